@@ -1,0 +1,99 @@
+"""Channels: the F-curves of one data-block's slot in its Action, as arrays.
+
+Frames are Blender's, sub-frames included; values are in the channel's own units. Blender keeps both in single
+precision.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+from ..motion import Poses
+
+
+def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
+    """The channels of `animated` in its Action. Whatever of Action, slot, layer and strip is missing is made."""
+    data = animated.animation_data or animated.animation_data_create()
+    if data.action is None:
+        data.action = bpy.data.actions.new(f"{animated.name}Action")
+    action = data.action
+    if data.action_slot is None:
+        data.action_slot = action.slots.new(animated.id_type, animated.name)
+    found = action_get_channelbag_for_slot(action, data.action_slot)
+    if found is not None:
+        return found
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(data.action_slot, ensure=True)
+
+
+def write_channel(
+    animated: bpy.types.ID,
+    data_path: str,
+    frames: np.ndarray,
+    values: np.ndarray,
+    *,
+    key_type: str = "KEYFRAME",
+    interpolation: str = "LINEAR",
+    group: str = "",
+) -> None:
+    """Replace a property's channels by keys of these values.
+
+    Parameters
+    ----------
+    animated : bpy.types.ID
+        The owner of the property.
+    data_path : str
+        The property, from `animated` on: "location".
+    frames : array, shape (n,)
+        Rising. They need not be whole.
+    values : array, shape (n,) or (n, channels)
+        One channel for a single number, one for each component of a vector.
+    key_type, interpolation : str
+        What every key gets; the names are those of `bpy.types.Keyframe`.
+    group : str
+        Where the Dope Sheet lists the channels. Empty for none.
+    """
+    channelbag = channelbag_of(animated)
+    fcurves = channelbag.fcurves
+    kind = bpy.types.Keyframe.bl_rna.properties
+    points = np.empty((len(frames), 2), dtype=np.float32)
+    points[:, 0] = frames
+    for index, column in enumerate(np.asarray(values).reshape(len(frames), -1).T):
+        if (old := fcurves.find(data_path, index=index)) is not None:
+            fcurves.remove(old)
+        fcurve = fcurves.new(data_path, index=index)
+        if group:
+            fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
+        points[:, 1] = column
+        keys = fcurve.keyframe_points
+        keys.add(len(frames))
+        keys.foreach_set("co", points.ravel())
+        for name, value in (("interpolation", interpolation), ("type", key_type)):
+            code = kind[name].enum_items[value].value
+            keys.foreach_set(name, np.full(len(frames), code, dtype=np.int32))
+        fcurve.update()
+
+
+def read_poses(obj: bpy.types.Object, frames: np.ndarray) -> Poses:
+    """The world poses of `obj` as the scene evaluates them: parents, constraints, drivers, deltas and all.
+
+    The scene steps through `frames` (shape (n,), sub-frames allowed) and returns to the frame it was on. Scales are
+    kept where the object is not of its own size; they are the mean of the three axes.
+    """
+    scene = bpy.context.scene
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    before, subframe = scene.frame_current, scene.frame_subframe
+    positions, quaternions = np.empty((len(frames), 3)), np.empty((len(frames), 4))
+    scales = np.empty(len(frames))
+    try:
+        for row, frame in enumerate(frames):
+            whole = int(np.floor(frame))
+            scene.frame_set(whole, subframe=float(frame - whole))
+            location, rotation, scale = obj.evaluated_get(depsgraph).matrix_world.decompose()
+            positions[row], quaternions[row], scales[row] = location, rotation, sum(scale) / 3.0
+    finally:
+        scene.frame_set(before, subframe=subframe)
+    return Poses(positions, quaternions, None if np.allclose(scales, 1.0, atol=1e-6) else scales)

@@ -1,0 +1,3 @@
+from .poses import Poses
+
+__all__ = ["Poses"]

@@ -1,0 +1,66 @@
+"""Poses: where a rigid body is and how it is turned, for many moments at once.
+
+Positions are in the units of their source, quaternions are unit, scalar first (w, x, y, z) as in `mathutils`, and
+scales are uniform and positive. All arrays are float64 and share their leading axes; the last of those is time, so
+one object has arrays of shape (n, 3) and (n, 4), and many objects have (objects, n, 3) and (objects, n, 4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Positions, rotations and, where the body grows or shrinks, scales.
+
+    Parameters
+    ----------
+    positions : array-like, shape (..., n, 3)
+    quaternions : array-like, shape (..., n, 4)
+        w, x, y, z. Kept as given: neither normalised nor checked for signs (see `addon.motion.repair`).
+    scales : array-like, shape (..., n), optional
+        Uniform scales. None means 1 everywhere, and is what every mode runs fastest with.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes do not fit one another.
+    """
+
+    positions: np.ndarray
+    quaternions: np.ndarray
+    scales: np.ndarray | None = None
+
+    def __init__(self, positions: ArrayLike, quaternions: ArrayLike, scales: ArrayLike | None = None) -> None:
+        positions = np.asarray(positions, dtype=np.float64)
+        quaternions = np.asarray(quaternions, dtype=np.float64)
+        if positions.shape[-1:] != (3,):
+            raise ValueError(f"positions need the shape (..., 3), not {positions.shape}")
+        if quaternions.shape != positions.shape[:-1] + (4,):
+            raise ValueError(f"quaternions need the shape {positions.shape[:-1] + (4,)}, not {quaternions.shape}")
+        if scales is not None:
+            scales = np.asarray(scales, dtype=np.float64)
+            if scales.shape != positions.shape[:-1]:
+                raise ValueError(f"scales need the shape {positions.shape[:-1]}, not {scales.shape}")
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "quaternions", quaternions)
+        object.__setattr__(self, "scales", scales)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The leading axes: (n,) for one object, (objects, n) for many."""
+        return self.positions.shape[:-1]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, index: Any) -> Poses:
+        """The poses at `index` of the leading axes: an integer, a slice, a mask or an array of integers."""
+        return Poses(
+            self.positions[index], self.quaternions[index], None if self.scales is None else self.scales[index]
+        )
