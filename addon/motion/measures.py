@@ -53,7 +53,9 @@ def measure(times: np.ndarray, poses: Poses, truth: Poses, radius: float = 0.1) 
 
 def shell_error(poses: Poses, truth: Poses, radius: float = 0.1) -> np.ndarray:
     """The largest displacement, shape (..., n), of the points at `radius` along the body's axes."""
-    displacement = np.stack([_shell_point(poses, axis, radius) - _shell_point(truth, axis, radius) for axis in range(3)])
+    displacement = np.stack(
+        [_shell_point(poses, axis, radius) - _shell_point(truth, axis, radius) for axis in range(3)]
+    )
     return np.sqrt(np.einsum("a...i,a...i->a...", displacement, displacement).max(axis=0))
 
 

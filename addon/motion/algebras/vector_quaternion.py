@@ -1,0 +1,30 @@
+"""Position and rotation apart, the state of the art of the paper: (1 - u) v + u w and q (q^-1 r)^u."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..poses import Poses
+from ..quaternions import conjugate, multiply
+
+
+def lerp_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
+    """Straight line and great arc."""
+    u = np.asarray(u)[..., None]
+    turned = multiply(first.quaternions, power(multiply(conjugate(first.quaternions), second.quaternions), u))
+    return Poses((1.0 - u) * first.positions + u * second.positions, turned, geometric_scales(first, second, u[..., 0]))
+
+
+def power(q: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """q^u = exp(u log q) of unit quaternions (n, 4) with non-negative w, u of shape (n, 1)."""
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    half_angle = np.arctan2(sine, q[..., :1])
+    axis = q[..., 1:] / np.where(sine == 0.0, 1.0, sine)
+    return np.concatenate((np.cos(u * half_angle), np.sin(u * half_angle) * axis), axis=-1)
+
+
+def geometric_scales(first: Poses, second: Poses, u: np.ndarray) -> np.ndarray | None:
+    """s0^(1 - u) s1^u: growth at an even rate. None where poses have no scales."""
+    if first.scales is None:
+        return None
+    return np.exp((1.0 - u) * np.log(first.scales) + u * np.log(second.scales))

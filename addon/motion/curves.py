@@ -1,0 +1,186 @@
+"""The fast forms: what each mode makes of the segments between keys, in the terms of `addon.motion.segments`.
+
+With D the chord, n the axis and h a quarter of the angle turned, positions relative to the centre are
+
+    lerp_slerp              D s / 2
+    dq_sclerp, pga_slerp    D_along s / 2 + D_across a + (n x D) b,       psi = s h
+    pga_lerp, cga_lerp      D a + (n x D) b,                              tan(psi) = s tan(h)
+
+    a = sin(psi) cos(psi) / sin(2 h),    b = sin(psi)^2 / sin(2 h) - tan(h) / 2
+
+so that the normalised blend of motors, which needs no sine, is the screw's own curve but for its uneven speed and for its
+advance along the axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .segments import SMALLEST_ANGLE, Curves, Segments
+
+
+def lerp_slerp(segments: Segments) -> Curves:
+    """Straight line and great arc."""
+
+    def basis(s, parameters, within):
+        turn, travel = np.empty((2, s.size)), np.empty((2, s.size))
+        _slerp(s, parameters[0], within, turn)
+        travel[0], travel[1] = 1.0, s
+        return turn, travel, _geometric_scales(s, parameters)
+
+    return _curves(segments, (segments.centre, 0.5 * segments.chord), (segments.quarter_angle,), basis)
+
+
+def screw(segments: Segments) -> Curves:
+    """The screw motion from key to key: ScLERP, and the SLERP of motors."""
+
+    def basis(s, parameters, within):
+        turn, travel = np.empty((2, s.size)), np.empty((4, s.size))
+        _slerp(s, parameters[0], within, turn)
+        travel[0], travel[1] = 1.0, s
+        np.multiply(turn[1], turn, out=travel[2:])
+        return turn, travel, _geometric_scales(s, parameters)
+
+    along, across, around = _decompose(segments)
+    sine = np.sin(2.0 * segments.quarter_angle)
+    offset = segments.centre - 0.5 * np.tan(segments.quarter_angle) * around
+    return _curves(segments, (offset, 0.5 * along, across / sine, around / sine), (segments.quarter_angle,), basis)
+
+
+def motor_lerp(segments: Segments) -> Curves:
+    """The normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
+
+    def basis(s, parameters, within):
+        turn, travel = np.empty((2, s.size)), np.empty((3, s.size))
+        _lerp(s, parameters[0], turn)
+        travel[0] = 1.0
+        np.multiply(turn[1], turn, out=travel[1:])
+        return turn, travel, _geometric_scales(s, parameters)
+
+    _, _, around = _decompose(segments)
+    tangent, sine = np.tan(segments.quarter_angle), np.sin(2.0 * segments.quarter_angle)
+    return _curves(
+        segments,
+        (segments.centre - 0.5 * tangent * around, segments.chord / sine, around / sine),
+        (tangent,),
+        basis,
+    )
+
+
+def similarity_slerp(segments: Segments) -> Curves:
+    """The geodesic of similarities: an even rate of turning, of advance and of growth. A screw where nothing grows."""
+    if segments.scales is None:
+        return screw(segments)
+
+    def basis(s, parameters, within):
+        quarter_angle, growth, _ = parameters
+        turn, travel = np.empty((2, s.size)), np.empty((4, s.size))
+        _slerp(s, quarter_angle, within, turn)
+        travel[0] = 1.0
+        # (exp(z u) - exp(z / 2)) / (exp(z) - 1), with z = l and z = l + i angle; u = (1 + s) / 2. See `algebras.cga`.
+        travel[1] = _half_sinh_share(s, growth, 0.0 * growth).real
+        across = _half_sinh_share(s, growth, 4.0 * quarter_angle)
+        travel[2], travel[3] = across.real, across.imag
+        return turn, travel, _geometric_scales(s, parameters)
+
+    along, across, around = _decompose(segments)
+    return _curves(segments, (segments.centre, along, across, around), (segments.quarter_angle,), basis)
+
+
+def similarity_lerp(segments: Segments) -> Curves:
+    """The projected blend of two versors of CGA. A motor's where nothing grows."""
+    if segments.scales is None:
+        return motor_lerp(segments)
+
+    def basis(s, parameters, within):
+        cosine, *roots = parameters
+        # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse for
+        # the weight of its rotor. See `algebras.cga.extract`.
+        shares = np.stack((1.0 - s, 1.0 + s))
+        shrinking, growing = shares / roots, shares * roots
+        rotor = 0.5 * (shrinking + growing)
+
+        def dot(a, b):
+            return a[0] * b[0] + a[1] * b[1] + cosine * (a[0] * b[1] + a[1] * b[0])
+
+        weight = dot(shrinking, shrinking)
+        travel = np.empty((3, s.size))
+        travel[0] = 1.0
+        travel[1] = (shrinking[1] ** 2 - shrinking[0] ** 2) / (2.0 * weight)
+        travel[2] = -shrinking[0] * shrinking[1] / weight
+        return rotor / np.sqrt(dot(rotor, rotor)), travel, dot(rotor, growing) / dot(rotor, shrinking)
+
+    h = segments.quarter_angle
+    _, _, around = _decompose(segments)
+    ends = segments.middle * np.cos(h), segments.difference * np.sin(h)
+    return Curves(
+        quaternions=np.stack((ends[0] - ends[1], ends[0] + ends[1]), axis=1),
+        positions=np.stack((segments.centre, segments.chord, np.sin(2.0 * h) * around), axis=1),
+        parameters=np.stack((np.cos(2.0 * h), *np.sqrt(segments.scales))),
+        basis=basis,
+    )
+
+
+def _curves(segments: Segments, positions: tuple, parameters: tuple, basis) -> Curves:
+    """Curves that turn about one axis and, where there are scales, grow geometrically."""
+    if segments.scales is not None:
+        logarithms = np.log(segments.scales)
+        parameters = (*parameters, logarithms[1] - logarithms[0], 0.5 * (logarithms[0] + logarithms[1]))
+    return Curves(
+        quaternions=np.stack((segments.middle, segments.difference), axis=1),
+        positions=np.stack(positions, axis=1),
+        parameters=np.stack(parameters),
+        basis=basis,
+    )
+
+
+def _decompose(segments: Segments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The chord's part along the axis, its part across, and n x D."""
+    n, chord = segments.axis, segments.chord
+    along = n * np.einsum("ks,ks->s", n, chord)
+    return along, chord - along, np.cross(n, chord, axis=0)
+
+
+def _slerp(s: np.ndarray, quarter_angle: np.ndarray, within: bool, turn: np.ndarray) -> None:
+    """cos(psi) and sin(psi) of psi = s h. Within the segment psi is at most 45 degrees, and a root gives the cosine."""
+    cosine, sine = turn
+    np.multiply(s, quarter_angle, out=cosine)
+    np.sin(cosine, out=sine)
+    if within:
+        np.multiply(sine, sine, out=cosine)
+        np.subtract(1.0, cosine, out=cosine)
+        np.sqrt(cosine, out=cosine)
+    else:
+        np.cos(cosine, out=cosine)
+
+
+def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
+    """cos(psi) and sin(psi) of tan(psi) = s tan(h)."""
+    cosine, sine = turn
+    np.multiply(s, tangent, out=sine)
+    np.multiply(sine, sine, out=cosine)
+    cosine += 1.0
+    np.sqrt(cosine, out=cosine)
+    np.reciprocal(cosine, out=cosine)
+    sine *= cosine
+
+
+def _geometric_scales(s: np.ndarray, parameters: np.ndarray) -> np.ndarray | None:
+    """Growth at an even rate, from the logarithms that `_curves` has put last; None where there are no scales."""
+    if len(parameters) < 3:
+        return None
+    growth, middle = parameters[-2:]
+    return np.exp(middle + 0.5 * s * growth)
+
+
+def _half_sinh_share(s: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> np.ndarray:
+    """(sinh(s w) + 2 sinh(s w / 2)^2) / (2 sinh(w)) - tanh(w / 2) / 2, where w = (real + i imaginary) / 2."""
+    w = 0.5 * real + 0.5j * imaginary
+    w = np.where(w == 0.0, SMALLEST_ANGLE, w)
+    half = _sinh(0.5 * s * w)
+    return (_sinh(s * w) + 2.0 * half * half) / (2.0 * _sinh(w)) - 0.5 * _sinh(0.5 * w) / np.cosh(0.5 * w)
+
+
+def _sinh(z: np.ndarray) -> np.ndarray:
+    """Of complex z, with both parts accurate where they are small."""
+    return np.sinh(z.real) * np.cos(z.imag) + 1j * np.cosh(z.real) * np.sin(z.imag)

@@ -1,0 +1,158 @@
+"""The table of interpolation modes, and the one way from keys to the poses between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import curves
+from .algebras import cga, dual_quaternions, pga, vector_quaternion
+from .poses import Poses
+from .segments import Curves, Segments, interpolate_along
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One way of filling in between two keys."""
+
+    label: str
+    """As menus and reports show it."""
+
+    description: str
+    """What it does for the motion, in one sentence, as a tooltip shows it."""
+
+    curves: Callable[[Segments], Curves]
+    """The fast form."""
+
+    reference: Callable[[Poses, Poses, np.ndarray], Poses]
+    """The same motion in the algebra it is named after, for single pairs of poses."""
+
+
+MODES: dict[str, Mode] = {
+    "lerp_slerp": Mode(
+        "Vector + Quaternion",
+        "The origin runs along a straight line while the object turns at an even speed",
+        curves.lerp_slerp,
+        vector_quaternion.lerp_slerp,
+    ),
+    "dq_sclerp": Mode(
+        "Screw (Dual Quaternion)",
+        "Turns about and slides along one fixed axis in space, both at an even speed",
+        curves.screw,
+        dual_quaternions.dq_sclerp,
+    ),
+    "pga_lerp": Mode(
+        "Motor Blend (PGA)",
+        "Nearly the screw motion, slower at the keys and faster half-way; the quickest to compute",
+        curves.motor_lerp,
+        pga.pga_lerp,
+    ),
+    "pga_slerp": Mode(
+        "Motor Screw (PGA)",
+        "The screw motion, by the exponential of the motor's logarithm",
+        curves.screw,
+        pga.pga_slerp,
+    ),
+    "cga_lerp": Mode(
+        "Versor Blend (CGA)",
+        "The motor blend, with uniform scale blended in the same breath",
+        curves.similarity_lerp,
+        cga.cga_lerp,
+    ),
+    "cga_slerp": Mode(
+        "Versor Spiral (CGA)",
+        "Turns, slides and grows at even rates: a screw that widens as the object grows",
+        curves.similarity_slerp,
+        cga.cga_slerp,
+    ),
+}
+
+
+def interpolate(
+    key_times: ArrayLike, keys: Poses, times: ArrayLike, mode: str = "dq_sclerp", *, extrapolate: bool = False
+) -> Poses:
+    """The poses at `times` of objects that have the poses `keys` at `key_times`.
+
+    Parameters
+    ----------
+    key_times : array-like, shape (n,) or (..., n)
+        Strictly rising, in any unit; the same for all objects, or a row for each.
+    keys : Poses, shape (n,) or (..., n)
+        The leading axes count objects. Quaternions need not be normalised; those that differ from their predecessor
+        by more than 180 degrees are taken with the other sign, so that the motion goes the short way.
+    times : array-like, shape (m,) or (..., m)
+        In any order, in the unit of `key_times`; the same for all objects, or a row for each.
+    mode : str
+        A key of `MODES`.
+    extrapolate : bool
+        Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold.
+
+    Returns
+    -------
+    Poses, shape (m,) or (..., m)
+        With unit quaternions. The arrays may be views that are not contiguous.
+
+    Raises
+    ------
+    ValueError
+        For an unknown mode, shapes that do not fit, times that do not rise, numbers that are not finite, quaternions of
+        length zero and scales that are not positive. The message names the key.
+
+    Notes
+    -----
+    Two rotations exactly 180 degrees apart have two shortest ways; the signs of the quaternions as given decide.
+
+    Examples
+    --------
+    >>> keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1]])  # a quarter turn about z
+    >>> interpolate([0, 1], keys, [0.5], "dq_sclerp").positions.round(6)
+    array([[ 0.5     , -0.207107,  0.      ]])
+    """
+    if mode not in MODES:
+        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    keys = _checked(key_times, keys)
+    if not np.isfinite(times).all():
+        raise ValueError("times to interpolate at need to be finite numbers")
+    if keys.shape[-1] == 1:
+        # A motion with a single key is a rest: the segment from that key to itself.
+        keys, key_times = keys[..., [0, 0]], key_times[..., :1] + np.array((0.0, 1.0))
+    if np.all(times[..., 1:] >= times[..., :-1]):
+        return interpolate_along(MODES[mode].curves, key_times, keys, times, extrapolate)
+    order = np.argsort(times, axis=-1, kind="stable")
+    rising = np.take_along_axis(times, order, axis=-1)
+    poses = interpolate_along(MODES[mode].curves, key_times, keys, rising, extrapolate)
+    back = np.broadcast_to(np.argsort(order, axis=-1, kind="stable"), poses.shape)
+    return Poses(
+        np.take_along_axis(poses.positions, back[..., None], axis=-2),
+        np.take_along_axis(poses.quaternions, back[..., None], axis=-2),
+        None if poses.scales is None else np.take_along_axis(poses.scales, back, axis=-1),
+    )
+
+
+def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
+    """The keys with unit quaternions, or a ValueError that names the first key that is wrong."""
+    if not keys.shape or keys.shape[-1] == 0:
+        raise ValueError("interpolation needs at least one key")
+    if key_times.shape not in (keys.shape, keys.shape[-1:]):
+        raise ValueError(f"key times of shape {key_times.shape} do not fit keys of shape {keys.shape}")
+    lengths = np.sqrt(np.einsum("...i,...i->...", keys.quaternions, keys.quaternions))
+    _require(np.isfinite(key_times), "has a time that is not a finite number")
+    _require(np.diff(key_times, prepend=-np.inf) > 0.0, "is not later than the key before it")
+    _require(np.isfinite(keys.positions).all(axis=-1), "has a position that is not finite")
+    _require(np.isfinite(lengths) & (lengths > 0.0), "has a quaternion of length zero or not finite")
+    if keys.scales is not None:
+        _require(np.isfinite(keys.scales) & (keys.scales > 0.0), "has a scale that is not a positive number")
+    return Poses(keys.positions, keys.quaternions / lengths[..., None], keys.scales)
+
+
+def _require(good: np.ndarray, complaint: str) -> None:
+    if not good.all():
+        *object_index, key = np.argwhere(~good)[0].tolist()
+        where = (
+            f" of object {object_index[0] if len(object_index) == 1 else tuple(object_index)}" if object_index else ""
+        )
+        raise ValueError(f"key {key}{where} {complaint}")
