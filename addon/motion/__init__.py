@@ -3,7 +3,22 @@
 No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and times keep the units they come in.
 """
 
+from .decimation import decimate
+from .measures import Errors, measure, rms, shell_error
 from .modes import MODES, Mode, interpolate
 from .poses import Poses
+from .repair import Repair, repair
 
-__all__ = ["MODES", "Mode", "Poses", "interpolate"]
+__all__ = [
+    "MODES",
+    "Errors",
+    "Mode",
+    "Poses",
+    "Repair",
+    "decimate",
+    "interpolate",
+    "measure",
+    "repair",
+    "rms",
+    "shell_error",
+]

@@ -8,8 +8,8 @@ With D the chord, n the axis and h a quarter of the angle turned, positions rela
 
     a = sin(psi) cos(psi) / sin(2 h),    b = sin(psi)^2 / sin(2 h) - tan(h) / 2
 
-so that the normalised blend of motors, which needs no sine, is the screw's own curve but for its uneven speed and for its
-advance along the axis.
+so that the normalised blend of motors, which needs no sine, is the screw's own curve but for its uneven speed and for
+its advance along the axis.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def screw(segments: Segments) -> Curves:
         np.multiply(turn[1], turn, out=travel[2:])
         return turn, travel, _geometric_scales(s, parameters)
 
-    along, across, around = _decompose(segments)
+    along, across, around = segments.decompose()
     sine = np.sin(2.0 * segments.quarter_angle)
     offset = segments.centre - 0.5 * np.tan(segments.quarter_angle) * around
     return _curves(segments, (offset, 0.5 * along, across / sine, around / sine), (segments.quarter_angle,), basis)
@@ -57,7 +57,7 @@ def motor_lerp(segments: Segments) -> Curves:
         np.multiply(turn[1], turn, out=travel[1:])
         return turn, travel, _geometric_scales(s, parameters)
 
-    _, _, around = _decompose(segments)
+    _, _, around = segments.decompose()
     tangent, sine = np.tan(segments.quarter_angle), np.sin(2.0 * segments.quarter_angle)
     return _curves(
         segments,
@@ -83,7 +83,7 @@ def similarity_slerp(segments: Segments) -> Curves:
         travel[2], travel[3] = across.real, across.imag
         return turn, travel, _geometric_scales(s, parameters)
 
-    along, across, around = _decompose(segments)
+    along, across, around = segments.decompose()
     return _curves(segments, (segments.centre, along, across, around), (segments.quarter_angle,), basis)
 
 
@@ -94,8 +94,8 @@ def similarity_lerp(segments: Segments) -> Curves:
 
     def basis(s, parameters, within):
         cosine, *roots = parameters
-        # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse for
-        # the weight of its rotor. See `algebras.cga.extract`.
+        # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse
+        # for the weight of its rotor. See `algebras.cga.extract`.
         shares = np.stack((1.0 - s, 1.0 + s))
         shrinking, growing = shares / roots, shares * roots
         rotor = 0.5 * (shrinking + growing)
@@ -111,7 +111,7 @@ def similarity_lerp(segments: Segments) -> Curves:
         return rotor / np.sqrt(dot(rotor, rotor)), travel, dot(rotor, growing) / dot(rotor, shrinking)
 
     h = segments.quarter_angle
-    _, _, around = _decompose(segments)
+    _, _, around = segments.decompose()
     ends = segments.middle * np.cos(h), segments.difference * np.sin(h)
     return Curves(
         quaternions=np.stack((ends[0] - ends[1], ends[0] + ends[1]), axis=1),
@@ -132,13 +132,6 @@ def _curves(segments: Segments, positions: tuple, parameters: tuple, basis) -> C
         parameters=np.stack(parameters),
         basis=basis,
     )
-
-
-def _decompose(segments: Segments) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The chord's part along the axis, its part across, and n x D."""
-    n, chord = segments.axis, segments.chord
-    along = n * np.einsum("ks,ks->s", n, chord)
-    return along, chord - along, np.cross(n, chord, axis=0)
 
 
 def _slerp(s: np.ndarray, quarter_angle: np.ndarray, within: bool, turn: np.ndarray) -> None:
@@ -165,7 +158,7 @@ def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
     sine *= cosine
 
 
-def _geometric_scales(s: np.ndarray, parameters: np.ndarray) -> np.ndarray | None:
+def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray | None:
     """Growth at an even rate, from the logarithms that `_curves` has put last; None where there are no scales."""
     if len(parameters) < 3:
         return None

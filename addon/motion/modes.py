@@ -115,13 +115,18 @@ def interpolate(
         raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
     key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
     keys = _checked(key_times, keys)
-    if not np.isfinite(times).all():
-        raise ValueError("times to interpolate at need to be finite numbers")
     if keys.shape[-1] == 1:
         # A motion with a single key is a rest: the segment from that key to itself.
         keys, key_times = keys[..., [0, 0]], key_times[..., :1] + np.array((0.0, 1.0))
-    if np.all(times[..., 1:] >= times[..., :-1]):
+    if times.ndim == 0 or times.shape not in ((times.shape[-1],), keys.shape[:-1] + times.shape[-1:]):
+        raise ValueError(f"times of shape {times.shape} do not fit keys of shape {keys.shape}")
+    if times.size == 0:
+        return keys[..., :0]
+    # Rising times that end in finite numbers are finite throughout, and what is not finite does not rise.
+    if np.all(times[..., 1:] >= times[..., :-1]) and np.isfinite(times[..., [0, -1]]).all():
         return interpolate_along(MODES[mode].curves, key_times, keys, times, extrapolate)
+    if not np.isfinite(times).all():
+        raise ValueError("times to interpolate at need to be finite numbers")
     order = np.argsort(times, axis=-1, kind="stable")
     rising = np.take_along_axis(times, order, axis=-1)
     poses = interpolate_along(MODES[mode].curves, key_times, keys, rising, extrapolate)
@@ -142,17 +147,17 @@ def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
     lengths = np.sqrt(np.einsum("...i,...i->...", keys.quaternions, keys.quaternions))
     _require(np.isfinite(key_times), "has a time that is not a finite number")
     _require(np.diff(key_times, prepend=-np.inf) > 0.0, "is not later than the key before it")
-    _require(np.isfinite(keys.positions).all(axis=-1), "has a position that is not finite")
-    _require(np.isfinite(lengths) & (lengths > 0.0), "has a quaternion of length zero or not finite")
+    _require(np.isfinite(keys.positions), "has a position that is not finite", axes_of_a_key=1)
+    _require(np.isfinite(lengths), "has a quaternion that is not finite")
+    _require(lengths > 0.0, "has a quaternion of length zero")
     if keys.scales is not None:
         _require(np.isfinite(keys.scales) & (keys.scales > 0.0), "has a scale that is not a positive number")
     return Poses(keys.positions, keys.quaternions / lengths[..., None], keys.scales)
 
 
-def _require(good: np.ndarray, complaint: str) -> None:
+def _require(good: np.ndarray, complaint: str, axes_of_a_key: int = 0) -> None:
+    """Raise a ValueError that names the first key that is not good; a key's own axes come last."""
     if not good.all():
-        *object_index, key = np.argwhere(~good)[0].tolist()
-        where = (
-            f" of object {object_index[0] if len(object_index) == 1 else tuple(object_index)}" if object_index else ""
-        )
-        raise ValueError(f"key {key}{where} {complaint}")
+        where = np.argwhere(~good)[0].tolist()
+        *objects, key = where[: len(where) - axes_of_a_key]
+        raise ValueError(f"key {key}{f' of object {objects}' if objects else ''} {complaint}")

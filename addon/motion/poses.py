@@ -41,8 +41,8 @@ class Poses:
         quaternions = np.asarray(quaternions, dtype=np.float64)
         if positions.shape[-1:] != (3,):
             raise ValueError(f"positions need the shape (..., 3), not {positions.shape}")
-        if quaternions.shape != positions.shape[:-1] + (4,):
-            raise ValueError(f"quaternions need the shape {positions.shape[:-1] + (4,)}, not {quaternions.shape}")
+        if quaternions.shape != (*positions.shape[:-1], 4):
+            raise ValueError(f"quaternions need the shape {(*positions.shape[:-1], 4)}, not {quaternions.shape}")
         if scales is not None:
             scales = np.asarray(scales, dtype=np.float64)
             if scales.shape != positions.shape[:-1]:

@@ -1,33 +1,34 @@
 """Segments: everything between two successive keys that does not depend on the moment, worked out once.
 
-Both keys of a segment are described from the pose half-way, with s = 2 u - 1 from -1 to 1 instead of u from 0 to 1. Of the
-quaternions q0 and q1 on either side, the sum and the difference are orthogonal: with their directions m and d and with h,
-a quarter of the angle turned, every mode's rotation is
+Both keys of a segment are described from the pose half-way, with s = 2 u - 1 from -1 to 1 instead of u from 0 to 1. Of
+the quaternions q0 and q1 on either side, the sum and the difference are orthogonal: with their directions m and d and
+with h, a quarter of the angle turned, every mode's rotation is
 
     q = m cos(psi) + d sin(psi),        psi = s h (slerp)  or  tan(psi) = s tan(h) (normalised lerp),
 
-the axis of the turn is n = d m*, and every position is a sum of a few fixed vectors, each times a function of psi and s.
-Nothing is divided by an angle that may vanish but together with the sine of that same angle: there is no special case
-for small turns, and none at 180 degrees.
+the axis of the turn is n = d m*, and every position is a sum of a few fixed vectors, each times a function of psi and
+s. Nothing is divided by an angle that may vanish but together with the sine of that same angle: there is no special
+case for small turns, and none at 180 degrees.
 
 A mode's fast form is a function from `Segments` to `Curves`; they are in `addon.motion.curves`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .poses import Poses
-from .quaternions import align_signs, conjugate, multiply
+from .quaternions import align_signs
 
-BLOCK = 8192
-"""In-betweens worked on at once: what fits the processor's second-level cache."""
+BLOCK = 32768
+"""In-betweens worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
 
 DENSE = 128
-"""In-betweens in a row with equally many in each segment, from which on a matrix product beats repeating coefficients."""
+"""In-betweens in a row, equally many in each segment, from which on a matrix product beats repeating coefficients."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -37,7 +38,7 @@ SMALLEST_ANGLE = 1e-150
 class Segments:
     """S segments, one after the other along the last axis of each array."""
 
-    mid_time: np.ndarray
+    start: np.ndarray
     """Shape (S,), seconds."""
 
     rate: np.ndarray
@@ -58,38 +59,43 @@ class Segments:
     quarter_angle: np.ndarray
     """h, from 0 to pi / 4, a quarter of the angle between the rotations, shape (S,)."""
 
-    axis: np.ndarray
-    """n, the axis of the turn, shape (3, S); zero where nothing turns."""
-
     scales: np.ndarray | None
     """The scales at both ends, shape (2, S), or None."""
 
     @classmethod
     def between(cls, key_times: np.ndarray, keys: Poses) -> Segments:
         """The n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
-        starts, durations = key_times[..., :-1], np.diff(key_times)
-        shape = keys.shape[:-1] + (keys.shape[-1] - 1,)
+        shape = (*keys.shape[:-1], keys.shape[-1] - 1)
         first, second = _components(keys.quaternions[..., :-1, :]), _components(keys.quaternions[..., 1:, :])
         begin, end = _components(keys.positions[..., :-1, :]), _components(keys.positions[..., 1:, :])
         total, change = first + second, second - first
         total_length, change_length = _length(total), _length(change)
         middle, difference = total / total_length, change / np.maximum(change_length, SMALLEST_ANGLE)
         return cls(
-            mid_time=np.broadcast_to(starts + 0.5 * durations, shape).ravel(),
-            rate=np.broadcast_to(2.0 / durations, shape).ravel(),
+            start=np.broadcast_to(key_times[..., :-1], shape).ravel(),
+            rate=np.broadcast_to(2.0 / np.diff(key_times), shape).ravel(),
             centre=0.5 * (begin + end),
             chord=end - begin,
             middle=middle,
             difference=difference,
             quarter_angle=np.maximum(np.arctan2(change_length, total_length), SMALLEST_ANGLE),
-            axis=multiply(difference.T, conjugate(middle.T)).T[1:],
             scales=None
             if keys.scales is None
             else np.stack((keys.scales[..., :-1].ravel(), keys.scales[..., 1:].ravel())),
         )
 
+    def decompose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The chord's part along the axis n, its part across, and n x D, each of shape (3, S).
 
-Basis = Callable[[np.ndarray, np.ndarray, bool], tuple[np.ndarray, np.ndarray, "np.ndarray | None"]]
+        Where nothing turns there is no axis: n is zero, and the whole chord is across.
+        """
+        (mw, *m), (dw, *d) = self.middle, self.difference
+        n = mw * np.stack(d) - dw * np.stack(m) - _cross(d, m)
+        along = n * np.einsum("ks,ks->s", n, self.chord)
+        return along, self.chord - along, _cross(n, self.chord)
+
+
+Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, np.ndarray, "np.ndarray | None"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +112,7 @@ class Curves:
     """The numbers of each segment that b and c need, shape (parameters, S)."""
 
     basis: Basis
-    """(s (n,), parameters (parameters, n), whether all s are within [-1, 1]) -> b (., n), c (., n), scales (n,) or None."""
+    """From s (n,), parameters of (n,) each and whether all |s| <= 1 to b (., n), c (., n) and scales (n,) or None."""
 
 
 def interpolate_along(
@@ -114,61 +120,84 @@ def interpolate_along(
 ) -> Poses:
     """Poses of shape (..., m) between at least two keys (..., n), at rising times (..., m).
 
-    `key_times` and `times` may leave out leading axes that all objects share. Quaternions of keys are unit.
+    `key_times` and `times` may leave out the leading axes, and all objects share them. Quaternions of keys are unit.
     """
-    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
     shape = keys.shape[:-1] + times.shape[-1:]
-    bounds = _sample_bounds(key_times, times, keys.shape)
-    samples = np.broadcast_to(times, shape).ravel()
-    result = np.empty((8 if keys.scales is not None else 7, samples.size))
-    mode = curves(segments)
-    timing = np.stack((segments.mid_time, segments.rate))
-    for segment, sample in _blocks(bounds):
-        counts = np.diff(bounds[segment.start : segment.stop + 1])
-        mid_time, rate, *parameters = np.repeat(
-            np.concatenate((timing[:, segment], mode.parameters[:, segment])), counts, axis=1
-        )
-        s = (samples[sample] - mid_time) * rate
-        if not extrapolate:
-            np.clip(s, -1.0, 1.0, out=s)
-        turn, travel, scales = mode.basis(s, np.asarray(parameters), not extrapolate)
-        _combine(mode.positions[..., segment], travel, counts, result[:3, sample])
-        _combine(mode.quaternions[..., segment], turn, counts, result[3:7, sample])
-        if scales is not None:
-            result[7, sample] = scales
+    keys = Poses(
+        keys.positions.reshape(-1, *keys.positions.shape[-2:]),
+        keys.quaternions.reshape(-1, *keys.quaternions.shape[-2:]),
+        None if keys.scales is None else keys.scales.reshape(-1, keys.scales.shape[-1]),
+    )
+    key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
+    result = np.empty((7 if keys.scales is None else 8, len(keys), times.shape[-1]))
+    at_once = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
+    for first in range(0, len(keys), at_once):
+        few = slice(first, first + at_once)
+        own_key_times, own_times = (rows if len(rows) == 1 else rows[few] for rows in (key_times, times))
+        _fill(curves, own_key_times, keys[few], own_times, extrapolate, result[:, few])
     return Poses(
-        result[:3].T.reshape(*shape, 3),
-        result[3:7].T.reshape(*shape, 4),
+        np.moveaxis(result[:3], 0, -1).reshape(*shape, 3),
+        np.moveaxis(result[3:7], 0, -1).reshape(*shape, 4),
         None if keys.scales is None else result[7].reshape(shape),
     )
 
 
-def _sample_bounds(key_times: np.ndarray, times: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def _fill(
+    curves: Callable[[Segments], Curves],
+    key_times: np.ndarray,
+    keys: Poses,
+    times: np.ndarray,
+    extrapolate: bool,
+    out: np.ndarray,
+) -> None:
+    """Fill out (7 or 8, objects, m) with positions, quaternions and, where the keys have them, scales.
+
+    Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
+    """
+    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
+    mode = curves(segments)
+    numbers = np.concatenate(((segments.start, segments.rate), mode.parameters))
+    bounds = _sample_bounds(key_times, times, len(keys))
+    samples = np.broadcast_to(times, out.shape[1:]).ravel()
+    flat = out.reshape(len(out), -1)
+    outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
+    for segment, sample in _blocks(bounds):
+        counts = np.diff(bounds[segment.start : segment.stop + 1])
+        start, rate, *parameters = np.repeat(numbers[:, segment], counts, axis=1)
+        s = samples[sample] - start
+        s *= rate
+        s -= 1.0
+        if outside and not extrapolate:
+            np.clip(s, -1.0, 1.0, out=s)
+        turn, travel, scales = mode.basis(s, parameters, not (outside and extrapolate))
+        _combine(mode.positions[..., segment], travel, counts, flat[:3, sample])
+        _combine(mode.quaternions[..., segment], turn, counts, flat[3:7, sample])
+        if scales is not None:
+            flat[7, sample] = scales
+
+
+def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
     """Where each segment's samples begin among the samples of all objects, shape (S + 1,)."""
-    objects, keys, samples = int(np.prod(shape[:-1])), shape[-1], times.shape[-1]
-    starts = np.zeros((objects, keys - 1), dtype=np.int64)
-    if keys > 2:
-        inner = key_times[..., 1:-1]
-        if inner.ndim == 1 and times.ndim == 1:
-            starts[:, 1:] = np.searchsorted(times, inner, side="right")
-        else:
-            inner = np.broadcast_to(inner, shape[:-1] + (keys - 2,)).reshape(objects, keys - 2)
-            own_times = np.broadcast_to(times, shape[:-1] + (samples,)).reshape(objects, samples)
-            for row in range(objects):
-                starts[row, 1:] = np.searchsorted(own_times[row], inner[row], side="right")
-    starts += samples * np.arange(objects)[:, None]
-    return np.append(starts.ravel(), objects * samples)
+    starts = np.zeros((objects, key_times.shape[-1] - 1), dtype=np.int64)
+    inner = key_times[:, 1:-1]
+    if inner.size:
+        # One search where all objects share their times, else one for each.
+        for row in range(max(len(inner), len(times))):
+            found = np.searchsorted(times[row % len(times)], inner[row % len(inner)], side="right")
+            starts[row if len(inner) > 1 or len(times) > 1 else slice(None), 1:] = found
+    starts += times.shape[-1] * np.arange(objects)[:, None]
+    return np.append(starts.ravel(), objects * times.shape[-1])
 
 
 def _blocks(bounds: np.ndarray) -> Iterator[tuple[slice, slice]]:
     """Slices of segments and of their samples, of about `BLOCK` samples each."""
     cuts = np.unique(np.append(np.searchsorted(bounds, np.arange(0, bounds[-1], BLOCK)), len(bounds) - 1))
-    for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+    for first, last in itertools.pairwise(cuts):
         yield slice(int(first), int(last)), slice(int(bounds[first]), int(bounds[last]))
 
 
 def _combine(coefficients: np.ndarray, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """out (k, n) = coefficients (k, b, S) of each sample's segment times basis (b, n); segment i has counts[i] samples."""
+    """Out (k, n) is the coefficients (k, b, S) of each sample's segment times basis (b, n); counts (S,) are of samples."""
     changes = np.flatnonzero(np.diff(counts)) + 1
     if counts.sum() < DENSE * (len(changes) + 1) or counts.min() < 8:
         np.einsum("kbn,bn->kn", np.repeat(coefficients, counts, axis=2), basis, out=out)
@@ -187,6 +216,10 @@ def _combine(coefficients: np.ndarray, basis: np.ndarray, counts: np.ndarray, ou
 def _components(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., k) one after the other as components (k, S)."""
     return np.ascontiguousarray(vectors.reshape(-1, vectors.shape[-1]).T)
+
+
+def _cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
+    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
 def _length(components: np.ndarray) -> np.ndarray:

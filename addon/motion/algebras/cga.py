@@ -1,4 +1,5 @@
-"""3D conformal geometric algebra: e1, e2, e3, e4 square to 1, e5 to -1; e_inf = e4 + e5. A pose is the versor M = T R S.
+"""3D conformal geometric algebra: e1, e2, e3, e4 square to 1, e5 to -1; e_inf = e4 + e5. A pose is the versor M = T R
+S.
 
 T = 1 - t e_inf / 2, R as in `pga`, and a uniform scale s is the dilator S = exp(-log(s) / 2 e45), the innermost factor.
 Of the rotor's terms the paper lists e1, e2, e3 too; a motor has none.
@@ -47,11 +48,11 @@ def encode(poses: Poses) -> np.ndarray:
 def extract(versor: np.ndarray, scaled: bool = True) -> Poses:
     """R, S and t of the versor that a blend of versors is projected to.
 
-    A blend that turns and grows at once is no versor: the rotor A on 1, e12, e13, e23 and the rotor B of the block B e45
-    point different ways. The rotation is that of A, and the scale is read from tanh(log(s) / 2) = -<B A~> / |A|^2. The
-    translation is where the blend takes the origin, T = C (A + B)^-1 with C the factor of e_inf, t = T . (e5 - e4); A + B is
-    what R S is to e_inf. So the path does not depend on where the world has its origin, and a motor, with B = 0, has the
-    paper's own extraction.
+    A blend that turns and grows at once is no versor: the rotor A on 1, e12, e13, e23 and the rotor B of the block B
+    e45 point different ways. The rotation is that of A, and the scale is read from tanh(log(s) / 2) = -<B A~> / |A|^2.
+    The translation is where the blend takes the origin, T = C (A + B)^-1 with C the factor of e_inf, t = T . (e5 - e4);
+    A + B is what R S is to e_inf. So the path does not depend on where the world has its origin, and a motor, with B =
+    0, has the paper's own extraction.
     """
     a, b = versor[..., _ROTOR], versor[..., _DILATED_ROTOR]
     squared = np.sum(a * a, axis=-1)

@@ -1,7 +1,7 @@
 """Geometric algebras: multivectors as arrays of coefficients, one for each basis blade, and their product.
 
-A multivector of an algebra over n basis vectors has shape (..., 2**n). Blades are named as in the paper, "e12" for e1 e2,
-and ordered by bit mask: bit i stands for the algebra's i-th basis vector.
+A multivector of an algebra over n basis vectors has shape (..., 2**n). Blades are named as in the paper, "e12" for e1
+e2, and ordered by bit mask: bit i stands for the algebra's i-th basis vector.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """3D projective geometric algebra: e0^2 = 0, e1^2 = e2^2 = e3^2 = 1. A pose is the motor M = T R.
 
-T = 1 - e0 (t1 e1 + t2 e2 + t3 e3) / 2, and the quaternion w, x, y, z is R = w - z e12 + y e13 - x e23, as the paper has it.
+T = 1 - e0 (t1 e1 + t2 e2 + t3 e3) / 2, and the quaternion w, x, y, z is R = w - z e12 + y e13 - x e23, as the paper has
+it.
 """
 
 from __future__ import annotations
@@ -59,8 +60,8 @@ def extract(motor: np.ndarray, scales: np.ndarray | None = None) -> Poses:
 def logarithm(motor: np.ndarray) -> np.ndarray:
     """The bivector whose exponential is a unit motor with non-negative scalar.
 
-    A motor is s + b + p I with a bivector b whose square is a scalar plus a multiple of I; the function h / sin h of that
-    "Study number" has the part f that scales b and the part f' that moves b's rotation over to its translation.
+    A motor is s + b + p I with a bivector b whose square is a scalar plus a multiple of I; the function h / sin h of
+    that "Study number" has the part f that scales b and the part f' that moves b's rotation over to its translation.
     """
     scalar, pseudoscalar = motor[..., [_SCALAR]], motor[..., [_PSEUDOSCALAR]]
     bivector = motor.copy()

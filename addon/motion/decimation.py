@@ -1,0 +1,43 @@
+"""Decimation: which samples of a recording are kept as keys."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def decimate(times: np.ndarray, rate: float) -> np.ndarray:
+    """The samples that a sender of `rate` poses a second would have sent: those nearest to its ticks.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Seconds, strictly rising.
+    rate : float
+        Keys a second. The ticks start at the first sample.
+
+    Returns
+    -------
+    array of int, shape (k,)
+        Rising indices without repetition, at least the first; where samples are rarer than ticks, all of them.
+
+    Raises
+    ------
+    ValueError
+        For a rate that is not a positive number.
+    """
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise ValueError(f"a rate of {rate} keys a second is not a positive number")
+    # A tick more than the duration holds would repeat the last sample; the allowance is for rounding, as in 2.0 * 0.5.
+    duration = times[-1] - times[0]
+    if duration * rate > 4.0 * len(times):
+        return np.arange(len(times))
+    ticks = times[0] + np.arange(np.floor(duration * rate + 1e-9) + 1.0) / rate
+    return np.unique(nearest(times, ticks))
+
+
+def nearest(times: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """The index of the time nearest to each moment, the earlier of two that are equally near."""
+    after = np.clip(np.searchsorted(times, moments), 1, max(len(times) - 1, 1))
+    if len(times) == 1:
+        return np.zeros(np.shape(moments), dtype=np.int64)
+    return after - (moments - times[after - 1] <= times[after] - moments)

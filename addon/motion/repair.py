@@ -1,0 +1,114 @@
+"""Repair: from a recording as devices deliver it to poses that can be interpolated.
+
+Rows are dropped, quaternions normalised and their signs aligned; nothing is invented. Whatever was done is said.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass
+
+import numpy as np
+
+from .poses import Poses
+from .quaternions import align_signs, normalise
+
+GAP = 1.75
+"""A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
+
+UNIT_TOLERANCE = 1e-3
+"""How far a quaternion's length may be from 1 before normalising it is worth a word: three decimals are often kept."""
+
+
+@dataclass(frozen=True)
+class Repair:
+    """One kind of fault that was found."""
+
+    fault: str
+    """What it was, and what was done about it."""
+
+    rows: np.ndarray
+    """The rows of the recording where, from 0. For a gap, the row after it."""
+
+    def __str__(self) -> str:
+        shown = ", ".join(str(row) for row in self.rows[:5].tolist())
+        return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > 5 else ''})"
+
+
+def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Repair]]:
+    """Make a recording fit for interpolation.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Seconds, as recorded.
+    poses : Poses, shape (n,)
+        As recorded: rows of NaN, quaternions of any length and sign.
+
+    Returns
+    -------
+    times : array, shape (m,)
+        Strictly rising.
+    poses : Poses, shape (m,)
+        Finite, with unit quaternions in successive hemispheres.
+    repairs : list of Repair
+        What was done, in the order it was done; empty for a recording without a fault.
+
+    Notes
+    -----
+    Of several rows with one time the last is kept, being the newest. Of times that run backwards, as few rows are
+    dropped as can be, so that one wild time stamp does not cost the rest of the recording. Gaps stay gaps.
+    """
+    repairs: list[Repair] = []
+    rows = np.arange(len(times))
+
+    def keep(good: np.ndarray, fault: str) -> None:
+        nonlocal times, poses, rows
+        if not good.all():
+            repairs.append(Repair(fault, rows[~good]))
+            times, poses, rows = times[good], poses[good], rows[good]
+
+    finite = (
+        np.isfinite(times) & np.isfinite(poses.positions).all(axis=-1) & np.isfinite(poses.quaternions).all(axis=-1)
+    )
+    if poses.scales is not None:
+        finite &= np.isfinite(poses.scales) & (poses.scales > 0.0)
+    keep(finite, "dropped rows with numbers that are missing or not finite")
+    lengths = np.linalg.norm(poses.quaternions, axis=-1)
+    keep(lengths > 1e-6, "dropped poses with a quaternion of length zero")
+    keep(_rising(times), "dropped rows whose time runs backwards")
+    keep(np.diff(times, append=np.inf) > 0.0, "dropped rows whose time comes again, keeping the last of each")
+
+    lengths = np.linalg.norm(poses.quaternions, axis=-1)
+    if (uneven := np.abs(lengths - 1.0) > UNIT_TOLERANCE).any():
+        repairs.append(Repair("normalised quaternions whose length was not 1", rows[uneven]))
+    quaternions = normalise(poses.quaternions)
+    aligned = align_signs(quaternions)
+    turned = np.any(aligned != quaternions, axis=-1)
+    if (flips := np.diff(turned, prepend=False)).any():
+        repairs.append(Repair("undid sign flips of quaternions", rows[flips]))
+    intervals = np.diff(times)
+    if len(intervals) and (gaps := intervals > GAP * np.median(intervals)).any():
+        longest = f"left gaps as they are, the longest {intervals.max() * 1e3:.0f} ms"
+        repairs.append(Repair(longest, rows[1:][gaps]))
+    return times, Poses(poses.positions, aligned, poses.scales), repairs
+
+
+def _rising(times: np.ndarray) -> np.ndarray:
+    """A mask of the longest part of `times` that never falls: the whole, where the recording is sound."""
+    if np.all(np.diff(times) >= 0.0):
+        return np.ones(len(times), dtype=bool)
+    # Longest non-decreasing subsequence by patience sorting: the smallest last time of each length, and who was before.
+    lasts: list[tuple[float, int]] = []
+    before = np.full(len(times), -1)
+    for row, time in enumerate(times.tolist()):
+        place = bisect_left(lasts, (time, row))
+        if place:
+            before[row] = lasts[place - 1][1]
+        lasts[place : place + 1] = [(time, row)]
+    kept = np.zeros(len(times), dtype=bool)
+    row = lasts[-1][1]
+    while row >= 0:
+        kept[row] = True
+        row = before[row]
+    return kept

@@ -1,0 +1,237 @@
+"""Poses a second of every mode, beside the libraries that offer the same motion, in one run on this machine.
+
+    python scripts/benchmark.py
+    python scripts/benchmark.py --rounds 30 --output docs/benchmark.md
+
+Each way starts from the keys (positions and quaternions) and ends with positions and quaternions. All take turns, round
+by round, so that a machine that slows down slows all of them; a figure is a way's fastest round, and what counts are the
+ratios. Needs the packages of the "test" extra.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytransform3d
+import scipy
+from pytransform3d.trajectories import (
+    dual_quaternions_from_pqs,
+    dual_quaternions_sclerp,
+    pqs_from_dual_quaternions,
+)
+from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from addon.motion import MODES, Poses, interpolate
+from addon.motion.quaternions import align_signs, multiply
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Objects (b) with keys (n), looked at m times each; and the same as a list of pairs, as the peers want it."""
+
+    title: str
+    key_times: np.ndarray
+    keys: Poses
+    times: np.ndarray
+
+    @property
+    def in_betweens(self) -> int:
+        return self.keys.shape[0] * self.times.shape[-1]
+
+    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """The first key of each in-between among all keys of all objects, and the share u of the way to the next."""
+        objects, n = self.keys.shape
+        times = np.broadcast_to(self.times, (objects, self.times.shape[-1]))
+        segment = np.clip(np.searchsorted(self.key_times, times, side="right") - 1, 0, n - 2)
+        u = (times - self.key_times[segment]) / (self.key_times[segment + 1] - self.key_times[segment])
+        return (segment + n * np.arange(objects)[:, None]).ravel(), u.ravel()
+
+
+def cases(count: int) -> Iterator[Case]:
+    """The shapes of work that users bring: `count` in-betweens or a few more in each."""
+    random = np.random.default_rng(7)
+
+    def case(title: str, objects: int, keys: int, times: np.ndarray) -> Case:
+        quaternions = random.normal(size=(objects, keys, 4))
+        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+        poses = Poses(random.normal(size=(objects, keys, 3)), align_signs(quaternions))
+        return Case(title, np.arange(float(keys)), poses, times)
+
+    yield case("a path, 1000 in-betweens to a segment", 1, count // 1000 + 1, np.arange(count) / 1000.0)
+    yield case(
+        "a recording, 9 samples to a segment, uneven", 1, count // 9 + 1, np.sort(random.uniform(0, count // 9, count))
+    )
+    yield case("2000 objects, 10 segments, 24 frames each", 2000, 11, np.arange(240) / 24.0)
+    yield case("independent pairs", count, 2, random.uniform(size=(count, 1)))
+
+
+def numpy_closed_form(case: Case, mode: str) -> Callable[[], object]:
+    """What one would write first: gather both keys of every in-between and evaluate the closed form on all of them."""
+
+    def run() -> Poses:
+        first, u = case.pairs()
+        p0, q0 = case.keys.positions.reshape(-1, 3)[first], case.keys.quaternions.reshape(-1, 4)[first]
+        p1, q1 = case.keys.positions.reshape(-1, 3)[first + 1], case.keys.quaternions.reshape(-1, 4)[first + 1]
+        u = u[:, None]
+        cosine = np.sum(q0 * q1, axis=1, keepdims=True)
+        chord = p1 - p0
+        if mode == "pga_lerp":
+            squared = (1 - u) ** 2 + u**2 + 2 * u * (1 - u) * cosine
+            v = multiply(q1, q0 * (1, -1, -1, -1))[:, 1:]
+            across = u * (1 - u) / squared * np.cross(v, chord)
+            return Poses(
+                p0 + (u**2 + u * (1 - u) * cosine) / squared * chord - across,
+                ((1 - u) * q0 + u * q1) / np.sqrt(squared),
+            )
+        angle = np.arccos(np.minimum(cosine, 1.0))
+        sine = np.maximum(np.sin(angle), 1e-12)
+        w0, w1 = np.sin((1 - u) * angle) / sine, np.sin(u * angle) / sine
+        quaternions = w0 * q0 + w1 * q1
+        if mode == "lerp_slerp":
+            return Poses(p0 + u * chord, quaternions)
+        v = multiply(q1, q0 * (1, -1, -1, -1))[:, 1:]
+        across = chord - v * np.sum(v * chord, axis=1, keepdims=True) / sine**2
+        swing = (w1 * np.cos((1 - u) * angle) - u) * across
+        return Poses(p0 + u * chord + swing - w0 * w1 * np.cross(v, chord), quaternions)
+
+    return run
+
+
+def numpy_algebra(case: Case, mode: str) -> Callable[[], object]:
+    """This program's own reference of the mode, in the algebra it is named after."""
+
+    def run() -> Poses:
+        first, u = case.pairs()
+        keys = Poses(case.keys.positions.reshape(-1, 3), case.keys.quaternions.reshape(-1, 4))
+        return MODES[mode].reference(keys[first], keys[first + 1], u)
+
+    return run
+
+
+def pytransform3d_sclerp(case: Case) -> Callable[[], object]:
+    """`dual_quaternions_sclerp` of `pytransform3d.trajectories`, its batch form."""
+
+    def run() -> np.ndarray:
+        first, u = case.pairs()
+        pqs = np.concatenate((case.keys.positions, case.keys.quaternions), axis=-1).reshape(-1, 7)
+        keys = dual_quaternions_from_pqs(pqs)
+        return pqs_from_dual_quaternions(dual_quaternions_sclerp(keys[first], keys[first + 1], u))
+
+    return run
+
+
+def scipy_screw(case: Case) -> Callable[[], object]:
+    """`RigidTransform`: a logarithm for each segment, an exponential for each in-between."""
+
+    def run() -> tuple[np.ndarray, np.ndarray]:
+        first, u = case.pairs()
+        keys = RigidTransform.from_components(
+            case.keys.positions.reshape(-1, 3),
+            Rotation.from_quat(case.keys.quaternions.reshape(-1, 4), scalar_first=True),
+        )
+        screws = (keys[:-1].inv() * keys[1:]).as_exp_coords()
+        between = keys[first] * RigidTransform.from_exp_coords(u[:, None] * screws[first])
+        return between.translation, between.rotation.as_quat(scalar_first=True)
+
+    return run
+
+
+def scipy_slerp(case: Case) -> Callable[[], object]:
+    """`Slerp`, and NumPy's `interp` for the three coordinates; one object after the other, as SciPy has it."""
+
+    def run() -> list[tuple[np.ndarray, np.ndarray]]:
+        result = []
+        for positions, quaternions in zip(case.keys.positions, case.keys.quaternions, strict=True):
+            turns = Slerp(case.key_times, Rotation.from_quat(quaternions, scalar_first=True))
+            straight = np.stack([np.interp(case.times, case.key_times, p) for p in positions.T], axis=-1)
+            result.append((straight, turns(case.times).as_quat(scalar_first=True)))
+        return result
+
+    return run
+
+
+def ways(case: Case) -> dict[tuple[str, str], Callable[[], object]]:
+    """(mode, who computes it) to what computes it."""
+    result: dict[tuple[str, str], Callable[[], object]] = {}
+    for mode in MODES:
+        result[mode, "Rigid Motion"] = lambda mode=mode: interpolate(case.key_times, case.keys, case.times, mode)
+        result[mode, "NumPy, in the algebra"] = numpy_algebra(case, mode)
+    for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp"):
+        result[mode, "NumPy, closed form"] = numpy_closed_form(case, mode)
+    result["dq_sclerp", "pytransform3d"] = pytransform3d_sclerp(case)
+    result["dq_sclerp", "SciPy"] = scipy_screw(case)
+    if case.times.ndim == 1 and case.keys.shape[0] == 1:
+        result["lerp_slerp", "SciPy"] = scipy_slerp(case)
+    return result
+
+
+def race(contestants: dict[tuple[str, str], Callable[[], object]], rounds: int) -> dict[tuple[str, str], list[float]]:
+    """Seconds of every round of each, all taking turns. Slow ones sit out most rounds once a fifth is run."""
+    seconds: dict[tuple[str, str], list[float]] = {name: [] for name in contestants}
+    for run in contestants.values():
+        run()
+    for turn in range(rounds):
+        for name, run in contestants.items():
+            if seconds[name] and turn % 5 and min(seconds[name]) > 0.1:
+                continue
+            start = time.perf_counter()
+            run()
+            seconds[name].append(time.perf_counter() - start)
+    return seconds
+
+
+def report(case: Case, seconds: dict[tuple[str, str], list[float]]) -> Iterator[str]:
+    """The case as lines of Markdown: million poses a second, and this program's multiple of each peer."""
+    fastest = {name: min(times) for name, times in seconds.items()}
+    yield f"### {case.title[0].upper()}{case.title[1:]}"
+    yield ""
+    yield f"{case.in_betweens} in-betweens from {case.keys.shape[0] * case.keys.shape[1]} keys."
+    yield ""
+    yield "| mode | computed by | million poses/s | Rigid Motion is faster by |"
+    yield "|---|---|---:|---:|"
+    for (mode, who), best in fastest.items():
+        ratio = "" if who == "Rigid Motion" else f"{best / fastest[mode, 'Rigid Motion']:.1f} times"
+        yield f"| `{mode}` | {who} | {case.in_betweens / best / 1e6:.2f} | {ratio} |"
+    saved = 1.0 - fastest["pga_lerp", "Rigid Motion"] / fastest["lerp_slerp", "Rigid Motion"]
+    yield ""
+    yield f"`pga_lerp` takes {saved:.1%} less time a pose than `lerp_slerp`, both in their fast form."
+    yield ""
+
+
+def versions() -> str:
+    """What was measured, on what."""
+    return (
+        f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}, "
+        f"pytransform3d {pytransform3d.__version__}, {platform.system()} {platform.machine()}"
+    )
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run all cases; print, and write where asked."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=100_000, help="in-betweens in a case (%(default)s)")
+    parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
+    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
+    options = parser.parse_args(arguments)
+    lines = ["# Benchmark", "", f"`python scripts/benchmark.py --rounds {options.rounds}`: {versions()}.", ""]
+    lines += [*__doc__.split("\n\n")[-1].strip().splitlines(), ""]
+    for case in cases(options.count):
+        print(f"{case.title} ...", file=sys.stderr, flush=True)
+        lines += report(case, race(ways(case), options.rounds))
+    print("\n".join(lines))
+    if options.output:
+        options.output.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
