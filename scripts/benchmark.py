@@ -3,9 +3,11 @@
     python scripts/benchmark.py
     python scripts/benchmark.py --rounds 30 --output docs/benchmark.md
 
-Each way starts from the keys (positions and quaternions) and ends with positions and quaternions. All take turns, round
-by round, so that a machine that slows down slows all of them; a figure is a way's fastest round, and what counts are the
-ratios. Needs the packages of the "test" extra.
+Each way starts from the keys (positions and quaternions) and ends with positions and quaternions. All take turns,
+round by round, so that a machine that slows down slows all of them; a figure is a way's fastest round, and what counts
+are the ratios. "In the algebra" is the mode written out in NumPy as in the paper, for every in-between anew (this
+program's own reference); "closed form" is the best formula known to this program without a table of segments.
+Needs the packages of the "test" extra.
 """
 
 from __future__ import annotations

@@ -116,8 +116,8 @@ def interpolate(
     key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
     keys = _checked(key_times, keys)
     if keys.shape[-1] == 1:
-        # A motion with a single key is a rest: the segment from that key to itself.
-        keys, key_times = keys[..., [0, 0]], key_times[..., :1] + np.array((0.0, 1.0))
+        # A motion with a single key is a rest at all times: the segment from that key to itself.
+        keys, key_times = keys[..., [0, 0]], np.array((0.0, 1.0))
     if times.ndim == 0 or times.shape not in ((times.shape[-1],), keys.shape[:-1] + times.shape[-1:]):
         raise ValueError(f"times of shape {times.shape} do not fit keys of shape {keys.shape}")
     if times.size == 0:

@@ -60,7 +60,8 @@ class Poses:
         return len(self.positions)
 
     def __getitem__(self, index: Any) -> Poses:
-        """The poses at `index` of the leading axes: an integer, a slice, a mask or an array of integers."""
+        """The poses at `index` of the leading axes, by NumPy's rules: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""
+        whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
         return Poses(
-            self.positions[index], self.quaternions[index], None if self.scales is None else self.scales[index]
+            self.positions[whole], self.quaternions[whole], None if self.scales is None else self.scales[index]
         )

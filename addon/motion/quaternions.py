@@ -31,9 +31,16 @@ def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points + q[..., :1] * turned + np.cross(q[..., 1:], turned)
 
 
+def length(q: np.ndarray) -> np.ndarray:
+    """The length of quaternions (..., 4), without overflow or underflow on the way."""
+    largest = np.abs(q).max(axis=-1, initial=0.0)
+    safe = np.where(largest == 0.0, 1.0, largest)
+    return largest * np.linalg.norm(q / safe[..., None], axis=-1)
+
+
 def normalise(q: np.ndarray) -> np.ndarray:
     """Unit quaternions of the same directions. Every quaternion needs a length above zero."""
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return q / length(q)[..., None]
 
 
 def align_signs(q: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .poses import Poses
-from .quaternions import align_signs, normalise
+from .quaternions import align_signs, length, normalise
 
 GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
@@ -74,12 +74,12 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     if poses.scales is not None:
         finite &= np.isfinite(poses.scales) & (poses.scales > 0.0)
     keep(finite, "dropped rows with numbers that are missing or not finite")
-    lengths = np.linalg.norm(poses.quaternions, axis=-1)
-    keep(lengths > 1e-6, "dropped poses with a quaternion of length zero")
+    lengths = length(poses.quaternions)
+    keep((lengths > 1e-6) & np.isfinite(lengths), "dropped poses with a quaternion of length zero")
     keep(_rising(times), "dropped rows whose time runs backwards")
     keep(np.diff(times, append=np.inf) > 0.0, "dropped rows whose time comes again, keeping the last of each")
 
-    lengths = np.linalg.norm(poses.quaternions, axis=-1)
+    lengths = length(poses.quaternions)
     if (uneven := np.abs(lengths - 1.0) > UNIT_TOLERANCE).any():
         repairs.append(Repair("normalised quaternions whose length was not 1", rows[uneven]))
     quaternions = normalise(poses.quaternions)

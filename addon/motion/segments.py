@@ -197,7 +197,10 @@ def _blocks(bounds: np.ndarray) -> Iterator[tuple[slice, slice]]:
 
 
 def _combine(coefficients: np.ndarray, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Out (k, n) is the coefficients (k, b, S) of each sample's segment times basis (b, n); counts (S,) are of samples."""
+    """Fill out (k, n) with the coefficients (k, b, S) of each sample's segment times basis (b, n).
+
+    Segment i has counts[i] samples, and at least one segment has any.
+    """
     changes = np.flatnonzero(np.diff(counts)) + 1
     if counts.sum() < DENSE * (len(changes) + 1) or counts.min() < 8:
         np.einsum("kbn,bn->kn", np.repeat(coefficients, counts, axis=2), basis, out=out)

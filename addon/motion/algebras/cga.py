@@ -32,11 +32,17 @@ def cga_lerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
 
 
 def cga_slerp(first: Poses, second: Poses, u: np.ndarray) -> Poses:
-    """M0 exp(u log(M0^-1 M1)): the geodesic of similarities, at an even rate of turning, of advance and of growth."""
-    u = np.asarray(u)
-    start, end = encode(first), encode(second)
-    bivector = logarithm(CGA.product(inverse(start), end))
-    return extract(CGA.product(start, exponential(u[..., None] * bivector)), scaled=first.scales is not None)
+    """M0 exp(u log(M0^-1 M1)): the geodesic of similarities, at an even rate of turning, of advance and of growth.
+
+    It does not depend on where the world has its origin, so the first position serves: far away from it, the squares of
+    e4 and e5 that cancel in M0^-1 M1 would take half of the digits with them.
+    """
+    u, origin = np.asarray(u), first.positions
+    start = encode(Poses(np.zeros_like(origin), first.quaternions, first.scales))
+    end = encode(Poses(second.positions - origin, second.quaternions, second.scales))
+    bivector = logarithm(CGA.product(CGA.reverse(start), end))
+    between = extract(CGA.product(start, exponential(u[..., None] * bivector)), scaled=first.scales is not None)
+    return Poses(origin + between.positions, between.quaternions, between.scales)
 
 
 def encode(poses: Poses) -> np.ndarray:
@@ -65,11 +71,6 @@ def extract(versor: np.ndarray, scaled: bool = True) -> Poses:
     at_infinity[..., _ROTOR + _DILATED_ROTOR] = 0.0
     translator = CGA.product(at_infinity, CGA.reverse(seen)) / np.sum(seen * seen, axis=-1, keepdims=True)
     return Poses(-(translator[..., _T4] + translator[..., _T5]), quaternions, np.exp(log_scales) if scaled else None)
-
-
-def inverse(versor: np.ndarray) -> np.ndarray:
-    """The reverse: T, R and S are unit versors."""
-    return CGA.reverse(versor)
 
 
 def logarithm(versor: np.ndarray) -> np.ndarray:

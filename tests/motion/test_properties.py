@@ -1,0 +1,285 @@
+"""What every mode promises, whatever the keys."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from addon.motion import MODES, Poses, interpolate
+from addon.motion.quaternions import angle_between, multiply, normalise, rotate
+
+SCREWS = ["dq_sclerp", "pga_slerp", "cga_slerp", "pga_lerp", "cga_lerp"]
+
+every_mode = pytest.mark.parametrize("mode", MODES)
+numbers = st.floats(-100.0, 100.0, width=32)
+
+
+@st.composite
+def motions(draw, least=2, most=6, scaled=False):
+    """Key times and keys: unevenly spaced, repeated poses and half turns among them."""
+    count = draw(st.integers(least, most))
+    intervals = draw(arrays(float, count, elements=st.floats(0.015625, 8.0, width=32)))
+    quaternions = draw(arrays(float, (count, 4), elements=st.floats(-1.0, 1.0, width=32)))
+    assume(np.all(np.linalg.norm(quaternions, axis=1) > 1e-3))
+    positions = draw(arrays(float, (count, 3), elements=numbers))
+    scales = draw(arrays(float, count, elements=st.floats(0.0625, 16.0, width=32))) if scaled else None
+    if draw(st.booleans()):
+        positions[-1], quaternions[-1] = positions[0], quaternions[0]
+    return np.cumsum(intervals), Poses(positions, normalise(quaternions), scales)
+
+
+def with_rotation(poses: Poses, quaternions: np.ndarray) -> Poses:
+    return Poses(poses.positions, quaternions, poses.scales)
+
+
+def placed(by: Poses, poses: Poses) -> Poses:
+    """The poses seen from another frame of the world: `by` has one pose."""
+    return Poses(
+        by.positions + rotate(np.broadcast_to(by.quaternions, poses.quaternions.shape), poses.positions),
+        multiply(np.broadcast_to(by.quaternions, poses.quaternions.shape), poses.quaternions),
+    )
+
+
+def reseated(poses: Poses, on: Poses) -> Poses:
+    """The poses of another point and set of axes of the same body: `on` has one pose."""
+    moved = rotate(poses.quaternions, np.broadcast_to(on.positions, poses.positions.shape))
+    return Poses(
+        poses.positions + moved,
+        multiply(poses.quaternions, np.broadcast_to(on.quaternions, poses.quaternions.shape)),
+    )
+
+
+def assert_close(a: Poses, b: Poses, tolerance: float = 1e-9) -> None:
+    assert np.abs(a.positions - b.positions).max() <= tolerance * (1.0 + np.abs(b.positions).max())
+    assert angle_between(a.quaternions, b.quaternions).max() <= tolerance
+
+
+def no_half_turn(keys: Poses) -> bool:
+    """Whether no two neighbours are so near 180 degrees apart that rounding decides on the way round."""
+    dots = np.sum(keys.quaternions[1:] * keys.quaternions[:-1], axis=1)
+    return bool(np.all(np.abs(dots) > 1e-6))
+
+
+def times_between(key_times: np.ndarray, count: int = 37) -> np.ndarray:
+    return np.linspace(key_times[0], key_times[-1], count)
+
+
+@every_mode
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+@given(data=st.data())
+def test_keys_are_met(mode, scaled, data):
+    key_times, keys = data.draw(motions(scaled=scaled))
+    poses = interpolate(key_times, keys, key_times, mode)
+    assert_close(poses, keys, 1e-12)
+    if scaled:
+        assert poses.scales == pytest.approx(keys.scales, rel=1e-12)
+
+
+@every_mode
+@pytest.mark.parametrize("extrapolate", [False, True])
+@given(motion=motions())
+def test_quaternions_are_unit(mode, extrapolate, motion):
+    key_times, keys = motion
+    times = np.linspace(key_times[0] - 1.0, key_times[-1] + 1.0, 51)
+    poses = interpolate(key_times, keys, times, mode, extrapolate=extrapolate)
+    assert np.abs(np.linalg.norm(poses.quaternions, axis=1) - 1.0).max() < 1e-12
+
+
+@every_mode
+@given(motion=motions(), seed=st.integers(0, 2**32 - 1))
+def test_q_and_minus_q_give_the_same_path(mode, motion, seed):
+    key_times, keys = motion
+    assume(no_half_turn(keys))
+    signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(len(keys), 1))
+    times = times_between(key_times)
+    flipped = interpolate(key_times, with_rotation(keys, signs * keys.quaternions), times, mode)
+    assert_close(flipped, interpolate(key_times, keys, times, mode), 1e-12)
+
+
+@every_mode
+@given(motion=motions())
+def test_a_motion_run_backwards_takes_the_same_way(mode, motion):
+    key_times, keys = motion
+    assume(no_half_turn(keys))
+    times = times_between(key_times)
+    backwards = interpolate(-key_times[::-1], keys[::-1], -times, mode)
+    assert_close(backwards, interpolate(key_times, keys, times, mode))
+
+
+@pytest.mark.parametrize("mode", SCREWS)
+@given(motion=motions(), frames=motions(least=2, most=2))
+def test_screws_do_not_depend_on_the_frames_of_world_and_body(mode, motion, frames):
+    key_times, keys = motion
+    assume(no_half_turn(keys))
+    world, body = frames[1][0], frames[1][1]
+    times = times_between(key_times)
+    moved = interpolate(key_times, reseated(placed(world, keys), body), times, mode)
+    assert_close(moved, reseated(placed(world, interpolate(key_times, keys, times, mode)), body), 1e-7)
+
+
+def test_lerp_slerp_depends_on_where_the_origin_of_the_body_is():
+    keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [0, 0, 0, 1]])
+    elsewhere = Poses([0, 1, 0], [1, 0, 0, 0])
+    half = interpolate([0, 1], keys, [0.5], "lerp_slerp")
+    other = interpolate([0, 1], reseated(keys, elsewhere), [0.5], "lerp_slerp")
+    assert np.linalg.norm(other.positions - reseated(half, elsewhere).positions) > 0.5
+
+
+@every_mode
+@given(motion=motions(scaled=True), shift=arrays(float, 3, elements=numbers))
+def test_the_origin_of_the_world_does_not_matter_even_where_things_grow(mode, motion, shift):
+    key_times, keys = motion
+    assume(no_half_turn(keys))
+    times = times_between(key_times)
+    there = interpolate(key_times, Poses(keys.positions + shift, keys.quaternions, keys.scales), times, mode)
+    here = interpolate(key_times, keys, times, mode)
+    assert_close(there, Poses(here.positions + shift, here.quaternions), 1e-7)
+
+
+@every_mode
+@given(motion=motions(), times=arrays(float, 20, elements=st.floats(-10.0, 60.0, width=32)))
+def test_the_order_of_times_does_not_matter(mode, motion, times):
+    shuffled = interpolate(*motion, times, mode)
+    rising = interpolate(*motion, np.sort(times), mode)
+    order = np.argsort(times, kind="stable")
+    assert np.array_equal(shuffled.positions[order], rising.positions)
+    assert np.array_equal(shuffled.quaternions[order], rising.quaternions)
+
+
+@every_mode
+@given(motion=motions())
+def test_end_poses_hold_outside_the_keys(mode, motion):
+    key_times, keys = motion
+    poses = interpolate(key_times, keys, [key_times[0] - 5.0, key_times[-1] + 5.0], mode)
+    assert_close(poses, keys[[0, -1]], 1e-12)
+
+
+@every_mode
+def test_extrapolation_goes_on_with_the_last_segment(mode):
+    keys = Poses([[0, 0, 0], [5, 0, 0], [1, 2, 0]], [[1, 0, 0, 0], [1, 0, 0, 0], [np.cos(0.3), 0, 0, np.sin(0.3)]])
+    beyond = interpolate([0, 1, 2], keys, [2.5, -0.5], mode, extrapolate=True)
+    alone = MODES[mode].reference(keys[[1]], keys[[2]], np.array([1.5]))
+    assert_close(beyond[[0]], alone, 1e-12)
+    assert_close(beyond[[1]], Poses([[-2.5, 0, 0]], [[1, 0, 0, 0]]), 1e-12)
+
+
+@every_mode
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+@pytest.mark.parametrize("own_key_times", [False, True])
+@pytest.mark.parametrize("own_times", [False, True])
+def test_many_objects_at_once_are_the_objects_one_by_one(mode, scaled, own_key_times, own_times):
+    random = np.random.default_rng(5)
+    shape = (2, 7, 11)
+    quaternions = random.normal(size=(*shape, 4))
+    keys = Poses(random.normal(size=(*shape, 3)), quaternions, np.exp(random.normal(size=shape)) if scaled else None)
+    key_times = np.cumsum(random.uniform(0.1, 1.0, size=shape if own_key_times else shape[-1:]), axis=-1)
+    times = random.uniform(-1.0, 8.0, size=(2, 7, 400) if own_times else (400,))
+    together = interpolate(key_times, keys, times, mode)
+    assert together.shape == (2, 7, 400)
+    for row in np.ndindex(2, 7):
+        alone = interpolate(
+            key_times[row] if own_key_times else key_times, keys[row], times[row] if own_times else times, mode
+        )
+        assert np.array_equal(together.positions[row], alone.positions)
+        assert np.array_equal(together.quaternions[row], alone.quaternions)
+        if scaled:
+            assert np.array_equal(together.scales[row], alone.scales)
+
+
+@every_mode
+@pytest.mark.parametrize("count", [1, 9, 100_000])
+def test_dense_and_sparse_evaluation_agree(mode, count):
+    # Even stretches go through matrix products, uneven ones through repeated coefficients.
+    random = np.random.default_rng(8)
+    keys = Poses(random.normal(size=(12, 3)), random.normal(size=(12, 4)))
+    times = np.linspace(0.0, 11.0, count)
+    together = interpolate(np.arange(12.0), keys, times, mode)
+    some = random.choice(count, size=min(count, 500), replace=False)
+    alone = interpolate(np.arange(12.0), keys, times[some], mode)
+    assert np.abs(together.positions[some] - alone.positions).max() < 1e-13
+    assert np.abs(together.quaternions[some] - alone.quaternions).max() < 1e-13
+
+
+def test_clock_times_of_ten_digits_lose_nothing():
+    keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 0]])
+    start, end = 1305031098.6659, 1305031098.7659
+    moment = start + 0.25 * (end - start)
+    expected = (moment - start) / (end - start)
+    assert interpolate([start, end], keys, [moment], "dq_sclerp").positions[0, 0] == pytest.approx(expected, abs=1e-12)
+
+
+@every_mode
+def test_one_key_is_a_rest(mode):
+    key = Poses([[1, 2, 3]], [[2, 0, 0, 0]])
+    poses = interpolate([4.0], key, [0.0, 9.0], mode)
+    assert_close(poses, Poses([[1, 2, 3]] * 2, [[1, 0, 0, 0]] * 2), 0.0)
+
+
+@every_mode
+def test_no_times_give_no_poses(mode):
+    assert len(interpolate([0, 1], Poses(np.zeros((2, 3)), np.eye(4)[:2]), [], mode)) == 0
+
+
+GOOD = ([0.0, 1.0, 2.0], np.zeros((3, 3)), np.eye(4)[[0, 0, 0]], None)
+
+
+def spoilt(field: int, row: int, value) -> tuple:
+    parts = [np.array(part, dtype=float) if part is not None else np.ones(3) for part in GOOD]
+    parts[field][row] = value
+    return tuple(parts)
+
+
+@pytest.mark.parametrize(
+    ("parts", "complaint"),
+    [
+        (spoilt(0, 1, np.nan), "key 1 has a time"),
+        (spoilt(0, 2, 1.0), "key 2 is not later"),
+        (spoilt(1, 2, np.inf), "key 2 has a position"),
+        (spoilt(2, 1, 0.0), "key 1 has a quaternion of length zero"),
+        (spoilt(2, 1, np.nan), "key 1 has a quaternion that is not finite"),
+        (spoilt(3, 0, -1.0), "key 0 has a scale"),
+    ],
+)
+def test_a_bad_key_is_named(parts, complaint):
+    key_times, positions, quaternions, scales = parts
+    with pytest.raises(ValueError, match=complaint):
+        interpolate(key_times, Poses(positions, quaternions, scales), [0.5])
+
+
+def test_a_bad_key_among_many_objects_is_named_with_its_object():
+    positions = np.zeros((4, 3, 3))
+    positions[2, 1, 0] = np.nan
+    with pytest.raises(ValueError, match=r"key 1 of object \[2\]"):
+        interpolate(GOOD[0], Poses(positions, np.tile(GOOD[2], (4, 1, 1))), [0.5])
+
+
+@pytest.mark.parametrize("times", [[np.nan], [0.0, np.inf], [1.0, np.nan, 0.0], 0.5, [[0.0], [1.0]]])
+def test_bad_times_are_refused(times):
+    with pytest.raises(ValueError, match="times"):
+        interpolate(GOOD[0], Poses(*GOOD[1:3]), times)
+
+
+def test_an_unknown_mode_is_refused_with_the_names_of_the_known():
+    with pytest.raises(ValueError, match="dq_sclerp"):
+        interpolate(GOOD[0], Poses(*GOOD[1:3]), [0.5], "bezier")
+
+
+@given(motion=motions())
+@settings(max_examples=30)
+def test_the_caller_s_arrays_stay_as_they_are(motion):
+    key_times, keys = motion
+    before = key_times.copy(), keys.positions.copy(), keys.quaternions.copy()
+    for mode in MODES:
+        interpolate(key_times, keys, times_between(key_times), mode)
+    assert all(
+        np.array_equal(*pair) for pair in zip(before, (key_times, keys.positions, keys.quaternions), strict=True)
+    )
+
+
+def test_every_mode_says_what_it_is():
+    labels = [mode.label for mode in MODES.values()]
+    assert len(set(labels)) == len(labels)
+    assert all(mode.description and not mode.description.endswith(".") for mode in MODES.values())

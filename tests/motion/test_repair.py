@@ -1,0 +1,116 @@
+"""The repair of recordings: what is done is right, and is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from addon.motion import Poses, interpolate, repair
+from tests.motion.cases import random_quaternions
+
+
+def recording(count: int = 20, seed: int = 0) -> tuple[np.ndarray, Poses]:
+    """A sound one at 100 Hz."""
+    random = np.random.default_rng(seed)
+    quaternions = np.array((1.0, 0, 0, 0)) + 0.1 * random.normal(size=(count, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return np.arange(count) / 100.0, Poses(random.normal(size=(count, 3)), quaternions)
+
+
+def faults(repairs) -> str:
+    return "; ".join(str(r) for r in repairs)
+
+
+def test_a_sound_recording_stays_as_it_is():
+    times, poses = recording()
+    kept, mended, repairs = repair(times, poses)
+    assert np.array_equal(kept, times)
+    assert mended.quaternions == pytest.approx(poses.quaternions, abs=1e-15)
+    assert repairs == []
+
+
+def test_rows_of_nan_and_zero_quaternions_are_dropped_and_named():
+    times, poses = recording()
+    poses.positions[3, 1] = np.nan
+    poses.quaternions[5] = 0.0
+    kept, _, repairs = repair(times, poses)
+    assert np.array_equal(kept, np.delete(times, [3, 5]))
+    assert [r.rows.tolist() for r in repairs[:2]] == [[3], [5]]
+    assert "row 3" in str(repairs[0])
+    assert "zero" in str(repairs[1])
+
+
+def test_of_equal_times_the_last_is_kept():
+    times, poses = recording()
+    times[4:7] = times[4]
+    kept, mended, repairs = repair(times, poses)
+    assert np.all(np.diff(kept) > 0)
+    assert np.array_equal(mended.positions[4], poses.positions[6])
+    assert "comes again" in faults(repairs)
+
+
+def test_a_clock_that_jumps_back_loses_as_few_rows_as_can_be():
+    times, poses = recording()
+    times[7] = 1e6
+    kept, _, repairs = repair(times, poses)
+    assert np.array_equal(kept, np.delete(times, 7))
+    assert repairs[0].rows.tolist() == [7]
+    assert "backwards" in str(repairs[0])
+
+
+def test_lengths_are_made_unit_and_only_said_where_they_were_off():
+    times, poses = recording()
+    poses.quaternions[2] *= 3.0
+    poses.quaternions[9] *= 1.0001
+    _, mended, repairs = repair(times, poses)
+    assert np.linalg.norm(mended.quaternions, axis=1) == pytest.approx(1.0, abs=1e-15)
+    assert repairs[0].rows.tolist() == [2]
+
+
+def test_sign_flips_are_undone_and_counted_where_they_happen():
+    times, poses = recording()
+    poses.quaternions[5:9] *= -1.0
+    _, mended, repairs = repair(times, poses)
+    assert np.all(np.sum(mended.quaternions[1:] * mended.quaternions[:-1], axis=1) > 0.0)
+    assert repairs[0].rows.tolist() == [5, 9]
+
+
+def test_gaps_are_left_and_reported_with_their_length():
+    times, poses = recording()
+    times[11:] += 0.05
+    kept, _, repairs = repair(times, poses)
+    assert np.array_equal(kept, times)
+    assert repairs[0].rows.tolist() == [11]
+    assert "60 ms" in str(repairs[0])
+
+
+def test_scales_that_are_no_scales_are_dropped():
+    times, poses = recording()
+    scales = np.ones(20)
+    scales[0] = 0.0
+    kept, _, _ = repair(times, Poses(poses.positions, poses.quaternions, scales))
+    assert np.array_equal(kept, times[1:])
+
+
+def test_nothing_left_is_no_crash():
+    times, poses = recording()
+    kept, mended, repairs = repair(times, Poses(poses.positions * np.nan, poses.quaternions))
+    assert len(kept) == len(mended) == 0
+    assert len(repairs) == 1
+
+
+wild = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1.0, 1.0, 2.0, -1e300, 1e-300])
+
+
+@given(st.lists(st.tuples(wild, wild, wild, wild), max_size=30))
+def test_whatever_comes_in_can_be_interpolated(rows):
+    table = np.array(rows, dtype=float).reshape(-1, 4)
+    quaternions = random_quaternions(np.random.default_rng(0), len(table)) * table[:, 1:2]
+    times, poses, _ = repair(table[:, 0], Poses(table[:, 1:4], quaternions))
+    assert np.all(np.diff(times) > 0)
+    assert np.all(np.abs(np.linalg.norm(poses.quaternions, axis=1) - 1.0) < 1e-12)
+    if len(times):
+        with np.errstate(over="ignore", invalid="ignore"):
+            assert len(interpolate(times, poses, times)) == len(times)
