@@ -1,0 +1,10 @@
+"""Reading recorded trajectories of rigid bodies, from whatever a tracker, a game or Blender wrote.
+
+Everything is returned as it was recorded: the file's own axes, units and signs, with nothing repaired.
+`axes` turns poses to Blender's axes.
+"""
+
+from .reading import read_trajectories
+from .recordings import Recording, Trajectory, TrajectoryError
+
+__all__ = ["Recording", "Trajectory", "TrajectoryError", "read_trajectories"]

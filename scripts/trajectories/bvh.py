@@ -1,0 +1,212 @@
+"""BVH joints: a hierarchy with offsets and channels, and a row of channel values for every frame.
+
+The poses are the joints' world poses: a joint without any rotation has the world's axes. Positions are in the file's
+unit, which BVH does not tell; angles are degrees, applied in the order of the channels. Position channels replace
+the joint's offset, as Blender's importer has it. That importer itself is not used: it works in single precision,
+needs Blender, and a file that it cannot read ends in an IndexError or, unnoticed, in a wrong skeleton.
+Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2001.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from addon.motion import Poses
+from addon.motion.quaternions import multiply, rotate
+
+from .euler import quaternions_from_euler
+from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
+from .tables import parse_rows, read_lines
+
+CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
+
+
+@dataclass
+class Joint:
+    """One joint of the hierarchy."""
+
+    name: str
+    parent: int | None
+    """The index of the parent, which is lower than its own. None for a root."""
+
+    offset: tuple[float, ...] = (0.0, 0.0, 0.0)
+    channels: list[tuple[str, str]] = field(default_factory=list)
+    """Axis and kind, in the order of the file: ("Z", "rotation")."""
+
+
+def read(path: Path, selection: Selection) -> list[Trajectory]:
+    """The joints, the root first."""
+    lines = read_lines(path)
+    joints, line = _read_hierarchy(path, lines)
+    taken = selection.of([joint.name for joint in joints])
+    values, frame_time = _read_motion(path, lines, line, joints)
+    times = np.arange(len(values)) * frame_time
+    # What is not finite in the file is not in the poses either, and no news.
+    with np.errstate(invalid="ignore", over="ignore"):
+        poses = world_poses(joints, values)
+    return [
+        Trajectory(joint.name, times, pose) for joint, pose in zip(joints, poses, strict=True) if joint.name in taken
+    ]
+
+
+def world_poses(joints: list[Joint], values: np.ndarray) -> list[Poses]:
+    """Forward kinematics: the world poses of every joint.
+
+    Parameters
+    ----------
+    joints : list of Joint
+        Parents before their children.
+    values : array, shape (n, channels of all joints)
+
+    Returns
+    -------
+    list of Poses, each of shape (n,)
+    """
+    world: list[Poses] = []
+    used = 0
+    for joint in joints:
+        own = values[:, used : used + len(joint.channels)]
+        used += len(joint.channels)
+        positions = np.tile(joint.offset, (len(values), 1))
+        turns = []
+        for column, (axis, kind) in enumerate(joint.channels):
+            if kind == "position":
+                positions[:, "XYZ".index(axis)] = own[:, column]
+            else:
+                turns.append(column)
+        order = "".join(joint.channels[column][0] for column in turns)
+        quaternions = quaternions_from_euler(np.radians(own[:, turns]), order)
+        if joint.parent is not None:
+            parent = world[joint.parent]
+            positions = parent.positions + rotate(parent.quaternions, positions)
+            quaternions = multiply(parent.quaternions, quaternions)
+        world.append(Poses(positions, quaternions))
+    return world
+
+
+class _Words:
+    """The words of the hierarchy, one after another, with the line that each is in."""
+
+    def __init__(self, path: Path, lines: list[str]) -> None:
+        self.path = path
+        self.line = 1
+        self._words = self._split(lines)
+
+    def _split(self, lines: list[str]) -> Iterator[str]:
+        for self.line, line in enumerate(lines, start=1):
+            yield from line.replace("{", " { ").replace("}", " } ").split()
+
+    def next(self, expected: str) -> str:
+        word = next(self._words, None)
+        if word is None:
+            self.fail(f"the file ends where {expected} is expected")
+        return word
+
+    def number(self, expected: str) -> float:
+        word = self.next(expected)
+        try:
+            number = float(word)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            self.fail(f"{shown(word)} where {expected} is expected")
+        return number
+
+    def until_brace(self) -> str:
+        words = []
+        while (word := self.next("{")) != "{":
+            words.append(word)
+        return "_".join(words)
+
+    def fail(self, problem: str) -> NoReturn:
+        raise TrajectoryError(self.path, problem, "export the BVH again", self.line)
+
+
+def _read_hierarchy(path: Path, lines: list[str]) -> tuple[list[Joint], int]:
+    """The joints with unique names, and the line of the word MOTION."""
+    words = _Words(path, lines)
+    first = words.next("HIERARCHY")
+    if first.upper() != "HIERARCHY":
+        words.fail(f"a BVH file begins with HIERARCHY, not with {shown(first)}")
+    joints: list[Joint] = []
+    # The joints that are open, innermost last. An end site has no pose of its own and is None.
+    opened: list[int | None] = []
+    while (word := words.next("MOTION")).upper() != "MOTION":
+        joint = joints[opened[-1]] if opened and opened[-1] is not None else None
+        match word.upper():
+            case "ROOT" if not opened:
+                joints.append(Joint(words.until_brace(), None))
+                opened.append(len(joints) - 1)
+            case "JOINT" if joint:
+                joints.append(Joint(words.until_brace(), opened[-1]))
+                opened.append(len(joints) - 1)
+            case "END" if joint:
+                words.until_brace()
+                opened.append(None)
+            case "OFFSET" if opened:
+                offset = tuple(words.number("a number of the OFFSET") for _ in range(3))
+                if joint:
+                    joint.offset = offset
+            case "CHANNELS" if joint and not joint.channels:
+                joint.channels = _read_channels(words)
+            case "}" if opened:
+                opened.pop()
+            case _:
+                words.fail(f"{shown(word)} is out of place")
+    if opened:
+        words.fail("a } is missing before MOTION")
+    if not joints:
+        words.fail("no ROOT before MOTION")
+    for joint, name in zip(joints, unique([joint.name or "joint" for joint in joints]), strict=True):
+        joint.name = name
+    return joints, words.line
+
+
+def _read_channels(words: _Words) -> list[tuple[str, str]]:
+    count = words.number("the number of CHANNELS")
+    if count not in range(len(CHANNELS) + 1):
+        words.fail(f"{count:g} CHANNELS for a joint")
+    names = [words.next("the name of a channel") for _ in range(int(count))]
+    for name in names:
+        if name.lower() not in CHANNELS:
+            words.fail(f"{shown(name)} is no channel")
+    channels = [CHANNELS[name.lower()] for name in names]
+    if len(set(channels)) < len(channels):
+        words.fail("a channel occurs twice in a joint")
+    return channels
+
+
+def _read_motion(path: Path, lines: list[str], line: int, joints: list[Joint]) -> tuple[np.ndarray, float]:
+    """The channels' values, shape (frames, channels), and the seconds between frames."""
+    rows = [(number, text.strip()) for number, text in enumerate(lines[line:], line + 1) if text.strip()]
+    settings, rows = rows[:2], rows[2:]
+    count = _read_setting(path, settings[:1], "Frames:", line)
+    frame_time = _read_setting(path, settings[1:], "Frame Time:", line)
+    if count != len(rows):
+        problem = f"Frames: says {count:g} and {len(rows)} rows follow"
+        raise TrajectoryError(path, problem, "correct the number or export the BVH again", settings[0][0])
+    labels = [f"{joint.name} {axis}{kind}" for joint in joints for axis, kind in joint.channels]
+    if not labels:
+        raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", line)
+    columns = {label: index for index, label in enumerate(labels)}
+    return parse_rows(path, rows, None, columns, len(columns)), frame_time
+
+
+def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:
+    """The positive number behind `name` in a row, which is empty where the file has ended at the line `motion`."""
+    number, text = row[0] if row else (motion, "")
+    label, _, value = text.partition(":")
+    try:
+        setting = float(value)
+    except ValueError:
+        setting = math.nan
+    if " ".join(label.split()).lower() != name.lower().rstrip(":") or not 0.0 < setting < math.inf:
+        problem = f"{shown(text)} where {name} and a positive number are expected"
+        raise TrajectoryError(path, problem, "export the BVH again", number)
+    return setting

@@ -1,0 +1,106 @@
+"""The way from `FILE`, `FILE:BODY` or `FILE:*` to trajectories: the table of formats, and which one reads a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from . import aframe, blend, bvh, euroc, motive, named_csv, tum
+from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
+from .tables import decode
+
+HEAD = 65536
+"""How many bytes of a file are looked at to tell its format."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file."""
+
+    label: str
+    extensions: tuple[str, ...]
+    read: Callable[[Path, Selection], list[Trajectory]]
+    recognises: Callable[[list[str]], bool] | None = None
+    """Given the first lines. None where the extension is enough."""
+
+
+# Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
+# takes the rest, and says what is wrong with it.
+FORMATS = (
+    Format("Motive CSV", (".csv",), motive.read, motive.recognises),
+    Format("EuRoC CSV", (".csv",), euroc.read, euroc.recognises),
+    Format("TUM", (".csv", ".txt", ".tum"), tum.read, tum.recognises),
+    Format("CSV with named columns", (".csv", ".tsv", ".txt"), named_csv.read),
+    Format("A-Frame recording", (".json",), aframe.read),
+    Format("BVH", (".bvh",), bvh.read),
+    Format("Blender file", (".blend",), blend.read),
+)
+
+
+def read_trajectories(source: str) -> Recording:
+    """Read a recording.
+
+    Parameters
+    ----------
+    source : str
+        A path; with `:BODY` behind it for one body by name, with `:*` for all bodies. A path alone asks for the first
+        body: a BVH's root, the first animated object of a .blend.
+
+    Returns
+    -------
+    Recording
+        The trajectories as recorded, and the names of the bodies that were left.
+
+    Raises
+    ------
+    TrajectoryError
+        One line: the file, the line in it, what is wrong and the way out.
+    """
+    path, body = split_source(source)
+    selection = Selection(path, body)
+    try:
+        trajectories = _format_of(path).read(path, selection)
+    except OSError as error:
+        problem = f"this file cannot be read ({error.strerror})"
+        raise TrajectoryError(path, problem, "check its permissions") from None
+    for trajectory in trajectories:
+        if len(trajectory.times) < 2:
+            problem = f"{shown(trajectory.name)} has {len(trajectory.times)} samples"
+            raise TrajectoryError(path, problem, "a trajectory needs at least 2")
+    return selection.recording(trajectories)
+
+
+def split_source(source: str) -> tuple[Path, str | None]:
+    """The file and the body. Files and bodies may have colons in their names, and a Windows path begins with one.
+
+    Raises
+    ------
+    TrajectoryError
+        Where no part of `source` before a colon, nor the whole, is a file.
+    """
+    colons = [index for index, character in enumerate(source) if character == ":"]
+    for end in [len(source), *reversed(colons)]:
+        # "C:" of "C:\take.csv" is no file of its own, whatever lies in the current folder.
+        drive = end == 1 and source[:1].isalpha() and source[2:3] in ("\\", "/")
+        if not drive and os.path.isfile(source[:end]):
+            return Path(source[:end]), source[end + 1 :] if end < len(source) else None
+    if os.path.isdir(source):
+        raise TrajectoryError(source, "this is a folder", "name a file in it")
+    raise TrajectoryError(source, "no such file", "check the path")
+
+
+def _format_of(path: Path) -> Format:
+    candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
+    if not candidates:
+        extensions = dict.fromkeys(extension for known in FORMATS for extension in known.extensions)
+        problem = f"unknown extension {shown(path.suffix)}"
+        raise TrajectoryError(path, problem, f"known are {', '.join(extensions)}")
+    if len(candidates) > 1:
+        with path.open("rb") as file:
+            head = decode(file.read(HEAD), errors="replace").splitlines() or [""]
+        for candidate in candidates[:-1]:
+            if candidate.recognises(head):
+                return candidate
+    return candidates[-1]

@@ -1,0 +1,135 @@
+"""What reading gives: the trajectories of the bodies that were asked for, the names of the others, or one clear error.
+
+Times are seconds; positions are in the unit of the file; quaternions are w, x, y, z with the signs of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from addon.motion import Poses
+
+ALL = "*"
+"""Asks for every body of a file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One body of one file, exactly as recorded: unrepaired, native axes, units and signs."""
+
+    name: str
+    """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object."""
+
+    times: np.ndarray
+    """Seconds, shape (n,). Neither rising nor finite unless the recording is sound."""
+
+    poses: Poses
+    """Shape (n,). A sample that was not tracked is NaN; scales are None unless the file has one that is not 1."""
+
+    metres_per_unit: float = 1.0
+    """The length of one unit of the positions, where the file tells it; 1 otherwise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What was read of a file."""
+
+    trajectories: tuple[Trajectory, ...]
+    """The bodies that were asked for, in the order of the file."""
+
+    others: tuple[str, ...] = ()
+    """The names of the bodies that were left."""
+
+    note: str = ""
+    """For a file of several bodies of which none was named: what was taken, what is left, how to name it."""
+
+
+class TrajectoryError(ValueError):
+    """Why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
+
+    def __init__(self, path: Path | str, problem: str, way_out: str, line: int | None = None) -> None:
+        where = f"{path}:{line}" if line else f"{path}"
+        super().__init__(printable(f"{where}: {problem}; {way_out}"))
+
+
+class Selection:
+    """Which bodies of a file are wanted: the first, all, or one by name."""
+
+    def __init__(self, path: Path, wanted: str | None) -> None:
+        self.path = path
+        self.wanted = wanted
+        self.names: tuple[str, ...] = ()
+
+    def of(self, names: Sequence[str], unlisted: Sequence[str] = ()) -> list[str]:
+        """The wanted ones among the bodies of the file.
+
+        Parameters
+        ----------
+        names : sequence of str
+            The bodies, in the order of the file.
+        unlisted : sequence of str
+            More bodies, to be had by name only.
+
+        Raises
+        ------
+        TrajectoryError
+            Where the file has no body of that name, or none at all.
+        """
+        self.names = tuple(names)
+        if self.wanted in (None, ALL):
+            if not names:
+                way_out = f"name one with {self.path}:NAME: {listed(unlisted)}" if unlisted else "record at least one"
+                raise TrajectoryError(self.path, "no moving body in this file", way_out)
+            return list(names) if self.wanted == ALL else [names[0]]
+        if self.wanted not in names and self.wanted not in unlisted:
+            raise TrajectoryError(
+                self.path, f"no body named {shown(self.wanted)}", f"it holds {listed([*names, *unlisted])}"
+            )
+        return [self.wanted]
+
+    def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
+        """The result, with what there is to say about the bodies that were not taken."""
+        taken = {trajectory.name for trajectory in trajectories}
+        others = tuple(name for name in self.names if name not in taken)
+        note = ""
+        if others and self.wanted is None:
+            note = printable(
+                f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
+                f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
+            )
+        return Recording(tuple(trajectories), others, note)
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """The names, a repeated one numbered as Blender does: Hand, Hand.001, Hand.002."""
+    result: list[str] = []
+    taken = set(names)
+    seen: set[str] = set()
+    for name in names:
+        candidate, count = name, 0
+        while candidate in seen or (count and candidate in taken):
+            count += 1
+            candidate = f"{name}.{count:03d}"
+        seen.add(candidate)
+        result.append(candidate)
+    return result
+
+
+def listed(names: Sequence[str], limit: int = 30) -> str:
+    """The names with commas, cut off where they become too many to read."""
+    shown_names = ", ".join(names[:limit])
+    return f"{shown_names} and {len(names) - limit} more" if len(names) > limit else shown_names
+
+
+def shown(text: str, limit: int = 24) -> str:
+    """A piece of a file, in quotes and short enough for a line of error."""
+    return repr(text if len(text) <= limit else f"{text[:limit]}...")
+
+
+def printable(text: str) -> str:
+    """The text in one line, without the control characters that a file could smuggle into a terminal."""
+    return "".join(character if character.isprintable() else " " for character in text)

@@ -1,0 +1,39 @@
+"""Small recordings made on the spot, and the check that an error is the one line that was promised."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from scripts.trajectories import TrajectoryError, read_trajectories
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[str, str | bytes], str]:
+    """Write a file of this name and content, and return its path."""
+
+    def _write(name: str, content: str | bytes) -> str:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return str(path)
+
+    return _write
+
+
+@pytest.fixture
+def refusal() -> Callable[[str], tuple[int | None, str]]:
+    """Read what cannot be read, and return the line and the rest of the error."""
+
+    def _refusal(source: str) -> tuple[int | None, str]:
+        with pytest.raises(TrajectoryError) as caught:
+            read_trajectories(source)
+        message = str(caught.value)
+        parts = re.fullmatch(r"(?P<path>.+?\.\w+)(:(?P<line>\d+))?: (?P<problem>.+?); (?P<way_out>.+)", message)
+        assert parts, f"not of the form FILE:LINE: problem; way out: {message!r}"
+        assert source.startswith(parts["path"])
+        return (int(parts["line"]) if parts["line"] else None), message[parts.start("problem") :]
+
+    return _refusal

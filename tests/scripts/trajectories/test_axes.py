@@ -1,0 +1,73 @@
+"""Recordings of other conventions in Blender's axes, against rotation matrices."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from addon.motion import Poses
+from scripts.trajectories.axes import AXES, to_blender
+
+
+def matrices(poses: Poses) -> np.ndarray:
+    return Rotation.from_quat(poses.quaternions[:, [1, 2, 3, 0]]).as_matrix()
+
+
+@pytest.fixture
+def poses() -> Poses:
+    random = np.random.default_rng(5)
+    quaternions = random.normal(size=(50, 4))
+    return Poses(
+        random.normal(size=(50, 3)),
+        quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
+        random.uniform(0.5, 2.0, size=50),
+    )
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_a_rotation_becomes_the_one_of_the_changed_matrix(poses: Poses, axes: str) -> None:
+    change = AXES[axes]
+    np.testing.assert_allclose(matrices(to_blender(poses, axes)), change @ matrices(poses) @ change.T, atol=1e-14)
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_every_point_of_the_body_moves_along(poses: Poses, axes: str) -> None:
+    change, changed = AXES[axes], to_blender(poses, axes)
+    for point in np.random.default_rng(6).normal(size=(5, 3)):
+        there = poses.positions + poses.scales[:, None] * (matrices(poses) @ point)
+        here = changed.positions + changed.scales[:, None] * (matrices(changed) @ (change @ point))
+        np.testing.assert_allclose(here, there @ change.T, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("axes", "up", "forward", "right"),
+    [
+        ("blender", (0, 0, 1), (0, 1, 0), (1, 0, 0)),
+        ("opengl", (0, 1, 0), (0, 0, -1), (1, 0, 0)),
+        ("unity", (0, 1, 0), (0, 0, 1), (1, 0, 0)),
+        ("ros", (0, 0, 1), (1, 0, 0), (0, -1, 0)),
+    ],
+)
+def test_up_is_z_forward_is_y_and_right_is_x(axes: str, up: tuple, forward: tuple, right: tuple) -> None:
+    still = np.tile((1.0, 0.0, 0.0, 0.0), (3, 1))
+    converted = to_blender(Poses(np.array((right, forward, up), dtype=float), still), axes)
+    np.testing.assert_array_equal(converted.positions, np.eye(3))
+
+
+def test_a_turn_to_the_right_in_unity_is_one_to_the_right_in_blender() -> None:
+    """Unity's rotations are left-handed: +90 degrees about its y axis take forward (z) to the right (x)."""
+    half = np.sqrt(0.5)
+    (turn,) = to_blender(Poses([[0, 0, 0]], [[half, 0, half, 0]]), "unity").quaternions
+    np.testing.assert_allclose(Rotation.from_quat(turn[[1, 2, 3, 0]]).apply((0, 1, 0)), (1, 0, 0), atol=1e-15)
+
+
+@pytest.mark.parametrize("axes", AXES)
+def test_what_was_recorded_stays_as_it_was(poses: Poses, axes: str) -> None:
+    before = poses.positions.copy(), poses.quaternions.copy()
+    to_blender(poses, axes)
+    np.testing.assert_array_equal(poses.positions, before[0])
+    np.testing.assert_array_equal(poses.quaternions, before[1])
+
+
+def test_unknown_axes_are_answered_with_the_known_ones(poses: Poses) -> None:
+    with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros"):
+        to_blender(poses, "maya")

@@ -1,0 +1,194 @@
+"""BVH joints: by hand, against the matrices of Blender's importer, and wrong files."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from addon.motion.quaternions import angle_between
+from scripts.trajectories import read_trajectories
+
+ARM = """HIERARCHY
+ROOT Shoulder
+{
+    OFFSET 0.0 0.0 0.0
+    CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+    JOINT Elbow
+    {
+        OFFSET 2.0 0.0 0.0
+        CHANNELS 3 Zrotation Xrotation Yrotation
+        End Site
+        {
+            OFFSET 1.0 0.0 0.0
+        }
+    }
+}
+MOTION
+Frames: 2
+Frame Time: 0.04
+0 0 0  0 0 0  0 0 0
+1 5 0  90 0 0  -90 0 0
+"""
+
+
+def test_a_joint_is_carried_by_its_parents(write) -> None:
+    shoulder, elbow = read_trajectories(write("arm.bvh", ARM) + ":*").trajectories
+    assert (shoulder.name, elbow.name) == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(elbow.times, [0.0, 0.04])
+    np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
+    np.testing.assert_allclose(elbow.poses.quaternions, [[1, 0, 0, 0]] * 2, atol=1e-15)
+    np.testing.assert_allclose(shoulder.poses.quaternions[1], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-15)
+
+
+def test_the_root_is_taken_and_the_others_are_told(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM))
+    assert [trajectory.name for trajectory in recording.trajectories] == ["Shoulder"]
+    assert recording.others == ("Elbow",)
+    assert "holds 2 bodies; took Shoulder; others: Elbow; name one with " in recording.note
+
+
+@pytest.mark.parametrize("order", ["".join(order) for order in permutations("XYZ")])
+def test_angles_are_applied_in_the_order_of_the_channels(write, order: str) -> None:
+    channels = " ".join(f"{axis}rotation" for axis in order)
+    text = ARM.replace("Zrotation Xrotation Yrotation", channels).replace("90 0 0  -90 0 0", "10 20 30  40 50 60")
+    shoulder, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    first = Rotation.from_euler(order, [10, 20, 30], degrees=True)
+    both = first * Rotation.from_euler(order, [40, 50, 60], degrees=True)
+    expected = np.array([first.as_quat(), both.as_quat()])[:, [3, 0, 1, 2]]
+    found = np.array([shoulder.poses.quaternions[1], elbow.poses.quaternions[1]])
+    assert angle_between(found, expected).max() < 1e-14
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ARM.replace("\n", "\r\n"),
+        ARM.replace("    ", "\t"),
+        ARM.replace("\n{", " {").replace("ROOT", "root").replace("position", "POSITION"),
+        ARM.replace("End Site", "End Site Hand_end"),
+        ARM.replace("Frame Time: 0.04", "Frame Time:\t4e-2").replace("Frames: 2", "Frames:\t2 "),
+        ARM + "\n\n",
+    ],
+)
+def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
+    _, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
+
+
+def test_joints_of_one_name_are_numbered_as_blender_does(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Shoulder")))
+    assert recording.others == ("Shoulder.001",)
+
+
+def test_a_name_of_several_words_is_joined_as_blender_does(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Left Elbow : upper")))
+    assert recording.others == ("Left_Elbow_:_upper",)
+
+
+def test_position_channels_take_the_place_of_the_offset(write) -> None:
+    text = ARM.replace("CHANNELS 3", "CHANNELS 6 Zposition Yposition Xposition").replace("-90 0 0", "3 2 1 -90 0 0")
+    text = text.replace("0 0 0  0 0 0  0 0 0", "0 0 0  0 0 0  3 2 1  0 0 0")
+    _, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    np.testing.assert_allclose(elbow.poses.positions, [[1, 2, 3], [1 - 2, 5 + 1, 3]], atol=1e-15)
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "1e308"])
+def test_numbers_that_are_broken_are_kept_for_the_repair(write, number: str) -> None:
+    text = ARM.replace("1 5 0  90 0 0", f"{number} -{number} 0  90 {number} 0")
+    shoulder, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    for trajectory in (shoulder, elbow):
+        assert np.isfinite(trajectory.poses.positions[0]).all()
+        assert not (np.abs(trajectory.poses.positions[1]) < 1e300).all()
+
+
+def skeleton(random: np.random.Generator, frames: int) -> str:
+    """A chain with a branch, every joint with its own order of channels, some with positions."""
+    orders = ["".join(order) for order in permutations("XYZ")]
+    count = 0
+
+    def joint(depth: int, children: list) -> str:
+        nonlocal count
+        positions = depth == 0 or random.random() < 0.3
+        channels = [f"{axis}position" for axis in random.permutation(list("XYZ"))] if positions else []
+        channels += [f"{axis}rotation" for axis in orders[count % len(orders)]]
+        name, count = f"Joint{count}", count + 1
+        widths.append(len(channels))
+        offset = " ".join(f"{number:.6f}" for number in random.uniform(-1, 1, 3))
+        inner = "".join(joint(depth + 1, child) for child in children) or "End Site\n{\nOFFSET 0 0.5 0\n}\n"
+        kind = "JOINT" if depth else "ROOT"
+        return f"{kind} {name}\n{{\nOFFSET {offset}\nCHANNELS {len(channels)} {' '.join(channels)}\n{inner}}}\n"
+
+    widths: list[int] = []
+    hierarchy = joint(0, [[[[]], []], [[[]]]])
+    rows = random.uniform(-180, 180, (frames, sum(widths)))
+    motion = "\n".join(" ".join(f"{number:.6f}" for number in row) for row in rows)
+    return f"HIERARCHY\n{hierarchy}MOTION\nFrames: {frames}\nFrame Time: 0.0333333\n{motion}\n"
+
+
+# The importer leaves its file to the garbage collector.
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
+    bpy = pytest.importorskip("bpy")
+    frames = 6
+    path = write("skeleton.bvh", skeleton(np.random.default_rng(seed), frames))
+    trajectories = read_trajectories(path + ":*").trajectories
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.preferences.addon_enable(module="io_anim_bvh")
+    try:
+        bpy.ops.import_anim.bvh(filepath=path, axis_forward="Y", axis_up="Z", frame_start=1)
+        armature = bpy.context.object
+        assert len(trajectories) == len(armature.pose.bones) == 8
+        for frame in range(frames):
+            bpy.context.scene.frame_set(1 + frame)
+            for trajectory in trajectories:
+                bone = armature.pose.bones[trajectory.name]
+                turned = bone.matrix @ bone.bone.matrix_local.inverted()
+                # Blender works in single precision, and positions here go to several hundred units.
+                np.testing.assert_allclose(trajectory.poses.positions[frame], bone.matrix.translation, atol=1e-3)
+                quaternion = np.array(turned.to_quaternion())
+                assert angle_between(trajectory.poses.quaternions[frame], quaternion) < 5e-5
+    finally:
+        bpy.ops.preferences.addon_disable(module="io_anim_bvh")
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        ("", 1, "the file ends where HIERARCHY is expected"),
+        ("t,x,y,z\n0,1,2,3\n", 1, "a BVH file begins with HIERARCHY, not with 't,x,y,z'"),
+        ("HIERARCHY\nMOTION\nFrames: 1\n", 2, "no ROOT before MOTION"),
+        (ARM.split("MOTION")[0], 16, "the file ends where MOTION is expected"),
+        (ARM.split("    CHANNELS 3")[0], 9, "the file ends where MOTION is expected"),
+        (ARM.replace("}\nMOTION", "MOTION"), 15, "a } is missing before MOTION"),
+        (ARM.replace("}\nMOTION", "}\n}\nMOTION"), 16, "'}' is out of place"),
+        (ARM.replace("JOINT Elbow", "ROOT Elbow"), 6, "'ROOT' is out of place"),
+        (ARM.replace("ROOT", "JOINT"), 2, "'JOINT' is out of place"),
+        (ARM.replace("2.0 0.0 0.0", "2.0 0.0"), 9, "'CHANNELS' where a number of the OFFSET is expected"),
+        (ARM.replace("2.0 0.0 0.0", "2.0 nan 0.0"), 8, "'nan' where a number of the OFFSET is expected"),
+        (ARM.replace("CHANNELS 3", "CHANNELS 4"), 10, "'End' is no channel"),
+        (ARM.replace("CHANNELS 3", "CHANNELS 2"), 9, "'Yrotation' is out of place"),
+        (ARM.replace("CHANNELS 3", "CHANNELS 1e9"), 9, "1e+09 CHANNELS for a joint"),
+        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 Q"), 9, "'Qrotation' is no channel"),
+        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 X"), 9, "a channel occurs twice in a joint"),
+        (ARM.split("Frames")[0], 16, "'' where Frames: and a positive number are expected"),
+        (ARM.split("Frame Time")[0], 16, "'' where Frame Time: and a positive number are expected"),
+        (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
+        (ARM.replace("Frames: 2", "Frames: 3"), 17, "Frames: says 3 and 2 rows follow"),
+        (ARM.replace("Frames: 2", "Frames: 1"), 17, "Frames: says 1 and 2 rows follow"),
+        (ARM.replace("Time: 0.04", "Time: 0"), 18, "'Frame Time: 0' where Frame Time: and a positive number"),
+        (ARM.replace("1 5 0 ", "1 5 "), 20, "8 columns where 9 are needed"),
+        (ARM.replace("1 5 0 ", "1 5 0 0 "), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0  90", "1 5 0  9O"), 20, "Shoulder Zrotation is '9O', not a number"),
+        (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'Shoulder' has 1 samp"),
+        ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "the file ends where MOTION is expected"),
+        (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, line: int | None, problem: str) -> None:
+    told_line, message = refusal(write("arm.bvh", text))
+    assert message.startswith(problem)
+    assert told_line == line
