@@ -1,0 +1,74 @@
+"""Makes what is in this folder: the clips (*.csv) and the models (models.blend). Every run makes the same.
+
+The clips need NumPy. The models need Blender's Python module besides, of the oldest version that the program supports,
+because an older Blender cannot open what a newer one has written; with another version, or none, they stay as they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+ASSETS = Path(__file__).resolve().parent
+sys.path.insert(0, str(ASSETS.parent))
+
+from assets.making.motions import MOTIONS  # noqa: E402
+from assets.making.tracking import tick, track  # noqa: E402
+
+SEED = 2021
+HEADER = "t,x,y,z,qx,qy,qz,qw"
+MODELS_BLENDER = (4, 5)
+
+
+def clip(name: str) -> str:
+    """The text of a clip: seconds, metres, and quaternions with the scalar last."""
+    motion = MOTIONS[name]
+    rng = np.random.default_rng((SEED, zlib.crc32(name.encode())))
+    times = tick(rng, motion.duration)
+    poses = track(rng, motion.poses, times)
+    rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
+    return "\n".join([HEADER, *(",".join(f"{value:.6f}" for value in row) for row in rows), ""])
+
+
+def write(path: Path, fill: Callable[[Path], None]) -> None:
+    """Have a file filled beside its place, and move it there only when it is whole."""
+    with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent) as folder:
+        whole = Path(folder) / path.name
+        fill(whole)
+        os.replace(whole, path)
+    print(f"{path}  {path.stat().st_size / 1000:.0f} kB")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Write all assets."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, default=ASSETS, metavar="FOLDER", help="where to (default: this folder)")
+    output = parser.parse_args(arguments).output
+    output.mkdir(parents=True, exist_ok=True)
+
+    for name in MOTIONS:
+        text = clip(name)
+        write(output / f"{name}.csv", lambda path, text=text: path.write_text(text, encoding="utf-8", newline="\n"))
+
+    try:
+        import bpy
+    except ImportError:
+        print("models.blend is left as it is: there is no bpy here (pip install bpy==4.5.15, with Python 3.11)")
+        return
+    if bpy.app.version[:2] != MODELS_BLENDER:
+        print(f"models.blend is left as it is: older versions cannot open what {bpy.app.version_string} writes")
+        return
+    from assets.making.library import write_models
+
+    write(output / "models.blend", write_models)
+
+
+if __name__ == "__main__":
+    main()
