@@ -1,7 +1,7 @@
 """What a comparison is about: a recorded clip, and what each mode makes of the few keys that are kept of it.
 
-Times are seconds and poses are in the recording's own axes and units, repaired. Errors do not depend on the axes;
-only what Blender shows is converted (`scripts.trajectories.axes`).
+Times are seconds and poses are in the recording's own axes and units, repaired. Errors are in metres and do not depend
+on the axes; only what Blender shows is converted (`scripts.trajectories.axes`).
 """
 
 from __future__ import annotations
@@ -35,6 +35,15 @@ class Clip:
 
     repairs: tuple[str, ...]
     """What had to be repaired in the recording, a sentence each."""
+
+    metres_per_unit: float = 1.0
+    """The length of the recording's unit. Errors, and what Blender shows, are in metres."""
+
+    def in_metres(self, poses: Poses) -> Poses:
+        """Poses of this clip with positions in metres."""
+        if self.metres_per_unit == 1.0:
+            return poses
+        return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,43 @@
+"""Files that are whole or not there: written beside their place, under a name of their own, and moved into it.
+
+Text is UTF-8 with LF line ends on every system, so that two runs can be compared byte by byte.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TextIO
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[TextIO]:
+    """Open a text file that takes the place of `path` when the block ends well, and leaves no trace where it fails.
+
+    Parameters
+    ----------
+    path : Path
+        Folders that are missing on the way are made.
+
+    Raises
+    ------
+    OSError
+        Where the folder cannot be written, or (on Windows) another program has `path` open.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with beside.open("w", encoding="utf-8", newline="\n") as stream:
+            yield stream
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write all of a text file, or nothing of it."""
+    with replacing(path) as stream:
+        stream.write(text)

@@ -1,0 +1,132 @@
+"""What a comparison found, in numbers: the rows of `metrics.csv`, and the poses behind them as tables.
+
+Errors are in metres; the poses in the tables keep the unit of their recording. The numbers are written so that `float`
+reads back exactly what was computed.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from addon.motion import Poses
+from addon.motion.measures import rms
+
+from .clips import Reconstruction
+from .files import write_text
+
+BYTES_PER_KEY = 7 * 8
+"""A position and a quaternion, as doubles: what the paper sends for an update."""
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """One clip at one rate under one mode. The fields are the columns of `metrics.csv`, in their order."""
+
+    clip: str
+    mode: str
+
+    rate_hz: str
+    """As the user wrote it."""
+
+    keys: int
+
+    samples: int
+    """How many samples of the recording were compared: those between the first and the last key, both included."""
+
+    duration_s: float
+    """From the first key to the last."""
+
+    bytes_per_s: float
+    """Of the keys that were really kept, not of the rate that was asked for: see `measure_reconstruction`."""
+
+    rms_shell_m: float
+    p95_shell_m: float
+    max_shell_m: float
+    rms_position_m: float
+    rms_rotation_deg: float
+    rms_velocity_m_s: float
+
+
+def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
+    """The metrics of every mode, in the order of the modes.
+
+    Notes
+    -----
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes. A recording that is thinned to 10 keys a second keeps fewer
+    where it has gaps or is slow itself, and it is what would be sent that counts. The first key is not counted, since
+    a stretch of the motion costs the key at its end: keys exactly a tenth of a second apart are 560 bytes a second for
+    any length of the clip.
+
+    Raises
+    ------
+    ValueError
+        Where there are fewer than two keys, which have no time between them.
+    """
+    keys = len(reconstruction.keys)
+    if keys < 2:
+        raise ValueError(
+            f"{reconstruction.clip.name} at {reconstruction.rate} keys/s: {keys} key has no in-betweens to measure; "
+            "give a longer recording or a higher rate"
+        )
+    times = reconstruction.times
+    duration = float(times[-1] - times[0])
+    return [
+        Metrics(
+            clip=reconstruction.clip.name,
+            mode=mode,
+            rate_hz=reconstruction.rate,
+            keys=keys,
+            samples=len(times),
+            duration_s=duration,
+            bytes_per_s=(keys - 1) / duration * BYTES_PER_KEY,
+            rms_shell_m=rms(errors.shell),
+            p95_shell_m=float(np.percentile(errors.shell, 95.0)),
+            max_shell_m=float(np.max(errors.shell)),
+            rms_position_m=rms(errors.position),
+            rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
+            rms_velocity_m_s=rms(errors.velocity),
+        )
+        for mode, errors in reconstruction.errors.items()
+    ]
+
+
+def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
+    """Write `metrics.csv`: a header and a row for every clip, rate and mode."""
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(field.name for field in dataclasses.fields(Metrics))
+    writer.writerows(dataclasses.astuple(row) for row in rows)
+    write_text(path, table.getvalue())
+
+
+def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
+    """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
+
+    Parameters
+    ----------
+    path : Path
+    times : array, shape (n,)
+    poses : Poses, shape (n,)
+    """
+    columns = [times, *poses.positions.T, *poses.quaternions.T]
+    header = "t,x,y,z,qw,qx,qy,qz"
+    if poses.scales is not None:
+        columns.append(poses.scales)
+        header += ",s"
+    lines = [",".join(map(repr, row)) for row in np.stack(columns, axis=-1).tolist()]
+    write_text(path, "\n".join([header, *lines, ""]))
+
+
+def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:
+    """Write `keys.csv` and a `MODE.csv` for every mode into `folder`."""
+    clip, keys = reconstruction.clip, reconstruction.keys
+    write_poses(folder / "keys.csv", clip.times[keys], clip.poses[keys])
+    for mode, poses in reconstruction.poses.items():
+        write_poses(folder / f"{mode}.csv", reconstruction.times, poses)

@@ -1,0 +1,31 @@
+"""Recordings of a swinging tool for the tests: small, smooth, and different for every seed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from addon.motion import MODES, Poses, decimate, interpolate, measure
+from scripts.comparison.clips import Clip, Reconstruction
+
+
+def swinging_clip(
+    name: str = "swing", *, seconds: float = 3.0, rate: float = 90.0, seed: int = 1, repairs: tuple[str, ...] = ()
+) -> Clip:
+    """A body on a winding path that turns about a changing axis."""
+    random = np.random.default_rng(seed)
+    times = 100.0 + np.arange(round(seconds * rate) + 1) / rate
+    waves = random.uniform(2.0, 9.0, (7, 1)) * times + random.uniform(0.0, 6.0, (7, 1))
+    quaternions = np.stack((3.0 + 0.0 * times, *np.sin(waves[:3])), axis=-1)
+    quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    poses = Poses(0.3 * np.sin(waves[3:6]).T, quaternions)
+    return Clip(name, f"{name}.csv", "blender", times, poses, repairs)
+
+
+def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(MODES)) -> Reconstruction:
+    """The clip thinned to `rate`, filled in again by the real modes and measured."""
+    keys = decimate(clip.times, float(rate))
+    samples = slice(int(keys[0]), int(keys[-1]) + 1)
+    times, truth = clip.times[samples], clip.poses[samples]
+    poses = {mode: interpolate(clip.times[keys], clip.poses[keys], times, mode) for mode in modes}
+    errors = {mode: measure(times, poses[mode], truth) for mode in modes}
+    return Reconstruction(clip, rate, keys, poses, errors)

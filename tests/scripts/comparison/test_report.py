@@ -1,0 +1,244 @@
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import re
+from collections.abc import Iterator
+from datetime import datetime
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.motion import MODES
+from scripts.comparison.clips import Reconstruction
+from scripts.comparison.metrics import measure_reconstruction
+from scripts.comparison.report import COLUMNS, Settings, write_report
+from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+
+VOID = {"meta", "link", "br", "img", "input", "hr", "source"}
+SETTINGS = Settings(
+    radius=0.1,
+    program="Rigid Motion 0.1.0",
+    blender="5.2.3",
+    command="python scripts/compare.py swing.csv",
+    date=datetime(2024, 2, 29, 12, 30),
+    details={"Engine": "workbench"},
+)
+
+
+class Page(HTMLParser):
+    """A page as elements with their text. Reading it fails where tags are not balanced."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(convert_charrefs=True)
+        self.source = path.read_text(encoding="utf-8")
+        self.elements: list[tuple[str, dict[str, str], list[str]]] = []
+        self.open: list[tuple[str, dict[str, str], list[str]]] = []
+        self.feed(self.source)
+        self.close()
+        assert not self.open, f"never closed: {[name for name, *_ in self.open]}"
+
+    def handle_starttag(self, name: str, attributes: list[tuple[str, str | None]]) -> None:
+        element = (name, {key: value or "" for key, value in attributes}, [])
+        self.elements.append(element)
+        if name not in VOID:
+            self.open.append(element)
+
+    def handle_endtag(self, name: str) -> None:
+        assert self.open[-1][0] == name, f"</{name}> closes <{self.open[-1][0]}> in line {self.getpos()[0]}"
+        self.open.pop()
+
+    def handle_data(self, data: str) -> None:
+        for _, _, text in self.open:
+            text.append(data)
+
+    def find(self, name: str, **attributes: str) -> Iterator[tuple[dict[str, str], str]]:
+        for element, own, text in self.elements:
+            if element == name and all(
+                own.get(key.rstrip("_").replace("_", "-")) == value for key, value in attributes.items()
+            ):
+                yield own, "".join(text)
+
+
+def report(folder: Path, runs: list[Reconstruction], films: dict[tuple[str, str], Path] | None = None) -> Page:
+    write_report(folder / "report.html", runs, films=films or {}, settings=SETTINGS)
+    return Page(folder / "report.html")
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[Reconstruction]:
+    clips = [swinging_clip("reach", seed=1, repairs=("dropped 3 rows",)), swinging_clip("throw", seed=2)]
+    return [reconstruct(clip, rate) for clip in clips for rate in ("5", "7.5", "20")]
+
+
+@pytest.fixture(scope="module")
+def page(runs: list[Reconstruction], tmp_path_factory: pytest.TempPathFactory) -> Page:
+    return report(tmp_path_factory.mktemp("report"), runs)
+
+
+def test_every_clip_rate_and_mode_has_its_place(page: Page) -> None:
+    headings = [text for _, text in page.find("h2")]
+    assert headings == ["Summary", "Modes and measures", "reach", "throw", "This run"]
+    assert [text for _, text in page.find("h3") if "keys/s" in text] == ["5 keys/s", "7.5 keys/s", "20 keys/s"] * 2
+    for mode in MODES.values():
+        assert mode.description in html.unescape(page.source)
+        assert sum(text == mode.label for _, text in page.find("th", scope="row")) == 7
+
+
+def test_ids_are_unique_and_every_link_within_the_page_leads_somewhere(page: Page) -> None:
+    ids = [own["id"] for _, own, _ in page.elements if "id" in own]
+    assert len(ids) == len(set(ids))
+    links = [own["href"] for own, _ in page.find("a")]
+    assert "#clip-2-rate-3" in links
+    assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
+
+
+def test_the_numbers_in_the_tables_are_those_of_the_metrics(page: Page, runs: list[Reconstruction]) -> None:
+    shown = [float(own["data-value"]) for own, _ in page.find("td")]
+    summary = 3 * len(MODES)
+    rows = [row for run in runs for row in measure_reconstruction(run)]
+    assert shown[summary:] == [getattr(row, column.metric) for row in rows for column in COLUMNS]
+
+
+def test_the_numbers_that_are_read_are_those_that_are_sorted_by_to_three_digits(page: Page) -> None:
+    cells = list(page.find("td"))[3 * len(MODES) :]
+    for place, (own, text) in enumerate(cells):
+        value = float(own["data-value"]) * COLUMNS[place % len(COLUMNS)].factor
+        assert float(text.removesuffix(" best")) == pytest.approx(value, rel=0.006)
+
+
+def test_the_best_of_each_column_is_marked_and_all_of_them_where_modes_are_identical(
+    tmp_path: Path, runs: list[Reconstruction]
+) -> None:
+    page = report(tmp_path, runs[:1])
+    cells = list(page.find("td"))[len(MODES) :]
+    for column in range(len(COLUMNS)):
+        values = [float(own["data-value"]) for own, _ in cells[column :: len(COLUMNS)]]
+        marked = [own.get("class") == "best" for own, _ in cells[column :: len(COLUMNS)]]
+        assert marked == [value <= min(values) * 1.00001 for value in values]
+
+
+def test_the_relative_errors_are_geometric_means_over_the_clips(page: Page, runs: list[Reconstruction]) -> None:
+    cells = [float(own["data-value"]) for own, _ in page.find("td")][: 3 * len(MODES)]
+    shell = np.array([[row.rms_shell_m for row in measure_reconstruction(run)] for run in runs]).reshape(2, 3, -1)
+    expected = np.exp(np.log(shell / shell[..., :1]).mean(axis=0)).T
+    np.testing.assert_allclose(np.reshape(cells, (-1, 3)), expected, rtol=1e-9)
+
+
+def test_identical_modes_share_a_line_and_the_line_bears_all_their_names(page: Page) -> None:
+    titles = [text for _, text in page.find("title")]
+    joint = " = ".join(MODES[mode].label for mode in ("dq_sclerp", "pga_slerp", "cga_slerp"))
+    curves = list(page.find("path", class_="curve"))
+    assert joint in titles
+    assert len(curves) % 3 == 0
+    assert MODES["pga_slerp"].label not in titles
+
+
+def test_repairs_are_listed_and_their_absence_is_stated(page: Page) -> None:
+    assert [text for _, text in page.find("div", class_="repairs")] == [
+        "Repaired in the recordingdropped 3 rows",
+        "Repaired in the recordingNothing.",
+    ]
+
+
+def test_the_settings_of_the_run_are_told(page: Page) -> None:
+    facts = " ".join(text for _, text in page.find("dl", class_="facts"))
+    for word in ("Rigid Motion 0.1.0", "5.2.3", "5, 7.5 and 20 keys/s", "0.1 m", "workbench", SETTINGS.command):
+        assert word in facts
+    assert ("2024-02-29T12:30", "29 February 2024, 12:30") in [
+        (own["datetime"], text) for own, text in page.find("time")
+    ]
+
+
+def test_the_page_asks_for_nothing_from_anywhere(page: Page) -> None:
+    for name, own, _ in page.elements:
+        assert not {"src", "srcset", "poster", "action"} & own.keys()
+        assert name not in {"link", "iframe", "img", "object", "embed"}
+        assert own.get("href", "#").startswith("#")
+    style = next(text for _, text in page.find("style"))
+    assert "@import" not in style
+    assert "url(" not in style
+
+
+def test_the_policy_allows_the_pages_own_script_and_no_request(page: Page) -> None:
+    ((policy, _),) = page.find("meta", http_equiv="Content-Security-Policy")
+    ((_, script),) = ((own, text) for own, text in page.find("script") if "type" not in own)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy["content"]
+    assert policy["content"].startswith("default-src 'none';")
+    assert "http" not in policy["content"]
+
+
+def test_names_are_data_whatever_they_hold(tmp_path: Path) -> None:
+    name = '<script>alert(1)</script>"&$style'
+    page = report(tmp_path, [reconstruct(swinging_clip(name, repairs=("<img src=x onerror=alert(2)>",)))])
+    assert name in [text for _, text in page.find("h2")]
+    assert len(list(page.find("script"))) == 1
+    assert not list(page.find("img"))
+
+
+def test_a_name_that_is_no_text_does_not_stop_the_report(tmp_path: Path) -> None:
+    name = b"clip\xff".decode("utf-8", "surrogateescape")
+    assert "clip\ufffd" in [text for _, text in report(tmp_path, [reconstruct(swinging_clip(name))]).find("h2")]
+
+
+def test_a_video_is_in_the_page_byte_for_byte_with_a_link_to_its_file(
+    tmp_path: Path, runs: list[Reconstruction]
+) -> None:
+    film = tmp_path / "re ach#1" / "5" / "comparison.mp4"
+    film.parent.mkdir(parents=True)
+    film.write_bytes(np.random.default_rng(3).bytes(1_000_001))
+    page = report(tmp_path, runs, {("reach", "5"): film})
+    ((place, _),) = ((own, text) for own, text in page.find("div", class_="film"))
+    ((_, encoded),) = page.find("script", id=place["data-film"])
+    assert base64.b64decode(encoded, validate=True) == film.read_bytes()
+    assert "re%20ach%231/5/comparison.mp4" in [own["href"] for own, _ in page.find("a")]
+
+
+def test_a_rate_without_its_video_says_so_where_others_have_theirs(tmp_path: Path, runs: list[Reconstruction]) -> None:
+    film = tmp_path / "comparison.mp4"
+    film.write_bytes(b"film")
+    page = report(tmp_path, runs, {("reach", "5"): film, ("reach", "20"): tmp_path / "interrupted.mp4"})
+    assert page.source.count("There is no video for this rate.") == 5
+    assert len(list(page.find("script", type="text/plain"))) == 1
+
+
+def test_a_run_without_videos_does_not_speak_of_them(page: Page) -> None:
+    assert "There is no video" not in page.source
+    assert not list(page.find("script", type="text/plain"))
+    assert not list(page.find("div", class_="film"))
+
+
+def test_a_single_clip_at_a_single_rate_under_a_single_mode_is_a_report_too(tmp_path: Path) -> None:
+    page = report(tmp_path, [reconstruct(swinging_clip(seconds=0.4), "5", ("pga_lerp",))])
+    lead = next(text for _, text in page.find("p", class_="lead"))
+    assert lead.startswith("One recorded clip thinned to 5 keys a second and filled in again by one mode")
+    assert "Error over rate" not in page.source
+
+
+def test_a_recording_of_which_every_sample_is_a_key_is_a_report_too(tmp_path: Path) -> None:
+    page = report(tmp_path, [reconstruct(swinging_clip(), "500")])
+    assert "no mode was off by more than rounding" in page.source
+
+
+def test_a_long_clip_does_not_make_a_large_page(tmp_path: Path) -> None:
+    clip = swinging_clip(seconds=600.0)
+    report(tmp_path, [reconstruct(clip, rate) for rate in ("5", "20")])
+    assert (tmp_path / "report.html").stat().st_size < 400_000
+
+
+def test_nothing_to_report_is_said_and_nothing_is_written(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no reconstruction to report"):
+        report(tmp_path, [])
+    assert not list(tmp_path.iterdir())
+
+
+def test_charts_describe_their_axes_in_plain_numbers(page: Page) -> None:
+    charts = list(page.find("svg", class_="chart"))
+    assert charts
+    for own, _ in charts:
+        for axis in (own["data-x"], own["data-y"]):
+            assert re.fullmatch(r"[-+\d.e]+ [-+\d.e]+ (log|linear) .*", axis)
