@@ -1,0 +1,119 @@
+"""Set up everything that Rigid Motion needs in a folder of its own, then run a part of it. Needs Python and pip only.
+
+    python scripts/bootstrap.py compare                     the main job, on the recordings in assets/
+    python scripts/bootstrap.py compare hand.csv --axes unity
+    python scripts/bootstrap.py test                        the tests
+    python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
+    python scripts/bootstrap.py benchmark
+
+The packages go into .venv/ of this checkout; the first run downloads about 400 MB. What is behind the command goes to it:
+`python scripts/bootstrap.py compare --help` shows the options of compare.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
+
+COMMANDS = {
+    "compare": (["scripts/compare.py"], ()),
+    "test": (["-m", "pytest"], ("test",)),
+    "benchmark": (["scripts/benchmark.py"], ("test",)),
+}
+"""Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
+
+
+def main(arguments: list[str]) -> int:
+    """Set up, run, and pass on the exit code."""
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(__doc__.strip())
+        return 0
+    command, *rest = arguments
+    if command not in COMMANDS:
+        return _fail(f"there is no command {command!r}; the commands are {', '.join(COMMANDS)}")
+    if sys.version_info < (3, 11):
+        return _fail(f"Python {PYTHON} is too old: run this with Python 3.11 or 3.13")
+    project = _project()
+    known = project["tool"]["rigid-motion"]["blender"]
+    if PYTHON not in known:
+        return _fail(f"Blender has no wheel for Python {PYTHON}: run this with Python {' or '.join(known)}")
+    blender = known[PYTHON][0]
+    if "--blender" in rest:
+        place = rest.index("--blender")
+        blender = rest[place + 1] if place + 1 < len(rest) else ""
+        del rest[place : place + 2]
+        if blender not in known[PYTHON]:
+            return _fail(f"--blender takes one of {', '.join(known[PYTHON])} with Python {PYTHON}")
+    run, extras = COMMANDS[command]
+    python = install(blender, _requirements(project, blender, extras))
+    if python is None or not _blender_starts(python):
+        return 1
+    return subprocess.call([str(python), *run, *rest], cwd=None if command == "compare" else ROOT)
+
+
+def install(blender: str, requirements: list[str]) -> Path | None:
+    """The Python of an environment with these requirements, made or completed where it has to be; None on failure."""
+    folder = ROOT / ".venv" / f"blender-{blender}-python-{PYTHON}"
+    python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    stamp = folder / "installed.json"
+    wanted = hashlib.sha256("\n".join([sys.version, *requirements]).encode()).hexdigest()
+    installed = json.loads(stamp.read_text()) if stamp.is_file() and python.exists() else []
+    if wanted in installed:
+        return python
+    print(f"Setting up Blender {blender} for Python {PYTHON} in {folder} ...", file=sys.stderr, flush=True)
+    if not python.exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        venv.create(folder, with_pip=True)
+    pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *requirements]
+    if subprocess.call(pip, cwd=ROOT) != 0:
+        _fail("the packages above could not be installed; with the network back, the same command goes on")
+        return None
+    stamp.write_text(json.dumps([*installed, wanted]))
+    return python
+
+
+def _project() -> dict:
+    # Python 3.11 brought it; older ones are to get this far, and be told.
+    import tomllib
+
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def _requirements(project: dict, blender: str, extras: tuple[str, ...]) -> list[str]:
+    """The pinned packages of pyproject.toml, with this Blender."""
+    listed = [r for r in project["project"]["dependencies"] if not r.startswith("bpy==")]
+    for extra in extras:
+        listed += project["project"]["optional-dependencies"][extra]
+    return [f"bpy=={blender}", *listed]
+
+
+def _blender_starts(python: Path) -> bool:
+    tried = subprocess.run([str(python), "-c", "import bpy"], capture_output=True, text=True)
+    if tried.returncode != 0:
+        sys.path.insert(0, str(ROOT))
+        from scripts.system_libraries import way_out
+
+        print(tried.stderr.strip().splitlines()[-1] if tried.stderr.strip() else "import bpy failed", file=sys.stderr)
+        _fail(way_out(tried.stderr.strip().splitlines()[-1] if tried.stderr.strip() else ""))
+    return tried.returncode == 0
+
+
+def _fail(message: str) -> int:
+    print(message, file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,24 @@
+"""The libraries that Blender's wheel takes from a Linux system, and what to say where they are missing."""
+
+from __future__ import annotations
+
+DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
+"""Packages of Debian and Ubuntu."""
+
+FEDORA = "libX11 libXrender libXfixes libXi libxkbcommon libSM libICE mesa-libGL mesa-libEGL mesa-dri-drivers"
+"""Packages of Fedora and its relatives."""
+
+
+def way_out(error: str) -> str:
+    """What to do about the message that `import bpy` failed with, in a few lines."""
+    if "cannot open shared object file" in error:
+        library = error.split(":")[0].split()[-1]
+        return (
+            f"Blender needs the system library {library}, which this machine does not have. Install, as root:\n"
+            f"  Debian, Ubuntu:  apt-get install -y {DEBIAN}\n"
+            f"  Fedora, RHEL:    dnf install -y {FEDORA}"
+        )
+    return (
+        "Blender's Python module bpy is not here. Run this through `python scripts/bootstrap.py`, which installs it,\n"
+        "or inside Blender: blender --background --python scripts/compare.py -- INPUT"
+    )
