@@ -1,0 +1,262 @@
+"""Compare interpolation modes on recorded trajectories.
+
+Of every recording only a few keys a second are kept; each mode fills them in again; what was lost is measured, and
+shown in a video in which the modes move side by side. Without INPUT, the recordings in assets/ are compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+try:
+    import bpy
+except ImportError as error:
+    from scripts.system_libraries import way_out
+
+    sys.exit(f"{error}\n{way_out(str(error))}")
+
+from addon.motion import MODES
+from scripts.comparison.clips import Clip, Reconstruction
+from scripts.comparison.film import render_film, save_blend
+from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_reconstruction
+from scripts.comparison.progress import Progress
+from scripts.comparison.report import Settings, write_report
+from scripts.comparison.stage import ENGINES, StageSettings, build_stage
+from scripts.comparison.study import read_clips, reconstruct
+from scripts.comparison.subject import SubjectError, load_subject
+from scripts.comparison.timeline import Timeline
+from scripts.trajectories import TrajectoryError
+from scripts.trajectories.axes import AXES
+
+EPILOG = """
+inputs:
+  CSV with named columns (t,x,y,z,qx,qy,qz,qw in any order), TUM, EuRoC, Motive (OptiTrack) CSV,
+  A-Frame motion capture JSON, BVH, .blend. FILE:BODY takes one body of several, FILE:* all of them.
+
+examples:
+  python scripts/compare.py
+  python scripts/compare.py hand_left.csv hand_right.csv --axes unity
+  python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
+  python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
+  python scripts/compare.py shot.blend:Camera --no-video
+  blender --background --python scripts/compare.py -- hand_left.csv --axes unity
+
+It writes OUTPUT/report.html (all of it in one file), OUTPUT/metrics.csv, and in OUTPUT/CLIP/RATE/ for every clip and
+rate keys.csv, MODE.csv, comparison.mp4 and comparison.blend. The last line it prints is the path of the report.
+Exit code: 0 done, 1 a video could not be rendered, 2 a wrong input or option, 130 stopped by Ctrl-C; after that the
+report holds what was ready.
+"""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = argparse.ArgumentParser(
+        prog="compare.py", description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings; those in assets/ where none is given")
+    parser.add_argument(
+        "--rates", type=_rates, default="5,10,15,20", metavar="HZ,...", help="keys a second that are kept (%(default)s)"
+    )
+    parser.add_argument(
+        "--modes", type=_modes, default=",".join(MODES), metavar="MODE,...", help="what fills them in (%(default)s)"
+    )
+    parser.add_argument(
+        "--output", type=Path, default=ROOT / "renders" / "comparison", help="folder to write to (renders/comparison)"
+    )
+    parser.add_argument("--axes", choices=AXES, default="blender", help="axes of the recordings (%(default)s)")
+    parser.add_argument(
+        "--radius", type=_positive, default=0.1, metavar="M", help="of the shell error, in metres (%(default)s)"
+    )
+    video = parser.add_argument_group("video")
+    video.add_argument("--no-video", action="store_true", help="numbers and report only")
+    video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
+    video.add_argument("--resolution", type=_resolution, default="854x480", metavar="WxH", help="(%(default)s)")
+    video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
+    video.add_argument(
+        "--slow-motion", type=_positive, default=1.0, metavar="N", help="times slower than life (%(default)s)"
+    )
+    video.add_argument(
+        "--object",
+        default="drill",
+        metavar="OBJECT",
+        help="what moves: drill, controller, or FILE.blend:NAME (%(default)s)",
+    )
+    options = parser.parse_args(arguments)
+    try:
+        options.stage = StageSettings(
+            engine=options.engine,
+            resolution=options.resolution,
+            fps=options.fps,
+            slow_motion=options.slow_motion,
+            subject=options.object,
+        )
+    except ValueError as error:
+        parser.error(str(error))
+    if not options.inputs:
+        options.inputs = [str(path) for path in sorted((ROOT / "assets").glob("*.csv"))]
+    return options
+
+
+def main(arguments: list[str]) -> int:
+    """Run a comparison, and return the exit code."""
+    options = parse(arguments)
+    started = time.perf_counter()
+    with Progress() as progress:
+        try:
+            with progress.stage("Reading", 1):
+                clips, notes = read_clips(options.inputs, options.axes)
+                if not options.no_video:
+                    load_subject(options.object)
+        except (TrajectoryError, SubjectError) as error:
+            progress.note(f"compare.py: {error}")
+            return 2
+        for note in notes:
+            progress.note(note)
+        for clip in clips:
+            for repaired in clip.repairs:
+                progress.note(f"{clip.name}: {repaired}")
+        run = _Run(options, progress, shlex.join(["compare.py", *arguments]))
+        try:
+            run.measure(clips)
+            if not run.reconstructions:
+                progress.note("compare.py: every clip is too short for two keys at these rates; give higher --rates")
+                return 2
+            if not options.no_video:
+                run.film()
+        except KeyboardInterrupt:
+            run.interrupted = True
+        except OSError as error:
+            progress.note(f"compare.py: {error.filename or options.output}: {error.strerror or error}")
+            return 2
+        report = run.report()
+    seconds = time.perf_counter() - started
+    print(
+        f"{seconds:.1f} s in all, {run.rendering:.1f} s ({run.rendering / seconds:.0%}) of them Blender's rendering.",
+        file=sys.stderr,
+    )
+    if run.interrupted:
+        print("Stopped; the report holds what was ready.", file=sys.stderr)
+    print(report, flush=True)
+    return 130 if run.interrupted else int(run.failed)
+
+
+class _Run:
+    """What a run has made so far: enough for a report at any time."""
+
+    def __init__(self, options: argparse.Namespace, progress: Progress, command: str) -> None:
+        self.options, self.progress, self.command = options, progress, command
+        self.reconstructions: list[Reconstruction] = []
+        self.films: dict[tuple[str, str], Path] = {}
+        self.rendering = 0.0
+        self.failed = self.interrupted = False
+
+    def measure(self, clips: list[Clip]) -> None:
+        """All numbers first: they take seconds, and are there whatever becomes of the videos."""
+        with self.progress.stage("Measuring", len(clips) * len(self.options.rates)) as stage:
+            for clip in clips:
+                for rate in self.options.rates:
+                    stage.say(f"{clip.name} at {rate} keys/s")
+                    made = reconstruct(clip, rate, self.options.modes, self.options.radius)
+                    if made is None:
+                        self.progress.note(f"{clip.name}: too short for two keys at {rate} a second; left out")
+                    else:
+                        write_reconstruction(self._folder(made), made)
+                        self.reconstructions.append(made)
+                    stage.advance()
+        rows = [row for made in self.reconstructions for row in measure_reconstruction(made)]
+        write_metrics(self.options.output / "metrics.csv", rows)
+
+    def film(self) -> None:
+        """A .blend and an MP4 for every clip and rate."""
+        self.films = {
+            (made.clip.name, made.rate): self._folder(made) / "comparison.mp4" for made in self.reconstructions
+        }
+        count = sum(
+            Timeline.of(made, self.options.fps, self.options.slow_motion).count for made in self.reconstructions
+        )
+        with self.progress.stage("Rendering", count) as stage:
+            for made in self.reconstructions:
+                title = f"{made.clip.name} at {made.rate} keys/s"
+                stage.say(title)
+                path = self.films[made.clip.name, made.rate]
+                path.unlink(missing_ok=True)  # A film of an earlier run must not pass for one of this.
+                try:
+                    scene = build_stage(made, self.options.stage)
+                    save_blend(path.with_suffix(".blend"))
+                    self.rendering += render_film(
+                        scene, path, lambda done, of, title=title: stage.advance(1, f"{title}: {done}/{of}")
+                    )
+                except RuntimeError as error:
+                    self.failed = True
+                    self.progress.note(f"{title}: no video: {error}")
+
+    def report(self) -> Path:
+        """The page, with the films that there are."""
+        path = self.options.output / "report.html"
+        settings = Settings(
+            radius=self.options.radius,
+            program="Rigid Motion",
+            blender=bpy.app.version_string,
+            command=self.command,
+        )
+        write_report(path, self.reconstructions, films=self.films, settings=settings)
+        return path.resolve()
+
+    def _folder(self, made: Reconstruction) -> Path:
+        return self.options.output / made.clip.name / made.rate
+
+
+def _rates(text: str) -> list[str]:
+    """Rates as written: each is the name of a folder as well."""
+    rates = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    wrong = [rate for rate in rates if not re.fullmatch(r"\d{1,6}(\.\d{1,6})?", rate, re.ASCII) or float(rate) <= 0.0]
+    if wrong or not rates:
+        raise argparse.ArgumentTypeError(f"{wrong[0] if wrong else text!r} is no rate; give numbers such as 5,7.5,10")
+    return rates
+
+
+def _modes(text: str) -> list[str]:
+    modes = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    wrong = [mode for mode in modes if mode not in MODES]
+    if wrong or not modes:
+        raise argparse.ArgumentTypeError(
+            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join(MODES)}"
+        )
+    return modes
+
+
+def _positive(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0.0 < number < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return number
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text, re.ASCII)
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} is no resolution; give one such as 1280x720")
+    return int(found[1]), int(found[2])
+
+
+def _arguments() -> list[str]:
+    """Ours: in Blender what is behind the "--", in Python everything."""
+    if Path(sys.argv[0]).name == Path(__file__).name:
+        return sys.argv[1:]
+    return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+
+
+if __name__ == "__main__":
+    sys.exit(main(_arguments()))

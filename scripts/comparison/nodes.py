@@ -1,0 +1,83 @@
+"""Node groups that animate by themselves, from the frame that is shown: no script at playback."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+Socket = bpy.types.NodeSocket
+
+
+class Group:
+    """A geometry node group in the making: `group.add("GeometryNodeFillCurve", curves)` is a node with its inputs."""
+
+    def __init__(self, name: str, **inputs: str) -> None:
+        """Make a group that takes a geometry and then `inputs`, name to the kind of socket ("Float", "Material")."""
+        self.tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+        self.tree.is_modifier = True
+        for direction in ("INPUT", "OUTPUT"):
+            self.tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+        for title, kind in inputs.items():
+            self.tree.interface.new_socket(title, in_out="INPUT", socket_type=f"NodeSocket{kind}")
+        self.inputs = self.tree.nodes.new("NodeGroupInput").outputs
+
+    def add(self, kind: str, *arguments: Any, settings: dict[str, Any] | None = None, **named: Any) -> Socket:
+        """Add a node and return its first output.
+
+        Sockets among the arguments are linked, other values are set; None leaves an input as it is. The settings
+        become properties of the node.
+        """
+        node = self.tree.nodes.new(kind)
+        for name, value in (settings or {}).items():
+            setattr(node, name, value)
+        pairs = [*zip(node.inputs, arguments, strict=False), *((node.inputs[name], v) for name, v in named.items())]
+        for socket, value in pairs:
+            if isinstance(value, Socket):
+                self.tree.links.new(value, socket)
+            elif value is not None:
+                socket.default_value = value
+        return node.outputs[0]
+
+    def math(self, operation: str, *values: Any, clamp: bool = False) -> Socket:
+        return self.add("ShaderNodeMath", *values, settings={"operation": operation, "use_clamp": clamp})
+
+    def attribute(self, name: str) -> Socket:
+        """A number that each point of the geometry carries."""
+        return self.add("GeometryNodeInputNamedAttribute", name, settings={"data_type": "FLOAT"})
+
+    def frame(self) -> Socket:
+        """The frame that is shown."""
+        return self.add("GeometryNodeInputSceneTime").node.outputs["Frame"]
+
+    def finish(self, geometry: Socket) -> bpy.types.NodeTree:
+        self.tree.links.new(geometry, self.tree.nodes.new("NodeGroupOutput").inputs[0])
+        return self.tree
+
+
+def apply_group(obj: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any) -> bpy.types.Modifier:
+    """Give the object a modifier with the group, and its inputs their values."""
+    modifier = obj.modifiers.new(group.name, "NODES")
+    modifier.node_group = group
+    for name, value in inputs.items():
+        if hasattr(modifier, "properties"):
+            getattr(modifier.properties.inputs, _identifier(group, name)).value = value
+        else:
+            modifier[_identifier(group, name)] = value
+    return modifier
+
+
+def input_path(modifier: bpy.types.Modifier, name: str) -> str:
+    """The data path, from the object on, by which an input is animated. Blender 5.2 moved it."""
+    identifier = _identifier(modifier.node_group, name)
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, identifier).path_from_id("value")
+    return f'modifiers["{modifier.name}"]["{identifier}"]'
+
+
+def _identifier(group: bpy.types.NodeTree, name: str) -> str:
+    return next(
+        item.identifier
+        for item in group.interface.items_tree
+        if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name == name
+    )

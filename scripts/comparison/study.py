@@ -1,0 +1,113 @@
+"""From recordings to clips, and from clips to what each mode makes of a few keys a second of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from addon.motion import Poses, decimate, interpolate, measure, repair
+from addon.motion.measures import Errors
+from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
+from scripts.trajectories.reading import split_source
+
+from .clips import Clip, Reconstruction
+
+LONGEST_NAME = 80
+"""Characters of a clip's name: folders below folders have to fit what file systems allow."""
+
+NOT_FOLDERS = {"metrics.csv", "report.html", *["con", "prn", "aux", "nul"]} | {
+    f"{device}{digit}" for device in ("com", "lpt") for digit in range(1, 10)
+}
+"""Names that the output needs itself, or that Windows keeps for devices."""
+
+
+def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]]:
+    """Read, repair and name the clips of all sources.
+
+    Parameters
+    ----------
+    sources : iterable of str
+        As `scripts.trajectories.read_trajectories` takes them.
+    axes : str
+        A name in `scripts.trajectories.axes.AXES`.
+
+    Returns
+    -------
+    clips : list of Clip
+    notes : list of str
+        What the user should know of what was read, a line each.
+
+    Raises
+    ------
+    TrajectoryError
+        For the first source that cannot be read, or of which fewer than two poses are left.
+    """
+    clips: list[Clip] = []
+    notes: list[str] = []
+    for source in sources:
+        recording = read_trajectories(source)
+        if recording.note:
+            notes.append(recording.note)
+        stem = split_source(source)[0].stem
+        for trajectory in recording.trajectories:
+            name = f"{stem}-{trajectory.name}" if len(recording.trajectories) > 1 else stem
+            clips.append(make_clip(trajectory, source, folder_name(name, [clip.name for clip in clips]), axes))
+    return clips, notes
+
+
+def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip:
+    """A trajectory, repaired. Raises TrajectoryError where fewer than two poses are left of it."""
+    times, poses, repairs = repair(trajectory.times, trajectory.poses)
+    if len(times) < 2:
+        found = "; ".join(map(str, repairs))
+        raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
+    return Clip(name, source, axes, times, poses, tuple(map(str, repairs)), trajectory.metres_per_unit)
+
+
+def folder_name(wanted: str, taken: Iterable[str]) -> str:
+    """A name like the one wanted that is safe for a folder on every system, and unlike those that are taken.
+
+    Letters and digits of any script stay, and so do dots inside, dashes and underscores. Case makes no difference.
+    """
+    safe = re.sub(r"[^\w.-]+", "_", wanted)[:LONGEST_NAME].strip("._ ") or "clip"
+    unavailable = NOT_FOLDERS | {name.casefold() for name in taken}
+    # Windows takes "nul.txt" for the device too.
+    if safe.casefold() in unavailable or safe.casefold().split(".")[0] in NOT_FOLDERS:
+        number = 2
+        while f"{safe}-{number}".casefold() in unavailable:
+            number += 1
+        return f"{safe}-{number}"
+    return safe
+
+
+def reconstruct(clip: Clip, rate: str, modes: Iterable[str], radius: float) -> Reconstruction | None:
+    """Keep `rate` keys a second of the clip, and fill in between them under every mode.
+
+    Parameters
+    ----------
+    clip : Clip
+    rate : str
+        Keys a second, as the user wrote it.
+    modes : iterable of str
+    radius : float
+        Of the shell, in metres.
+
+    Returns
+    -------
+    Reconstruction or None
+        None where the clip is too short for two keys at this rate.
+    """
+    keys = decimate(clip.times, float(rate))
+    if len(keys) < 2:
+        return None
+    samples = slice(int(keys[0]), int(keys[-1]) + 1)
+    times, truth = clip.times[samples], clip.poses[samples]
+    poses = {mode: interpolate(clip.times[keys], clip.poses[keys], times, mode) for mode in modes}
+    errors = {mode: _errors(clip, times, filled, truth, radius) for mode, filled in poses.items()}
+    return Reconstruction(clip, rate, keys, poses, errors)
+
+
+def _errors(clip: Clip, times: np.ndarray, poses: Poses, truth: Poses, radius: float) -> Errors:
+    return measure(times, clip.in_metres(poses), clip.in_metres(truth), radius)

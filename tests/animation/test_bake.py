@@ -1,0 +1,146 @@
+"""Baked poses, read back from the evaluated scene, are the poses that were baked."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+from addon.animation import bake_poses, read_poses, write_channel
+from addon.motion import MODES, Poses, interpolate
+from addon.motion.quaternions import angle_between, multiply, rotate
+
+
+@pytest.fixture
+def empty(empty_file) -> bpy.types.Object:
+    """An empty in quaternion mode, in the scene."""
+    return new_empty("Tool")
+
+
+def new_empty(name: str) -> bpy.types.Object:
+    obj = bpy.data.objects.new(name, None)
+    obj.rotation_mode = "QUATERNION"
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+def motion(count: int = 60, scaled: bool = False, step: float = 1.0) -> tuple[np.ndarray, Poses]:
+    """Frames and wild poses: half of the keys have the other sign."""
+    random = np.random.default_rng(11)
+    keys = Poses(
+        random.normal(size=(8, 3)),
+        random.normal(size=(8, 4)),
+        np.exp(random.normal(size=8)) if scaled else None,
+    )
+    frames = 1.0 + step * np.arange(count)
+    poses = interpolate(np.linspace(frames[0], frames[-1], 8), keys, frames, "dq_sclerp")
+    poses.quaternions[::2] *= -1.0
+    return frames, poses
+
+
+def keys_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
+    data = obj.animation_data
+    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
+    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in channelbag.fcurves}
+
+
+def assert_read_back(obj: bpy.types.Object, frames: np.ndarray, poses: Poses) -> None:
+    read = read_poses(obj, frames)
+    assert np.abs(read.positions - poses.positions).max() < 1e-5
+    assert angle_between(read.quaternions, poses.quaternions).max() < 1e-5 * np.pi
+    if poses.scales is not None:
+        assert np.abs(read.scales / poses.scales - 1.0).max() < 1e-5
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+def test_every_mode_arrives_in_the_evaluated_scene_on_every_frame(empty, mode, scaled):
+    random = np.random.default_rng(3)
+    keys = Poses(
+        random.normal(size=(6, 3)), random.normal(size=(6, 4)), np.exp(random.normal(size=6)) if scaled else None
+    )
+    frames = np.arange(1.0, 102.0)
+    poses = interpolate(np.linspace(1.0, 101.0, 6), keys, frames, mode)
+    bake_poses(empty, frames, poses)
+    assert_read_back(empty, frames, poses)
+
+
+def test_sub_frames_are_kept(empty):
+    frames, poses = motion(step=0.25)
+    bake_poses(empty, frames, poses)
+    assert_read_back(empty, frames, poses)
+
+
+def test_a_parent_carries_the_baked_poses_along(empty):
+    frames, poses = motion()
+    bake_poses(empty, frames, poses)
+    parent = new_empty("Arm")
+    parent.location, parent.rotation_quaternion = (1, 2, 3), (0.5, 0.5, 0.5, 0.5)
+    empty.parent = parent
+    turn = np.broadcast_to((0.5, 0.5, 0.5, 0.5), poses.quaternions.shape)
+    expected = Poses(np.array((1, 2, 3)) + rotate(turn, poses.positions), multiply(turn, poses.quaternions))
+    assert_read_back(empty, frames, expected)
+
+
+def test_keys_are_generated_straight_and_in_one_group(empty):
+    frames, poses = motion()
+    bake_poses(empty, frames, poses)
+    curves = keys_of(empty)
+    assert len(curves) == 7
+    for fcurve in curves.values():
+        assert fcurve.group.name == "Object Transforms"
+        assert len(fcurve.keyframe_points) == len(frames)
+        assert {key.type for key in fcurve.keyframe_points} == {"GENERATED"}
+        assert {key.interpolation for key in fcurve.keyframe_points} == {"LINEAR"}
+
+
+def test_quaternions_do_not_flip_between_frames(empty):
+    frames, poses = motion()
+    bake_poses(empty, frames, poses)
+    curves = keys_of(empty)
+    baked = np.array([[key.co.y for key in curves["rotation_quaternion", i].keyframe_points] for i in range(4)]).T
+    assert np.all(np.sum(baked[1:] * baked[:-1], axis=1) > 0.0)
+
+
+def test_baking_again_replaces_the_keys_and_leaves_other_channels(empty):
+    frames, poses = motion()
+    write_channel(empty, "hide_render", frames[:2], np.array([0.0, 1.0]), interpolation="CONSTANT")
+    bake_poses(empty, frames, poses)
+    bake_poses(empty, frames[:30], poses[:30])
+    curves = keys_of(empty)
+    assert len(curves["location", 0].keyframe_points) == 30
+    assert len(curves["hide_render", 0].keyframe_points) == 2
+    assert len(curves) == 8
+
+
+def test_a_shared_action_keeps_what_others_have_in_it(empty):
+    frames, poses = motion()
+    bake_poses(empty, frames, poses)
+    other = new_empty("Other")
+    data = other.animation_data_create()
+    data.action = empty.animation_data.action
+    data.action_slot = data.action.slots.new("OBJECT", "Other")
+    still = Poses(poses.positions * 0.0, poses.quaternions)
+    bake_poses(other, frames, still)
+    assert_read_back(empty, frames, poses)
+    assert_read_back(other, frames, still)
+
+
+def test_an_euler_object_is_refused_untouched(empty):
+    empty.rotation_mode = "XYZ"
+    with pytest.raises(ValueError, match="Tool: rotation mode XYZ"):
+        bake_poses(empty, *motion())
+    assert empty.animation_data is None
+
+
+def test_poses_that_do_not_fit_the_frames_are_refused(empty):
+    frames, poses = motion()
+    with pytest.raises(ValueError, match="Tool"):
+        bake_poses(empty, frames[1:], poses)
+
+
+def test_reading_leaves_the_scene_on_its_frame(empty):
+    bpy.context.scene.frame_set(17, subframe=0.5)
+    read_poses(empty, np.arange(1.0, 5.0))
+    assert bpy.context.scene.frame_current_final == 17.5

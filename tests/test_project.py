@@ -1,0 +1,77 @@
+"""What holds for the whole checkout: one style, one version, a manifest that Blender takes, no way to the network."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import bpy
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = sorted(path for folder in ("addon", "assets", "scripts") for path in (ROOT / folder).rglob("*.py"))
+
+FLOORS = {"motion": {"numpy"}, "animation": {"numpy", "bpy", "bpy_extras", "mathutils"}}
+"""What each floor of the extension may import beside the standard library and the floors below."""
+
+
+def imported(path: Path) -> set[str]:
+    """The top-level names of all modules that a file imports, "." for its own package."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found.add("." * node.level + (node.module or "").split(".")[0])
+    return found
+
+
+@pytest.mark.parametrize("command", [["check"], ["format", "--check"]], ids=["lint", "format"])
+def test_style(command):
+    done = subprocess.run([sys.executable, "-m", "ruff", *command, str(ROOT)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_extension_is_valid_for_blender(tmp_path):
+    package = tmp_path / "rigid_motion"
+    shutil.copytree(ROOT / "addon", package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "blender_manifest.toml", package)
+    tool = Path(bpy.utils.system_resource("SCRIPTS")) / "addons_core/bl_pkg/cli/blender_ext.py"
+    done = subprocess.run([sys.executable, str(tool), "validate", str(package)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_one_version_everywhere():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert manifest["version"] == project["project"]["version"]
+    assert f"## {manifest['version']}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_the_extension_imports_downwards_and_nothing_else(floor):
+    below = {"motion"} if floor == "animation" else set()
+    for path in (ROOT / "addon" / floor).rglob("*.py"):
+        for name in imported(path):
+            known = name in FLOORS[floor] or name in sys.stdlib_module_names
+            inside = name.startswith(".") and not name.startswith("..")
+            lower = name.lstrip(".") in below or (floor == "motion" and (path.parent.name == "algebras"))
+            assert known or inside or lower, f"{path.relative_to(ROOT)} imports {name}"
+
+
+def test_the_extension_has_no_way_to_the_network_or_to_a_shell():
+    forbidden = {"socket", "http", "urllib", "requests", "subprocess", "ctypes", "pickle", "shelve", "marshal"}
+    for path in (ROOT / "addon").rglob("*.py"):
+        assert not imported(path) & forbidden, path
+        assert not re.search(r"\b(eval|exec|__import__)\(|sys\.path", path.read_text(encoding="utf-8")), path
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_module_says_what_lives_in_it(path):
+    source = path.read_text(encoding="utf-8")
+    assert not source.strip() or ast.get_docstring(ast.parse(source)), f"{path.relative_to(ROOT)} has no docstring"
