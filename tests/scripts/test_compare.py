@@ -1,0 +1,269 @@
+"""compare.py as people run it: what it writes, what it prints, how it ends."""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
+from scipy.spatial.transform import Rotation
+
+from addon.motion import MODES, Poses, shell_error
+from scripts import compare
+from scripts.comparison.study import folder_name
+
+ROOT = Path(__file__).resolve().parents[2]
+RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
+
+COLUMNS = (
+    "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
+    "rms_position_m,rms_rotation_deg,rms_velocity_m_s"
+)
+SMALL = ["--resolution", "160x90", "--fps", "6"]
+
+
+def run(*arguments: object) -> int:
+    return compare.main([str(argument) for argument in arguments])
+
+
+def exit_code(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        run(*arguments)
+    return ended.value.code
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def table(path: Path) -> dict[str, np.ndarray]:
+    rows = rows_of(path)
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def poses_of(columns: dict[str, np.ndarray]) -> Poses:
+    return Poses(
+        np.stack([columns[name] for name in ("x", "y", "z")], axis=-1),
+        np.stack([columns[name] for name in ("qw", "qx", "qy", "qz")], axis=-1),
+    )
+
+
+@pytest.fixture(scope="module")
+def short_clip(tmp_path_factory) -> Path:
+    """One second of an asset."""
+    lines = (ROOT / "assets" / "throw.csv").read_text().splitlines()
+    path = tmp_path_factory.mktemp("clips") / "toss.csv"
+    path.write_text("\n".join(lines[:1] + lines[90:181]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory) -> Path:
+    """The output of the main job on the assets, without videos."""
+    output = tmp_path_factory.mktemp("measured")
+    assert run("--no-video", "--output", output, "--rates", "5,7.5,20") == 0
+    return output
+
+
+def test_there_is_a_row_for_every_clip_rate_and_mode(measured):
+    assert (measured / "metrics.csv").read_text().splitlines()[0] == COLUMNS
+    rows = rows_of(measured / "metrics.csv")
+    clips = [path.stem for path in sorted((ROOT / "assets").glob("*.csv"))]
+    wanted = {(clip, rate, mode) for clip in clips for rate in ("5", "7.5", "20") for mode in MODES}
+    assert {(row["clip"], row["rate_hz"], row["mode"]) for row in rows} == wanted
+    assert len(rows) == len(wanted)
+
+
+def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measured):
+    for row in rows_of(measured / "metrics.csv"):
+        recording = table(ROOT / "assets" / f"{row['clip']}.csv")
+        folder = measured / row["clip"] / row["rate_hz"]
+        filled, keys = table(folder / f"{row['mode']}.csv"), table(folder / "keys.csv")
+        compared = (recording["t"] >= keys["t"][0]) & (recording["t"] <= keys["t"][-1])
+        truth = {name: column[compared] for name, column in recording.items()}
+        assert np.array_equal(filled["t"], truth["t"])
+        assert np.isin(keys["t"], truth["t"]).all()
+        offset = poses_of(filled).positions - poses_of(truth).positions
+        turns = [Rotation.from_quat(poses_of(columns).quaternions, scalar_first=True) for columns in (filled, truth)]
+        arms = [0.1 * (turns[0].as_matrix() - turns[1].as_matrix())[:, :, axis] for axis in range(3)]
+        shell = np.max([np.linalg.norm(offset + arm, axis=1) for arm in arms], axis=0)
+        drift = np.linalg.norm(np.diff(offset, axis=0), axis=1) / np.diff(truth["t"])
+        expected = {
+            "keys": len(keys["t"]),
+            "samples": compared.sum(),
+            "duration_s": np.ptp(keys["t"]),
+            "bytes_per_s": 56 * (len(keys["t"]) - 1) / np.ptp(keys["t"]),
+            "rms_shell_m": np.sqrt(np.mean(shell**2)),
+            "p95_shell_m": np.percentile(shell, 95),
+            "max_shell_m": shell.max(),
+            "rms_position_m": np.sqrt(np.mean(np.sum(offset**2, axis=1))),
+            "rms_rotation_deg": np.degrees(np.sqrt(np.mean((turns[1].inv() * turns[0]).magnitude() ** 2))),
+            "rms_velocity_m_s": np.sqrt(np.mean(drift**2)),
+        }
+        for name, value in expected.items():
+            assert float(row[name]) == pytest.approx(value, rel=1e-6, abs=1e-9), (row["clip"], row["mode"], name)
+
+
+def test_screws_are_pytransform3ds_between_the_written_keys(measured):
+    keys, filled = (table(measured / "reach" / "5" / name) for name in ("keys.csv", "dq_sclerp.csv"))
+    segment = np.clip(np.searchsorted(keys["t"], filled["t"], side="right") - 1, 0, len(keys["t"]) - 2)
+    u = (filled["t"] - keys["t"][segment]) / np.diff(keys["t"])[segment]
+    poses = poses_of(keys)
+    ends = dual_quaternions_from_pqs(np.hstack((poses.positions, poses.quaternions)))
+    pqs = pqs_from_dual_quaternions(dual_quaternions_sclerp(ends[segment], ends[segment + 1], u))
+    assert shell_error(poses_of(filled), Poses(pqs[:, :3], pqs[:, 3:])).max() < 1e-12
+
+
+def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_clip, tmp_path, capsys):
+    assert run(short_clip, "--output", tmp_path, "--rates", "10", *SMALL) == 0
+    written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
+    tables = {f"toss/10/{name}.csv" for name in ("keys", *MODES)}
+    assert written == tables | {"metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend"}
+    assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
+
+
+def test_rates_and_modes_can_be_chosen(short_clip, tmp_path):
+    arguments = ("--no-video", "--output", tmp_path, "--rates", "7.5, 30,7.5", "--modes", "pga_lerp,lerp_slerp")
+    assert run(short_clip, *arguments) == 0
+    assert sorted(path.name for path in (tmp_path / "toss").iterdir()) == ["30", "7.5"]
+    assert sorted(path.name for path in (tmp_path / "toss" / "30").iterdir()) == [
+        "keys.csv",
+        "lerp_slerp.csv",
+        "pga_lerp.csv",
+    ]
+
+
+def test_clips_of_one_name_get_folders_of_their_own(short_clip, tmp_path):
+    other = tmp_path / "other" / "Toss.csv"
+    other.parent.mkdir()
+    shutil.copy(short_clip, other)
+    assert run(short_clip, other, short_clip, "--no-video", "--output", tmp_path / "out", "--rates", "5") == 0
+    assert sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir()) == ["Toss-2", "toss", "toss-3"]
+
+
+@pytest.mark.parametrize("name", ["..", "a b", "con", "report.html", "<script>", "-", "übung", "x" * 300])
+def test_names_of_clips_are_safe(name):
+    folder = folder_name(name, [])
+    assert re.fullmatch(r"[\w.-]{1,85}", folder)
+    assert folder not in (".", "..", "con", "report.html")
+
+
+def test_what_is_repaired_is_said(short_clip, tmp_path, capsys):
+    lines = short_clip.read_text().splitlines()
+    lines.insert(1, "0,0,0,0,0,0,0,0")
+    lines.insert(40, lines[40])
+    broken = tmp_path / "broken.csv"
+    broken.write_text("\n".join(lines))
+    assert run(broken, "--no-video", "--output", tmp_path / "out", "--rates", "5") == 0
+    said = capsys.readouterr().err
+    assert "broken: dropped poses with a quaternion of length zero" in said
+    assert "broken: dropped rows whose time comes again" in said
+    assert "length zero" in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--rates", "0"], "rate"),
+        (["--rates", "../../x"], "rate"),
+        (["--rates", "1e3"], "rate"),
+        (["--rates", ""], "rate"),
+        (["--modes", "bezier"], "lerp_slerp"),
+        (["--radius", "-1"], "above 0"),
+        (["--slow-motion", "nan"], "above 0"),
+        (["--resolution", "161x90"], "even"),
+        (["--resolution", "big"], "1280x720"),
+        (["--fps", "0"], "1 to 240"),
+        (["--axes", "maya"], "unity"),
+    ],
+)
+def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
+    assert exit_code(*arguments) == 2
+    assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        ("t,x,y,z\n1,2,3,4\n", "qx"),
+        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,zero,0,0,0,0,1\n", ":3:"),
+        ("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n", "0 usable poses"),
+        ("", "line.csv"),
+    ],
+)
+def test_a_wrong_file_ends_with_code_2_and_one_line(tmp_path, capsys, content, complaint):
+    path = tmp_path / "line.csv"
+    path.write_text(content)
+    assert run(path, "--no-video", "--output", tmp_path / "out") == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if "compare.py:" in line]
+    assert len(said) == 1
+    assert complaint in said[0]
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_object_that_is_not_there_is_said_before_any_work(short_clip, tmp_path, capsys):
+    assert run(short_clip, "--output", tmp_path / "out", "--object", "nowhere.blend:Cube") == 2
+    assert "nowhere.blend" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_clip_too_short_for_a_rate_is_left_out_and_said(short_clip, tmp_path, capsys):
+    assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "0.5,10") == 0
+    assert "toss: too short for two keys at 0.5 a second" in capsys.readouterr().err
+    assert not (tmp_path / "toss" / "0.5").exists()
+
+
+def test_help_has_examples(capsys):
+    assert exit_code("--help") == 0
+    assert "blender --background --python scripts/compare.py --" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for another process")
+def test_ctrl_c_while_rendering_leaves_a_report_and_no_half_video(tmp_path):
+    command = [sys.executable, ROOT / "scripts" / "compare.py", "--output", tmp_path, "--rates", "5", "--fps", "60"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    waited = time.monotonic() + 120
+    while not list(tmp_path.glob("*/5/.*comparison.mp4")) and time.monotonic() < waited:
+        assert process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    printed, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert Path(printed.splitlines()[-1]).is_file()
+    assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
+    assert len(list(tmp_path.rglob("*.mp4"))) < 4
+
+
+AXES = {
+    "aframe_head.csv": "opengl",
+    "aframe_left.csv": "opengl",
+    "aframe_right.csv": "opengl",
+    "beat_saber_body.bvh": "opengl",
+    "broad_fast_rotation.csv": "ros",
+    "freiburg1_xyz.tum": "ros",
+    "optitrack_rigid_body.csv": "opengl",
+    "vive_index_left.csv": "unity",
+    "vive_index_right.csv": "unity",
+}
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not beside the checkout")
+@pytest.mark.parametrize("name", AXES)
+def test_real_recordings_run(name, tmp_path, capsys):
+    assert run(RECORDINGS / name, "--axes", AXES[name], "--no-video", "--output", tmp_path) == 0
+    said = capsys.readouterr().err
+    if name.startswith("vive"):
+        assert "length zero" in said
+        assert "time comes again" in said
+        assert "gaps" in said
+    for row in rows_of(tmp_path / "metrics.csv"):
+        assert 0.0 < float(row["rms_shell_m"]) < 0.5
