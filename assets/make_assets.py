@@ -19,8 +19,8 @@ import numpy as np
 ASSETS = Path(__file__).resolve().parent
 sys.path.insert(0, str(ASSETS.parent))
 
-from assets.making.motions import MOTIONS  # noqa: E402
-from assets.making.tracking import tick, track  # noqa: E402
+from assets.making.motions import MOTIONS
+from assets.making.tracking import tick, track
 
 SEED = 2021
 HEADER = "t,x,y,z,qx,qy,qz,qw"

@@ -6,8 +6,8 @@
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py benchmark
 
-The packages go into .venv/ of this checkout; the first run downloads about 400 MB. What is behind the command goes to it:
-`python scripts/bootstrap.py compare --help` shows the options of compare.
+The packages go into .venv/ of this checkout; the first run downloads about 400 MB. What is behind the command goes to
+it: `python scripts/bootstrap.py compare --help` shows the options of compare.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def main(arguments: list[str]) -> int:
     command, *rest = arguments
     if command not in COMMANDS:
         return _fail(f"there is no command {command!r}; the commands are {', '.join(COMMANDS)}")
-    if sys.version_info < (3, 11):
+    if sys.version_info < (3, 11):  # noqa: UP036 - whoever starts it with another Python is to read why
         return _fail(f"Python {PYTHON} is too old: run this with Python 3.11 or 3.13")
     project = _project()
     known = project["tool"]["rigid-motion"]["blender"]

@@ -11,6 +11,7 @@ import re
 import shlex
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -30,7 +31,7 @@ from scripts.comparison.film import render_film, save_blend
 from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_reconstruction
 from scripts.comparison.progress import Progress
 from scripts.comparison.report import Settings, write_report
-from scripts.comparison.stage import ENGINES, StageSettings, build_stage
+from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings, build_stage
 from scripts.comparison.study import read_clips, reconstruct
 from scripts.comparison.subject import SubjectError, load_subject
 from scripts.comparison.timeline import Timeline
@@ -79,7 +80,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
-    video.add_argument("--resolution", type=_resolution, default="854x480", metavar="WxH", help="(%(default)s)")
+    video.add_argument("--resolution", type=_resolution, default="960x540", metavar="WxH", help="(%(default)s)")
     video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
     video.add_argument(
         "--slow-motion", type=_positive, default=1.0, metavar="N", help="times slower than life (%(default)s)"
@@ -90,6 +91,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="OBJECT",
         help="what moves: drill, controller, or FILE.blend:NAME (%(default)s)",
     )
+    video.add_argument(
+        "--antialiasing",
+        choices=ANTIALIASING,
+        help="of workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
+    )
+    video.add_argument("--samples", type=int, default=16, help="of eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
     try:
         options.stage = StageSettings(
@@ -98,6 +105,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             fps=options.fps,
             slow_motion=options.slow_motion,
             subject=options.object,
+            antialiasing=options.antialiasing,
+            samples=options.samples,
         )
     except ValueError as error:
         parser.error(str(error))
@@ -202,11 +211,19 @@ class _Run:
     def report(self) -> Path:
         """The page, with the films that there are."""
         path = self.options.output / "report.html"
+        manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+        stage = self.options.stage
         settings = Settings(
             radius=self.options.radius,
-            program="Rigid Motion",
+            program=f"{manifest['name']} {manifest['version']}",
             blender=bpy.app.version_string,
             command=self.command,
+            details={}
+            if self.options.no_video
+            else {
+                "Videos": f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s",
+                "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
+            },
         )
         write_report(path, self.reconstructions, films=self.films, settings=settings)
         return path.resolve()

@@ -13,13 +13,10 @@ from typing import TextIO
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[TextIO]:
-    """Open a text file that takes the place of `path` when the block ends well, and leaves no trace where it fails.
+def written_beside(path: Path) -> Iterator[Path]:
+    """A path next to `path` for a file that takes its place when the block ends well, and leaves no trace otherwise.
 
-    Parameters
-    ----------
-    path : Path
-        Folders that are missing on the way are made.
+    It ends as `path` does. Folders that are missing on the way are made.
 
     Raises
     ------
@@ -27,14 +24,19 @@ def replacing(path: Path) -> Iterator[TextIO]:
         Where the folder cannot be written, or (on Windows) another program has `path` open.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    beside = path.resolve().with_name(f".{os.getpid()}.{path.name}")
     try:
-        with beside.open("w", encoding="utf-8", newline="\n") as stream:
-            yield stream
+        yield beside
         beside.replace(path)
-    except BaseException:
+    finally:
         beside.unlink(missing_ok=True)
-        raise
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[TextIO]:
+    """Open a text file that takes the place of `path` when the block ends well: see `written_beside`."""
+    with written_beside(path) as beside, beside.open("w", encoding="utf-8", newline="\n") as stream:
+        yield stream
 
 
 def write_text(path: Path, text: str) -> None:

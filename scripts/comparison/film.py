@@ -1,6 +1,6 @@
 """The film: a stage rendered to a video that any browser plays, and saved as the .blend it was rendered from.
 
-H.264 in an MP4, by Blender's own encoder. Either file is written beside its place and moved into it when it is whole.
+Either file is written beside its place and moved into it when it is whole.
 """
 
 from __future__ import annotations
@@ -8,7 +8,9 @@ from __future__ import annotations
 import ctypes
 import io
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -16,17 +18,16 @@ from pathlib import Path
 
 import bpy
 
-QUALITY = "HIGH"
-"""Of Blender's constant rate factors, the one that leaves thin lines and small letters sharp."""
+from .files import written_beside
 
 
 def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int], None] | None = None) -> float:
-    """Render all frames of the scene to an MP4.
+    """Render all frames of the scene to its MP4.
 
     Parameters
     ----------
     scene : bpy.types.Scene
-        With an even width and height, which the codec needs.
+        Set up for video, as `stage.build_stage` leaves it.
     path : Path
         Ending in .mp4. A file that is there is replaced, once the new one is whole.
     progress : callable, optional
@@ -43,13 +44,18 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
         Where Blender cannot render.
     OSError
         Where the file cannot be put in its place.
+    KeyboardInterrupt
+        After Ctrl-C, once the frame at hand is done; there is no film then.
     """
     total = scene.frame_end - scene.frame_start + 1
-    with _written_beside(path) as beside, _counting(progress, total):
-        _encode_as_mp4(scene, beside)
+    with written_beside(path) as beside, _interruptible(), _counting(progress, total):
+        kept, scene.render.filepath = scene.render.filepath, str(beside)
         started = time.perf_counter()
-        with _hushed():
-            bpy.ops.render.render(animation=True, scene=scene.name)
+        try:
+            with _hushed():
+                bpy.ops.render.render(animation=True, scene=scene.name)
+        finally:
+            scene.render.filepath = kept
         seconds = time.perf_counter() - started
         if not beside.is_file():
             raise RuntimeError(f"{path}: Blender rendered no video; is the resolution even, and the disk not full?")
@@ -58,35 +64,8 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
 
 def save_blend(path: Path) -> None:
     """Save the open file as a compressed .blend. A file that is there is replaced."""
-    with _written_beside(path) as beside, _hushed():
+    with written_beside(path) as beside, _hushed():
         bpy.ops.wm.save_as_mainfile(filepath=str(beside), compress=True, copy=True, check_existing=False)
-
-
-def _encode_as_mp4(scene: bpy.types.Scene, path: Path) -> None:
-    image = scene.render.image_settings
-    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
-        image.media_type = "VIDEO"
-    image.file_format = "FFMPEG"
-    image.color_mode = "RGB"
-    video = scene.render.ffmpeg
-    video.format, video.codec, video.audio_codec = "MPEG4", "H264", "NONE"
-    video.constant_rate_factor = QUALITY
-    video.ffmpeg_preset = "REALTIME"
-    video.gopsize = scene.render.fps
-    scene.render.use_file_extension = True
-    scene.render.filepath = str(path)
-
-
-@contextmanager
-def _written_beside(path: Path) -> Iterator[Path]:
-    """A path for a new file next to `path`, which takes its place when the block ends well."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.resolve().with_name(f".{os.getpid()}.{path.name}")
-    try:
-        yield beside
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -106,6 +85,37 @@ def _counting(progress: Callable[[int, int], None] | None, total: int) -> Iterat
         yield
     finally:
         bpy.app.handlers.render_post.remove(count)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C end the rendering after the frame at hand, and raise KeyboardInterrupt then.
+
+    Blender swallows what is raised in its handlers, and renders on. So the scene is put on its last frame, and
+    Blender's own loop skips the rest.
+    """
+    if threading.current_thread() is not threading.main_thread():  # Signals come to the main thread alone.
+        yield
+        return
+    interrupted = False
+
+    def interrupt(*_: object) -> None:
+        nonlocal interrupted
+        interrupted = True
+
+    def skip(scene: bpy.types.Scene, *_: object) -> None:
+        if interrupted:
+            scene.frame_current = scene.frame_end
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    bpy.app.handlers.render_post.append(skip)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_post.remove(skip)
+        signal.signal(signal.SIGINT, before)
+    if interrupted:
+        raise KeyboardInterrupt
 
 
 @contextmanager

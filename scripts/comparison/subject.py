@@ -83,6 +83,7 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
                 raise SubjectError(f"{file}: has no object {name!r}; it has {_listed(source.objects)}")
             target.objects = [name]
         mesh = _evaluated_copy(target.objects[0])
+        names = _own_materials(mesh) if mesh else {}
     except OSError as error:
         raise SubjectError(f"{file}: is not a .blend file that this Blender can read") from error
     finally:
@@ -90,6 +91,8 @@ def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
     if mesh is None:
         raise SubjectError(f"{file}: {name!r} has no faces to show; name a mesh, curve, surface or text object")
     mesh.name = name
+    for material, plain in names.items():
+        material.name = plain
     if not mesh.materials:
         mesh.materials.append(None)
     return mesh
@@ -116,6 +119,23 @@ def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
         return None
     mesh.transform(Matrix.Diagonal((*size, 1.0)))
     return mesh
+
+
+def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
+    """Give the mesh copies of its materials, and return the names they are copies of.
+
+    Blender notes in what it loads which file that was, by its full path, and a copy has no such note. Images are
+    packed, so that the file that shows the object can be opened elsewhere.
+    """
+    names = {}
+    for slot, material in enumerate(mesh.materials):
+        if material is not None:
+            mesh.materials[slot] = material.copy()
+            names[mesh.materials[slot]] = material.name
+    for image in bpy.data.images:
+        if image.source == "FILE" and not image.packed_file and Path(bpy.path.abspath(image.filepath)).is_file():
+            image.pack()
+    return names
 
 
 def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> None:

@@ -92,15 +92,18 @@ class ShownMotion:
         clip, kept = reconstruction.clip, reconstruction.keys
         key_times, keys = clip.times[kept], clip.poses[kept]
         times = timeline.times_of(timeline.fine_frames)
-        recording = to_blender(interpolate(clip.times, clip.poses, times, "dq_sclerp"), clip.axes)
+
+        def shown(poses: Poses) -> Poses:
+            return to_blender(clip.in_metres(poses), clip.axes)
+
+        recording = shown(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
         centre = (recording.positions.min(axis=0) + recording.positions.max(axis=0)) / 2.0
         return cls(
             recording=_around(centre, recording),
             modes={
-                mode: _around(centre, to_blender(interpolate(key_times, keys, times, mode), clip.axes))
-                for mode in reconstruction.poses
+                mode: _around(centre, shown(interpolate(key_times, keys, times, mode))) for mode in reconstruction.poses
             },
-            keys=_around(centre, to_blender(keys, clip.axes)),
+            keys=_around(centre, shown(keys)),
             key_frames=timeline.frames_of(key_times),
             centre=centre,
         )

@@ -83,6 +83,12 @@ def test_nothing_is_left_behind_and_nothing_is_said(scene, tmp_path, capfd):
     assert handlers() == before
 
 
+def test_the_file_tells_nothing_of_the_machine_it_was_made_on(scene, tmp_path):
+    render_film(scene, tmp_path / "comparison.mp4")
+    assert scene.render.filepath == "//comparison.mp4"
+    assert bpy.utils.blend_paths(absolute=False) == []
+
+
 def test_a_film_that_cannot_be_rendered_leaves_the_old_one(scene, tmp_path):
     film = tmp_path / "comparison.mp4"
     film.write_bytes(b"the film of yesterday")

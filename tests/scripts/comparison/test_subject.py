@@ -1,10 +1,24 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 
 from scripts.comparison.subject import MODELS, SubjectError, load_subject, shrink, tinted_slots, vertices_of
+
+
+def painted(picture: Path) -> bpy.types.Material:
+    """A material with an image of its own."""
+    image = bpy.data.images.new("Paint", 4, 4)
+    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.save()
+    material = bpy.data.materials.new("Paint")
+    if material.node_tree is None:
+        material.use_nodes = True
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = bpy.data.images.load(str(picture))
+    return material
 
 
 @pytest.fixture
@@ -13,7 +27,7 @@ def user_file(tmp_path, empty_file):
     cube = bpy.data.objects.new("Cube", bpy.data.meshes.new("Cube"))
     corners = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
     cube.data.from_pydata(corners.tolist(), [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6)])
-    cube.data.materials.append(bpy.data.materials.new("Paint"))
+    cube.data.materials.append(painted(tmp_path / "paint.png"))
     array = cube.modifiers.new("Array", "ARRAY")
     array.use_relative_offset, array.use_constant_offset = False, True
     array.count, array.constant_offset_displace = 3, (10.0, 0.0, 0.0)
@@ -48,8 +62,16 @@ def test_nothing_else_of_the_users_file_stays(user_file):
     scene_blocks = set(bpy.data.user_map())
     mesh = load_subject(f"{user_file}:Cube")
     arrived = set(bpy.data.user_map()) - scene_blocks
-    assert arrived == {mesh, bpy.data.materials["Paint"]}
+    assert arrived == {mesh, mesh.materials[0], bpy.data.images["paint.png"]}
+    assert mesh.materials[0].name == "Paint"
     assert not bpy.data.texts
+
+
+def test_what_is_shown_can_be_opened_elsewhere(user_file, tmp_path):
+    mesh = load_subject(f"{user_file}:Cube")
+    (tmp_path / "paint.png").unlink()
+    assert bpy.data.images["paint.png"].packed_file
+    assert mesh.materials[0].library_weak_reference is None
 
 
 def test_an_object_without_our_material_is_tinted_in_its_first_slot(user_file):
