@@ -35,6 +35,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from addon.motion import MODES, Poses, interpolate
 from addon.motion.quaternions import align_signs, multiply
 
+ENOUGH = 4.0
+"""Seconds after which one way of computing a case has been measured well enough."""
+
 
 @dataclass(frozen=True, eq=False)
 class Case:
@@ -177,17 +180,19 @@ def ways(case: Case) -> dict[tuple[str, str], Callable[[], object]]:
 
 
 def race(contestants: dict[tuple[str, str], Callable[[], object]], rounds: int) -> dict[tuple[str, str], list[float]]:
-    """Seconds of every round of each, all taking turns. Slow ones sit out most rounds once a fifth is run."""
+    """Seconds of every round of each, all taking turns. Whoever has used up `ENOUGH` seconds has had its rounds.
+
+    Each runs twice in its turn, and the second run counts: the first one pays for the memory and the caches that the
+    one before it has left behind.
+    """
     seconds: dict[tuple[str, str], list[float]] = {name: [] for name in contestants}
-    for run in contestants.values():
-        run()
-    for turn in range(rounds):
+    for _ in range(rounds):
         for name, run in contestants.items():
-            if seconds[name] and turn % 5 and min(seconds[name]) > 0.1:
-                continue
-            start = time.perf_counter()
-            run()
-            seconds[name].append(time.perf_counter() - start)
+            if sum(seconds[name]) < ENOUGH / 2:
+                run()
+                start = time.perf_counter()
+                run()
+                seconds[name].append(time.perf_counter() - start)
     return seconds
 
 

@@ -111,7 +111,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     except ValueError as error:
         parser.error(str(error))
     if not options.inputs:
-        options.inputs = [str(path) for path in sorted((ROOT / "assets").glob("*.csv"))]
+        assets = ROOT / "assets"
+        if Path.cwd() == ROOT:
+            assets = assets.relative_to(ROOT)
+        options.inputs = [str(path) for path in sorted(assets.glob("*.csv"))]
     return options
 
 

@@ -23,10 +23,10 @@ def lerp_slerp(segments: Segments) -> Curves:
     """Straight line and great arc."""
 
     def basis(s, parameters, within):
-        turn, travel = np.empty((2, s.size)), np.empty((2, s.size))
-        _slerp(s, parameters[0], within, turn)
-        travel[0], travel[1] = 1.0, s
-        return turn, travel, _geometric_scales(s, parameters)
+        rows = np.empty((4, s.size))
+        _slerp(s, parameters[0], within, rows[:2])
+        rows[2], rows[3] = 1.0, s
+        return rows, _geometric_scales(s, parameters)
 
     return _curves(segments, (segments.centre, 0.5 * segments.chord), (segments.quarter_angle,), basis)
 
@@ -35,11 +35,11 @@ def screw(segments: Segments) -> Curves:
     """The screw motion from key to key: ScLERP, and the SLERP of motors."""
 
     def basis(s, parameters, within):
-        turn, travel = np.empty((2, s.size)), np.empty((4, s.size))
-        _slerp(s, parameters[0], within, turn)
-        travel[0], travel[1] = 1.0, s
-        np.multiply(turn[1], turn, out=travel[2:])
-        return turn, travel, _geometric_scales(s, parameters)
+        rows = np.empty((6, s.size))
+        _slerp(s, parameters[0], within, rows[:2])
+        rows[2], rows[3] = 1.0, s
+        np.multiply(rows[1], rows[:2], out=rows[4:])
+        return rows, _geometric_scales(s, parameters)
 
     along, across, around = segments.decompose()
     sine = np.sin(2.0 * segments.quarter_angle)
@@ -51,11 +51,11 @@ def motor_lerp(segments: Segments) -> Curves:
     """The normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
 
     def basis(s, parameters, within):
-        turn, travel = np.empty((2, s.size)), np.empty((3, s.size))
-        _lerp(s, parameters[0], turn)
-        travel[0] = 1.0
-        np.multiply(turn[1], turn, out=travel[1:])
-        return turn, travel, _geometric_scales(s, parameters)
+        rows = np.empty((5, s.size))
+        _lerp(s, parameters[0], rows[:2])
+        rows[2] = 1.0
+        np.multiply(rows[1], rows[:2], out=rows[3:])
+        return rows, _geometric_scales(s, parameters)
 
     _, _, around = segments.decompose()
     tangent, sine = np.tan(segments.quarter_angle), np.sin(2.0 * segments.quarter_angle)
@@ -74,14 +74,14 @@ def similarity_slerp(segments: Segments) -> Curves:
 
     def basis(s, parameters, within):
         quarter_angle, growth, _ = parameters
-        turn, travel = np.empty((2, s.size)), np.empty((4, s.size))
-        _slerp(s, quarter_angle, within, turn)
-        travel[0] = 1.0
+        rows = np.empty((6, s.size))
+        _slerp(s, quarter_angle, within, rows[:2])
+        rows[2] = 1.0
         # (exp(z u) - exp(z / 2)) / (exp(z) - 1), with z = l and z = l + i angle; u = (1 + s) / 2. See `algebras.cga`.
-        travel[1] = _half_sinh_share(s, growth, 0.0 * growth).real
+        rows[3] = _half_sinh_share(s, growth, 0.0 * growth).real
         across = _half_sinh_share(s, growth, 4.0 * quarter_angle)
-        travel[2], travel[3] = across.real, across.imag
-        return turn, travel, _geometric_scales(s, parameters)
+        rows[4], rows[5] = across.real, across.imag
+        return rows, _geometric_scales(s, parameters)
 
     along, across, around = segments.decompose()
     return _curves(segments, (segments.centre, along, across, around), (segments.quarter_angle,), basis)
@@ -104,11 +104,12 @@ def similarity_lerp(segments: Segments) -> Curves:
             return a[0] * b[0] + a[1] * b[1] + cosine * (a[0] * b[1] + a[1] * b[0])
 
         weight = dot(shrinking, shrinking)
-        travel = np.empty((3, s.size))
-        travel[0] = 1.0
-        travel[1] = (shrinking[1] ** 2 - shrinking[0] ** 2) / (2.0 * weight)
-        travel[2] = -shrinking[0] * shrinking[1] / weight
-        return rotor / np.sqrt(dot(rotor, rotor)), travel, dot(rotor, growing) / dot(rotor, shrinking)
+        rows = np.empty((5, s.size))
+        rows[:2] = rotor / np.sqrt(dot(rotor, rotor))
+        rows[2] = 1.0
+        rows[3] = (shrinking[1] ** 2 - shrinking[0] ** 2) / (2.0 * weight)
+        rows[4] = -shrinking[0] * shrinking[1] / weight
+        return rows, dot(rotor, growing) / dot(rotor, shrinking)
 
     h = segments.quarter_angle
     _, _, around = segments.decompose()

@@ -18,6 +18,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -95,24 +96,33 @@ class Segments:
         return along, self.chord - along, _cross(n, self.chord)
 
 
-Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, np.ndarray, "np.ndarray | None"]]
+Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, "np.ndarray | None"]]
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What a mode makes of S segments: quaternion = Q b(s), position = P c(s), with b and c of the mode's choice."""
+    """What a mode makes of S segments: quaternion = Q b(s) and position = P c(s), with b and c of the mode's choice."""
 
     quaternions: np.ndarray
-    """Q, shape (4, basis functions b, S)."""
+    """Q, shape (4, 2, S): b has two functions."""
 
     positions: np.ndarray
-    """P, shape (3, basis functions c, S)."""
+    """P, shape (3, functions in c, S)."""
 
     parameters: np.ndarray
     """The numbers of each segment that b and c need, shape (parameters, S)."""
 
     basis: Basis
-    """From s (n,), parameters of (n,) each and whether all |s| <= 1 to b (., n), c (., n) and scales (n,) or None."""
+    """From s (n,), parameters of (n,) each and whether all |s| <= 1 to b above c, (., n), and scales (n,) or None."""
+
+    @cached_property
+    def matrices(self) -> np.ndarray:
+        """P and Q of each segment in one matrix, shape (S, 7, functions in b and c)."""
+        functions, segments = self.positions.shape[1:]
+        matrices = np.zeros((segments, 7, 2 + functions))
+        matrices[:, :3, 2:] = self.positions.transpose(2, 0, 1)
+        matrices[:, 3:, :2] = self.quaternions.transpose(2, 0, 1)
+        return matrices
 
 
 def interpolate_along(
@@ -158,20 +168,20 @@ def _fill(
     mode = curves(segments)
     numbers = np.concatenate(((segments.start, segments.rate), mode.parameters))
     bounds = _sample_bounds(key_times, times, len(keys))
+    all_counts = np.diff(bounds)
     samples = np.broadcast_to(times, out.shape[1:]).ravel()
     flat = out.reshape(len(out), -1)
     outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
     for segment, sample in _blocks(bounds):
-        counts = np.diff(bounds[segment.start : segment.stop + 1])
+        counts = all_counts[segment]
         start, rate, *parameters = np.repeat(numbers[:, segment], counts, axis=1)
         s = samples[sample] - start
         s *= rate
         s -= 1.0
         if outside and not extrapolate:
             np.clip(s, -1.0, 1.0, out=s)
-        turn, travel, scales = mode.basis(s, parameters, not (outside and extrapolate))
-        _combine(mode.positions[..., segment], travel, counts, flat[:3, sample])
-        _combine(mode.quaternions[..., segment], turn, counts, flat[3:7, sample])
+        basis, scales = mode.basis(s, parameters, not (outside and extrapolate))
+        _combine(mode, segment, basis, counts, flat[:7, sample])
         if scales is not None:
             flat[7, sample] = scales
 
@@ -196,24 +206,28 @@ def _blocks(bounds: np.ndarray) -> Iterator[tuple[slice, slice]]:
         yield slice(int(first), int(last)), slice(int(bounds[first]), int(bounds[last]))
 
 
-def _combine(coefficients: np.ndarray, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (k, n) with the coefficients (k, b, S) of each sample's segment times basis (b, n).
+def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (7, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
 
-    Segment i has counts[i] samples, and at least one segment has any.
+    The i-th of the segments has counts[i] samples, and at least one has any.
     """
-    changes = np.flatnonzero(np.diff(counts)) + 1
-    if counts.sum() < DENSE * (len(changes) + 1) or counts.min() < 8:
-        np.einsum("kbn,bn->kn", np.repeat(coefficients, counts, axis=2), basis, out=out)
+    changes = np.flatnonzero(counts[1:] != counts[:-1])
+    if basis.shape[1] < DENSE * (len(changes) + 1) or counts.min() < 8:
+        positions, quaternions = mode.positions[..., segment], mode.quaternions[..., segment]
+        np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
+        np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:])
         return
-    matrices = np.ascontiguousarray(np.moveaxis(coefficients, -1, 0))
-    starts = np.append(0, np.cumsum(counts))
-    for first, last in zip(np.append(0, changes), np.append(changes, len(counts)), strict=True):
-        stretch, shape = slice(starts[first], starts[last]), (-1, last - first, counts[first])
+    matrices = mode.matrices[segment]
+    begin = 0
+    for first, last in itertools.pairwise((0, *(changes + 1).tolist(), len(counts))):
+        shape = (-1, last - first, int(counts[first]))
+        end = begin + shape[1] * shape[2]
         np.matmul(
             matrices[first:last],
-            basis[:, stretch].reshape(shape).transpose(1, 0, 2),
-            out=out[:, stretch].reshape(shape).transpose(1, 0, 2),
+            basis[:, begin:end].reshape(shape).transpose(1, 0, 2),
+            out=out[:, begin:end].reshape(shape).transpose(1, 0, 2),
         )
+        begin = end
 
 
 def _components(vectors: np.ndarray) -> np.ndarray:

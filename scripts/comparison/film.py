@@ -10,11 +10,13 @@ import io
 import os
 import signal
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
+from typing import TextIO
 
 import bpy
 
@@ -120,19 +122,42 @@ def _interruptible() -> Iterator[None]:
 
 @contextmanager
 def _hushed() -> Iterator[None]:
-    """Keep what Blender says of every frame and file off the standard output: it goes by Python and by C."""
+    """Keep what Blender and the graphics driver say of every frame and file to themselves, unless the block fails.
+
+    They write by Python and by C. What Python writes to the standard error still gets through: the progress.
+    """
     _flush_output()
-    kept = os.dup(1)
-    nothing = os.open(os.devnull, os.O_WRONLY)
+    out, err = os.dup(1), os.dup(2)
+    through = os.fdopen(os.dup(2), "w", encoding=getattr(sys.stderr, "encoding", None), errors="replace")
+    python_error = sys.stderr
+    with tempfile.TemporaryFile() as said, through:
+        os.dup2(said.fileno(), 1)
+        os.dup2(said.fileno(), 2)
+        if _descriptor(python_error) == 2:
+            sys.stderr = through
+        failed = True
+        try:
+            with redirect_stdout(io.StringIO()):
+                yield
+            failed = False
+        finally:
+            sys.stderr = python_error
+            _flush_output()
+            os.dup2(out, 1)
+            os.dup2(err, 2)
+            os.close(out)
+            os.close(err)
+            if failed and sys.stderr is not None:
+                said.seek(0)
+                sys.stderr.write(said.read().decode(errors="replace"))
+
+
+def _descriptor(stream: TextIO | None) -> int | None:
+    """The number of a stream's file; None where it has none, being a window or a test."""
     try:
-        os.dup2(nothing, 1)
-        with redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        _flush_output()
-        os.dup2(kept, 1)
-        os.close(kept)
-        os.close(nothing)
+        return stream.fileno()
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def _flush_output() -> None:

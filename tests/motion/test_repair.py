@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from addon.motion import Poses, interpolate, repair
@@ -104,6 +104,7 @@ def test_nothing_left_is_no_crash():
 wild = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1.0, 1.0, 2.0, -1e300, 1e-300])
 
 
+@example([(0.0, 1.7e308, 0.0, 0.0)] * 3)
 @given(st.lists(st.tuples(wild, wild, wild, wild), max_size=30))
 def test_whatever_comes_in_can_be_interpolated(rows):
     table = np.array(rows, dtype=float).reshape(-1, 4)
