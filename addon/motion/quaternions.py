@@ -32,7 +32,7 @@ def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def length(q: np.ndarray) -> np.ndarray:
-    """The length of quaternions (..., 4), without overflow or underflow on the way; infinite beyond the largest float."""
+    """The length of quaternions (..., 4), without underflow on the way; infinite beyond the largest float."""
     largest = np.abs(q).max(axis=-1, initial=0.0)
     safe = np.where(largest == 0.0, 1.0, largest)
     with np.errstate(over="ignore"):
