@@ -18,11 +18,11 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
+from scripts.system_libraries import missing_for_rendering, way_out
+
 try:
     import bpy
 except ImportError as error:
-    from scripts.system_libraries import way_out
-
     sys.exit(f"{error}\n{way_out(str(error))}")
 
 from addon.motion import MODES
@@ -121,6 +121,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Run a comparison, and return the exit code."""
     options = parse(arguments)
+    missing = None if options.no_video or options.engine == "cycles" else missing_for_rendering()
+    if missing:
+        print(f"compare.py: {way_out(missing)}\nOr go without videos: --no-video", file=sys.stderr)
+        return 2
     started = time.perf_counter()
     with Progress() as progress:
         try:

@@ -2,11 +2,30 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
+
 DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
 """Packages of Debian and Ubuntu."""
 
 FEDORA = "libX11 libXrender libXfixes libXi libxkbcommon libSM libICE mesa-libGL mesa-libEGL mesa-dri-drivers"
 """Packages of Fedora and its relatives."""
+
+
+LOADED_LATE = ("libEGL.so.1", "libGL.so.1")
+"""What Blender loads only when it renders. It aborts the whole process where it cannot."""
+
+
+def missing_for_rendering() -> str | None:
+    """The message of the dynamic linker about the first library that is not here; None where all of them are."""
+    if sys.platform != "linux":
+        return None
+    for library in LOADED_LATE:
+        try:
+            ctypes.CDLL(library)
+        except OSError as error:
+            return str(error)
+    return None
 
 
 def way_out(error: str) -> str:

@@ -10,13 +10,11 @@ import io
 import os
 import signal
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import TextIO
 
 import bpy
 
@@ -55,10 +53,12 @@ def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int
         started = time.perf_counter()
         try:
             with _hushed():
-                bpy.ops.render.render(animation=True, scene=scene.name)
+                ended = bpy.ops.render.render(animation=True, scene=scene.name)
         finally:
             scene.render.filepath = kept
         seconds = time.perf_counter() - started
+        if "CANCELLED" in ended:
+            raise KeyboardInterrupt
         if not beside.is_file():
             raise RuntimeError(f"{path}: Blender rendered no video; is the resolution even, and the disk not full?")
     return seconds
@@ -94,9 +94,10 @@ def _interruptible() -> Iterator[None]:
     """Let Ctrl-C end the rendering after the frame at hand, and raise KeyboardInterrupt then.
 
     Blender swallows what is raised in its handlers, and renders on. So the scene is put on its last frame, and
-    Blender's own loop skips the rest.
+    Blender's own loop skips the rest. The Blender program, unlike the module, has an answer to Ctrl-C of its own, which
+    Python cannot see: it cancels the rendering.
     """
-    if threading.current_thread() is not threading.main_thread():  # Signals come to the main thread alone.
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
         yield
         return
     interrupted = False
@@ -122,42 +123,22 @@ def _interruptible() -> Iterator[None]:
 
 @contextmanager
 def _hushed() -> Iterator[None]:
-    """Keep what Blender and the graphics driver say of every frame and file to themselves, unless the block fails.
+    """Keep what Blender says of every frame and file off the standard output: it goes by Python and by C.
 
-    They write by Python and by C. What Python writes to the standard error still gets through: the progress.
+    The standard error stays open: where Blender has to abort, its last words are there.
     """
     _flush_output()
-    out, err = os.dup(1), os.dup(2)
-    through = os.fdopen(os.dup(2), "w", encoding=getattr(sys.stderr, "encoding", None), errors="replace")
-    python_error = sys.stderr
-    with tempfile.TemporaryFile() as said, through:
-        os.dup2(said.fileno(), 1)
-        os.dup2(said.fileno(), 2)
-        if _descriptor(python_error) == 2:
-            sys.stderr = through
-        failed = True
-        try:
-            with redirect_stdout(io.StringIO()):
-                yield
-            failed = False
-        finally:
-            sys.stderr = python_error
-            _flush_output()
-            os.dup2(out, 1)
-            os.dup2(err, 2)
-            os.close(out)
-            os.close(err)
-            if failed and sys.stderr is not None:
-                said.seek(0)
-                sys.stderr.write(said.read().decode(errors="replace"))
-
-
-def _descriptor(stream: TextIO | None) -> int | None:
-    """The number of a stream's file; None where it has none, being a window or a test."""
+    kept = os.dup(1)
+    nothing = os.open(os.devnull, os.O_WRONLY)
     try:
-        return stream.fileno()
-    except (AttributeError, OSError, ValueError):
-        return None
+        os.dup2(nothing, 1)
+        with redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        _flush_output()
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nothing)
 
 
 def _flush_output() -> None:

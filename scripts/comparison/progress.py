@@ -61,7 +61,7 @@ class Progress:
         clock: Callable[[], float] = time.monotonic,
         environ: Mapping[str, str] = os.environ,
     ) -> None:
-        self._given_stream = stream
+        self._stream = sys.stderr if stream is None else stream
         self._clock = clock
         self._environ = environ
         self._live = self._stream is not None and self._stream.isatty() and environ.get("TERM") != "dumb"
@@ -71,11 +71,6 @@ class Progress:
         self._started = self._clock()
         self._shown_at: float | None = None
         self._shown_columns = 0
-
-    @property
-    def _stream(self) -> TextIO | None:
-        """The standard error is asked for anew each time: others may put another in its place for a while."""
-        return sys.stderr if self._given_stream is None else self._given_stream
 
     def __enter__(self) -> Self:
         self._started = self._clock()
