@@ -1,0 +1,74 @@
+"""The set-up in one command: what it installs, and what it says where it cannot."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from scripts import bootstrap
+from scripts.system_libraries import DEBIAN, missing_for_rendering, way_out
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, ROOT / "scripts" / "bootstrap.py", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",)])
+def test_help_shows_the_commands(arguments):
+    done = run(*arguments)
+    assert done.returncode == 0
+    for command in bootstrap.COMMANDS:
+        assert f"bootstrap.py {command}" in done.stdout
+
+
+def test_an_unknown_command_is_refused_with_the_known_ones():
+    done = run("render")
+    assert done.returncode == 2
+    assert "compare, test, benchmark" in done.stderr
+
+
+@pytest.mark.parametrize("given", [["--blender", "2.79"], ["--blender"]])
+def test_a_blender_that_does_not_fit_the_python_is_refused(given):
+    done = run("test", *given)
+    assert done.returncode == 2
+    assert bootstrap._project()["tool"]["rigid-motion"]["blender"][bootstrap.PYTHON][0] in done.stderr
+
+
+def test_every_package_is_pinned():
+    project = bootstrap._project()
+    extras = tuple(project["project"]["optional-dependencies"])
+    for requirement in bootstrap._requirements(project, "5.2.3", extras):
+        assert re.match(r"[\w.-]+==\d[\w.]*(;|$)", requirement), requirement
+
+
+def test_the_blender_that_is_asked_for_is_the_only_one():
+    requirements = bootstrap._requirements(bootstrap._project(), "4.5.15", ())
+    assert [r for r in requirements if r.startswith("bpy")] == ["bpy==4.5.15"]
+
+
+def test_the_default_blender_is_the_one_pinned_for_that_python():
+    project = bootstrap._project()
+    for python, versions in project["tool"]["rigid-motion"]["blender"].items():
+        assert f"bpy=={versions[0]}; python_version == '{python}'" in project["project"]["dependencies"]
+
+
+def test_a_missing_system_library_is_named_with_the_packages_to_install():
+    said = way_out("libXi.so.6: cannot open shared object file: No such file or directory")
+    assert "libXi.so.6" in said
+    assert f"apt-get install -y {DEBIAN}" in said
+    assert DEBIAN in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_a_missing_bpy_is_told_from_a_missing_library():
+    assert "bootstrap.py" in way_out("No module named 'bpy'")
+
+
+def test_this_machine_can_render():
+    assert missing_for_rendering() is None
