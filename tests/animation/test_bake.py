@@ -9,6 +9,7 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from addon.animation import bake_poses, read_poses, write_channel
 from addon.motion import MODES, Poses, interpolate
+from addon.motion.eulers import ORDERS
 from addon.motion.quaternions import angle_between, multiply, rotate
 
 
@@ -127,9 +128,18 @@ def test_a_shared_action_keeps_what_others_have_in_it(empty):
     assert_read_back(other, frames, still)
 
 
-def test_an_euler_object_is_refused_untouched(empty):
-    empty.rotation_mode = "XYZ"
-    with pytest.raises(ValueError, match="Tool: rotation mode XYZ"):
+@pytest.mark.parametrize("order", ORDERS)
+def test_euler_objects_of_every_order_take_the_same_poses(empty, order):
+    frames, poses = motion(200)
+    empty.rotation_mode = order
+    bake_poses(empty, frames, poses)
+    assert {path for path, _ in keys_of(empty)} == {"location", "rotation_euler"}
+    assert_read_back(empty, frames, poses)
+
+
+def test_an_object_that_turns_by_axis_and_angle_is_refused_untouched(empty):
+    empty.rotation_mode = "AXIS_ANGLE"
+    with pytest.raises(ValueError, match="Tool: rotation by axis and angle"):
         bake_poses(empty, *motion())
     assert empty.animation_data is None
 

@@ -1,0 +1,68 @@
+"""Euler angles of a motion, continuous from moment to moment.
+
+Orders are Blender's: "XYZ" turns about the x axis first, then about y, then about z, all of them fixed. Angles are
+radians about x, y and z, in this order whatever the order of turning, as Blender has its channels.
+
+Source: Bernardes and Viollet, "Quaternion to Euler angles conversion: a direct, general and computationally efficient
+method", PLoS ONE 17(11), 2022.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+
+LOCKED = 1e-7
+"""Below this length a half sum or half difference of angles has no direction: the gimbal is locked."""
+
+
+def eulers_from_quaternions(quaternions: np.ndarray, order: str) -> np.ndarray:
+    """The angles of a motion's rotations, each set of angles the one nearest to the set before it.
+
+    Parameters
+    ----------
+    quaternions : array, shape (n, 4)
+        Unit, w, x, y, z, of any sign.
+    order : str
+        One of `ORDERS`.
+
+    Returns
+    -------
+    array, shape (n, 3)
+        Radians about x, y and z. The angles may leave the range of a full turn.
+
+    Notes
+    -----
+    The half sum and the half difference of the outer angles each have the direction of a plane vector of quaternion
+    components. Through gimbal lock one of the vectors passes zero and comes out on the other side: taken as directions
+    of a line, whose lengths may be negative, both go on smoothly, and so do the angles. Where one is zero it is free,
+    and gets what lies between its neighbours.
+    """
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    sign = (i - j) * (j - k) * (k - i) // 2
+    w, *xyz = quaternions.T
+    half_sum, outer = _direction(w - xyz[j], xyz[i] + sign * xyz[k])
+    half_difference, inner = _direction(w + xyz[j], sign * xyz[k] - xyz[i])
+    angles = np.empty((len(quaternions), 3))
+    angles[:, i] = half_sum - half_difference
+    angles[:, j] = np.unwrap(2.0 * np.arctan2(inner, outer)) - 0.5 * np.pi
+    angles[:, k] = sign * (half_sum + half_difference)
+    return _nearest_to_zero(angles)
+
+
+def _direction(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
+    length = np.hypot(x, y)
+    free = length < LOCKED
+    angle = np.arctan2(y, x)
+    if free.all():
+        return np.zeros_like(length), length
+    rows = np.arange(len(angle))
+    line = np.interp(rows, rows[~free], np.unwrap(angle[~free], period=np.pi))
+    return line, np.where(free, length, length * np.sign(np.cos(line - angle)))
+
+
+def _nearest_to_zero(angles: np.ndarray) -> np.ndarray:
+    """The same motion with its first angles within half a turn, as an animator would have keyed it."""
+    return angles - 2.0 * np.pi * np.round(angles[:1] / (2.0 * np.pi))

@@ -1,0 +1,77 @@
+"""Euler angles against mathutils, and their continuity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mathutils import Euler
+from scipy.spatial.transform import Rotation
+
+from addon.motion import Poses, interpolate
+from addon.motion.eulers import ORDERS, eulers_from_quaternions
+from tests.motion.cases import random_quaternions
+
+in_every_order = pytest.mark.parametrize("order", ORDERS)
+
+
+def rotations(angles: np.ndarray, order: str) -> Rotation:
+    """By SciPy, whose small letters turn about fixed axes, one after the other."""
+    return Rotation.from_euler(order.lower(), angles[:, ["XYZ".index(axis) for axis in order]])
+
+
+def assert_same_rotations(angles: np.ndarray, order: str, quaternions: np.ndarray, tolerance: float = 1e-12) -> None:
+    expected = Rotation.from_quat(quaternions, scalar_first=True)
+    assert (expected.inv() * rotations(angles, order)).magnitude().max() < tolerance
+
+
+@in_every_order
+def test_angles_give_the_rotations_back(order):
+    quaternions = random_quaternions(np.random.default_rng(0), 2000)
+    assert_same_rotations(eulers_from_quaternions(quaternions, order), order, quaternions)
+
+
+@in_every_order
+def test_mathutils_has_the_same_order_and_axes(order):
+    quaternions = random_quaternions(np.random.default_rng(1), 50)
+    for angles, quaternion in zip(eulers_from_quaternions(quaternions, order), quaternions, strict=True):
+        assert abs(Euler(angles, order).to_quaternion().dot(quaternion)) == pytest.approx(1.0, abs=1e-6)
+
+
+@in_every_order
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_turning_on_and_on_about_one_axis_is_one_rising_angle(order, axis):
+    turns = np.linspace(0.0, 6.0 * np.pi, 400)
+    quaternions = np.zeros((400, 4))
+    quaternions[:, 0], quaternions[:, 1 + axis] = np.cos(turns / 2.0), np.sin(turns / 2.0)
+    quaternions[::3] *= -1.0
+    expected = np.zeros((400, 3))
+    expected[:, axis] = turns
+    assert eulers_from_quaternions(quaternions, order) == pytest.approx(expected, abs=1e-7)
+
+
+@in_every_order
+def test_motions_have_no_jumps(order):
+    keys = Poses(np.zeros((20, 3)), random_quaternions(np.random.default_rng(2), 20))
+    frames = np.linspace(0.0, 19.0, 20_000)
+    quaternions = interpolate(np.arange(20.0), keys, frames, "dq_sclerp").quaternions
+    angles = eulers_from_quaternions(quaternions, order)
+    assert np.abs(np.diff(angles, axis=0)).max() < 0.3
+    assert_same_rotations(angles, order, quaternions)
+
+
+@in_every_order
+def test_straight_through_gimbal_lock(order):
+    middle = "XYZ".index(order[1])
+    angles = np.full((201, 3), 0.3)
+    angles[:, middle] = np.linspace(1.0, np.pi - 1.0, 201)  # The middle one of these is a right angle exactly.
+    quaternions = rotations(angles, order).as_quat(scalar_first=True)
+    found = eulers_from_quaternions(quaternions, order)
+    assert_same_rotations(found, order, quaternions, 1e-7)
+    assert np.abs(np.diff(found, axis=0)).max() < 0.02
+
+
+def test_resting_in_gimbal_lock_is_a_rest():
+    quaternion = Rotation.from_euler("xyz", [0.4, np.pi / 2.0, 0.1]).as_quat(scalar_first=True)
+    angles = eulers_from_quaternions(np.tile(quaternion, (5, 1)), "XYZ")
+    assert np.ptp(angles, axis=0) == pytest.approx(0.0, abs=1e-12)
+    assert_same_rotations(angles, "XYZ", np.tile(quaternion, (5, 1)), 1e-7)
