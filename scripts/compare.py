@@ -143,16 +143,17 @@ def main(arguments: list[str]) -> int:
         run = _Run(options, progress, shlex.join(["compare.py", *arguments]))
         try:
             run.measure(clips)
-            if not run.reconstructions:
-                progress.note("compare.py: every clip is too short for two keys at these rates; give higher --rates")
-                return 2
-            if not options.no_video:
+            if run.reconstructions and not options.no_video:
                 run.film()
         except KeyboardInterrupt:
             run.interrupted = True
         except OSError as error:
             progress.note(f"compare.py: {error.filename or options.output}: {error.strerror or error}")
             return 2
+        if not run.reconstructions:
+            if not run.interrupted:
+                progress.note("compare.py: every clip is too short for two keys at these rates; give higher --rates")
+            return 130 if run.interrupted else 2
         report = run.report()
     seconds = time.perf_counter() - started
     print(
@@ -283,4 +284,7 @@ def _arguments() -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(_arguments()))
+    try:
+        sys.exit(main(_arguments()))
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -222,6 +222,12 @@ def test_a_clip_too_short_for_a_rate_is_left_out_and_said(short_clip, tmp_path, 
     assert not (tmp_path / "toss" / "0.5").exists()
 
 
+def test_clips_too_short_for_every_rate_end_with_code_2(short_clip, tmp_path, capsys):
+    assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "0.5") == 2
+    assert "give higher --rates" in capsys.readouterr().err
+    assert not (tmp_path / "report.html").exists()
+
+
 def test_help_has_examples(capsys):
     assert exit_code("--help") == 0
     assert "blender --background --python scripts/compare.py --" in capsys.readouterr().out
