@@ -23,7 +23,8 @@ from scripts.system_libraries import missing_for_rendering, way_out
 try:
     import bpy
 except ImportError as error:
-    sys.exit(f"{error}\n{way_out(str(error))}")
+    print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
+    sys.exit(2)
 
 from addon.motion import MODES
 from scripts.comparison.clips import Clip, Reconstruction

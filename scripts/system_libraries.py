@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import sys
 
 DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
@@ -30,10 +31,10 @@ def missing_for_rendering() -> str | None:
 
 def way_out(error: str) -> str:
     """What to do about the message that `import bpy` failed with, in a few lines."""
-    if "cannot open shared object file" in error:
-        library = error.split(":")[0].split()[-1]
+    missing = re.search(r"(\S+): cannot open shared object file", error)
+    if missing:
         return (
-            f"Blender needs the system library {library}, which this machine does not have. Install, as root:\n"
+            f"Blender needs the system library {missing[1]}, which this machine does not have. Install, as root:\n"
             f"  Debian, Ubuntu:  apt-get install -y {DEBIAN}\n"
             f"  Fedora, RHEL:    dnf install -y {FEDORA}"
         )
