@@ -102,8 +102,8 @@ def _blender_starts(python: Path) -> bool:
         sys.path.insert(0, str(ROOT))
         from scripts.system_libraries import way_out
 
-        print(tried.stderr.strip().splitlines()[-1] if tried.stderr.strip() else "import bpy failed", file=sys.stderr)
-        _fail(way_out(tried.stderr.strip().splitlines()[-1] if tried.stderr.strip() else ""))
+        last_words = (tried.stderr.strip() or "import bpy failed").splitlines()[-1]
+        _fail(f"{last_words}\n{way_out(last_words)}")
     return tried.returncode == 0
 
 

@@ -37,7 +37,7 @@ def decimate(times: np.ndarray, rate: float) -> np.ndarray:
 
 def nearest(times: np.ndarray, moments: np.ndarray) -> np.ndarray:
     """The index of the time nearest to each moment, the earlier of two that are equally near."""
-    after = np.clip(np.searchsorted(times, moments), 1, max(len(times) - 1, 1))
     if len(times) == 1:
         return np.zeros(np.shape(moments), dtype=np.int64)
+    after = np.clip(np.searchsorted(times, moments), 1, len(times) - 1)
     return after - (moments - times[after - 1] <= times[after] - moments)

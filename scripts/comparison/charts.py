@@ -292,16 +292,7 @@ def _labels_at_ends(curves: list[Curve], y: Axis) -> Markup:
     return element(
         "svg",
         [
-            [
-                element(
-                    "path",
-                    d=f"M6 {end:.1f}L18 {middle:.1f}",
-                    class_="leader",
-                    style=f"--colour:{curve.colour}",
-                    stroke=curve.colour,
-                ),
-                _label(curve, 23, middle),
-            ]
+            [_leader(curve, f"M6 {end:.1f}L18 {middle:.1f}"), _label(curve, 23, middle)]
             for curve, end, middle in zip(curves, ends, _apart(ends, heights), strict=True)
         ],
         x="100%",
@@ -311,22 +302,18 @@ def _labels_at_ends(curves: list[Curve], y: Axis) -> Markup:
     )
 
 
+def _leader(curve: Curve, d: str) -> Markup:
+    """The line in the curve's colour that leads to its label."""
+    return element("path", d=d, class_="leader", style=f"--colour:{curve.colour}", stroke=curve.colour)
+
+
 def _labels_in_list(curves: list[Curve]) -> Markup:
     heights = np.array([len(curve.labels) * LINE_OF_TEXT + 8.0 for curve in curves])
     middles = np.cumsum(heights) - heights / 2.0
     return element(
         "svg",
         [
-            [
-                element(
-                    "path",
-                    d=f"M8 {middle:.1f}h14",
-                    class_="leader",
-                    style=f"--colour:{curve.colour}",
-                    stroke=curve.colour,
-                ),
-                _label(curve, 27, middle),
-            ]
+            [_leader(curve, f"M8 {middle:.1f}h14"), _label(curve, 27, middle)]
             for curve, middle in zip(curves, middles, strict=True)
         ],
         x="100%",

@@ -5,12 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-import numpy as np
-
-from addon.motion import Poses, decimate, interpolate, measure, repair
-from addon.motion.measures import Errors
+from addon.motion import decimate, interpolate, measure, repair
 from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
-from scripts.trajectories.reading import split_source
 
 from .clips import Clip, Reconstruction
 
@@ -50,7 +46,7 @@ def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]
         recording = read_trajectories(source)
         if recording.note:
             notes.append(recording.note)
-        stem = split_source(source)[0].stem
+        stem = recording.path.stem
         for trajectory in recording.trajectories:
             name = f"{stem}-{trajectory.name}" if len(recording.trajectories) > 1 else stem
             clips.append(make_clip(trajectory, source, folder_name(name, [clip.name for clip in clips]), axes))
@@ -103,11 +99,7 @@ def reconstruct(clip: Clip, rate: str, modes: Iterable[str], radius: float) -> R
     if len(keys) < 2:
         return None
     samples = slice(int(keys[0]), int(keys[-1]) + 1)
-    times, truth = clip.times[samples], clip.poses[samples]
+    times, truth = clip.times[samples], clip.in_metres(clip.poses[samples])
     poses = {mode: interpolate(clip.times[keys], clip.poses[keys], times, mode) for mode in modes}
-    errors = {mode: _errors(clip, times, filled, truth, radius) for mode, filled in poses.items()}
+    errors = {mode: measure(times, clip.in_metres(filled), truth, radius) for mode, filled in poses.items()}
     return Reconstruction(clip, rate, keys, poses, errors)
-
-
-def _errors(clip: Clip, times: np.ndarray, poses: Poses, truth: Poses, radius: float) -> Errors:
-    return measure(times, clip.in_metres(poses), clip.in_metres(truth), radius)

@@ -38,6 +38,8 @@ class Trajectory:
 class Recording:
     """What was read of a file."""
 
+    path: Path
+
     trajectories: tuple[Trajectory, ...]
     """The bodies that were asked for, in the order of the file."""
 
@@ -101,7 +103,7 @@ class Selection:
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
                 f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
             )
-        return Recording(tuple(trajectories), others, note)
+        return Recording(self.path, tuple(trajectories), others, note)
 
 
 def unique(names: Sequence[str]) -> list[str]:
