@@ -31,17 +31,9 @@ def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points + q[..., :1] * turned + np.cross(q[..., 1:], turned)
 
 
-def length(q: np.ndarray) -> np.ndarray:
-    """The length of quaternions (..., 4), without underflow on the way; infinite beyond the largest float."""
-    largest = np.abs(q).max(axis=-1, initial=0.0)
-    safe = np.where(largest == 0.0, 1.0, largest)
-    with np.errstate(over="ignore"):
-        return largest * np.linalg.norm(q / safe[..., None], axis=-1)
-
-
 def normalise(q: np.ndarray) -> np.ndarray:
     """Unit quaternions of the same directions. Every quaternion needs a length above zero."""
-    return q / length(q)[..., None]
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def align_signs(q: np.ndarray) -> np.ndarray:

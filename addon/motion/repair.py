@@ -11,10 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .poses import Poses
-from .quaternions import align_signs, length, normalise
+from .quaternions import align_signs, normalise
 
 GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
+
+LARGEST = 1e100
+"""A number beyond this is damage, not a measurement: its differences and squares would leave the range of floats."""
 
 UNIT_TOLERANCE = 1e-3
 """How far a quaternion's length may be from 1 before normalising it is worth a word: three decimals are often kept."""
@@ -68,18 +71,15 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
             repairs.append(Repair(fault, rows[~good]))
             times, poses, rows = times[good], poses[good], rows[good]
 
-    finite = (
-        np.isfinite(times) & np.isfinite(poses.positions).all(axis=-1) & np.isfinite(poses.quaternions).all(axis=-1)
-    )
+    finite = _usable(times) & _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)
     if poses.scales is not None:
-        finite &= np.isfinite(poses.scales) & (poses.scales > 0.0)
+        finite &= _usable(poses.scales) & (poses.scales > 0.0)
     keep(finite, "dropped rows with numbers that are missing or not finite")
-    lengths = length(poses.quaternions)
-    keep((lengths > 1e-6) & np.isfinite(lengths), "dropped poses with a quaternion of length zero")
+    keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
     keep(_rising(times), "dropped rows whose time runs backwards")
     keep(np.diff(times, append=np.inf) > 0.0, "dropped rows whose time comes again, keeping the last of each")
 
-    lengths = length(poses.quaternions)
+    lengths = np.linalg.norm(poses.quaternions, axis=-1)
     if (uneven := np.abs(lengths - 1.0) > UNIT_TOLERANCE).any():
         repairs.append(Repair("normalised quaternions whose length was not 1", rows[uneven]))
     quaternions = normalise(poses.quaternions)
@@ -92,6 +92,11 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
         longest = f"left gaps as they are, the longest {intervals.max() * 1e3:.0f} ms"
         repairs.append(Repair(longest, rows[1:][gaps]))
     return times, Poses(poses.positions, aligned, poses.scales), repairs
+
+
+def _usable(numbers: np.ndarray) -> np.ndarray:
+    """Which numbers are there, finite and of a size that anything has: NaN is neither small nor large."""
+    return np.abs(numbers) < LARGEST
 
 
 def _rising(times: np.ndarray) -> np.ndarray:

@@ -105,6 +105,9 @@ wild = st.floats(allow_nan=True, allow_infinity=True) | st.sampled_from([0.0, 1.
 
 
 @example([(0.0, 1.7e308, 0.0, 0.0)] * 3)
+@example([(-1.8e305, 1.0, 0.0, 0.0), (-1.0, 1.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)])
+@example([(-1.1e308, 1.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)])
+@example([(1.7e308, 1.0, 0.0, 0.0), (-1e292, 1.0, 0.0, 0.0)])
 @given(st.lists(st.tuples(wild, wild, wild, wild), max_size=30))
 def test_whatever_comes_in_can_be_interpolated(rows):
     table = np.array(rows, dtype=float).reshape(-1, 4)
