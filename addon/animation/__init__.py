@@ -1,6 +1,46 @@
-"""Blender's side of a motion: Actions, slots, channels, keys. No user interface, and no interpolation of its own."""
+"""Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
-from .bake import bake_poses
+reading     what is keyed, from Blender's data          sources     the same as arrays
+fcurves     F-curves in NumPy                           easings     Blender's easings
+inbetweens  from sources to delta transforms            filling     writing those
+live        refreshing after every edit                 insertion   keys that are inserted in between
+mode_keys   choosing modes                              bake        real keys for every frame
+"""
+
+from . import live, properties
+from .bake import bake, bake_poses, is_baked, unbake
 from .channels import channelbag_of, read_poses, write_channel
+from .live import problem_of, refresh, set_enabled
+from .mode_keys import key_frames, modes_of, set_mode
+from .reading import Refused
+from .sources import MODE_IDS
 
-__all__ = ["bake_poses", "channelbag_of", "read_poses", "write_channel"]
+__all__ = [
+    "MODE_IDS",
+    "Refused",
+    "bake",
+    "bake_poses",
+    "channelbag_of",
+    "is_baked",
+    "key_frames",
+    "modes_of",
+    "problem_of",
+    "read_poses",
+    "refresh",
+    "register",
+    "set_enabled",
+    "set_mode",
+    "unbake",
+    "unregister",
+    "write_channel",
+]
+
+
+def register() -> None:
+    properties.register()
+    live.register()
+
+
+def unregister() -> None:
+    live.unregister()
+    properties.unregister()

@@ -1,4 +1,8 @@
-"""Baking: poses written as real keys on an object's own channels, which any Blender plays without this extension."""
+"""Baking: poses written as real keys on an object's own channels, which any Blender plays without this extension.
+
+`bake_poses` writes a motion that comes from elsewhere. `bake` puts the in-betweens of an object's keys on its channels,
+in a copy of its Action, and `unbake` puts the original back.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,24 @@ import numpy as np
 
 from ..motion import Poses
 from ..motion.eulers import ORDERS, eulers_from_quaternions
-from ..motion.quaternions import align_signs
+from ..motion.quaternions import align_signs, conjugate, multiply
+from . import live
 from .channels import write_channel
+from .filling import adopt
+from .inbetweens import InBetweens, components_at, in_betweens
+from .mode_keys import set_mode_in
+from .reading import Refused, Slot, Transformable, curves_in, read, slots_of
+from .sources import LOCATION, ROTATION, SAME_FRAME, Source
+
+FIELDS = {
+    "co": (2, np.float32),
+    "handle_left": (2, np.float32),
+    "handle_right": (2, np.float32),
+    **dict.fromkeys(("handle_left_type", "handle_right_type", "interpolation", "easing", "type"), (1, np.int32)),
+    **dict.fromkeys(("back", "amplitude", "period"), (1, np.float32)),
+    **dict.fromkeys(("select_control_point", "select_left_handle", "select_right_handle"), (1, np.bool_)),
+}
+"""All there is to a key: how many numbers, and of which type."""
 
 
 def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_type: str = "GENERATED") -> None:
@@ -49,3 +69,196 @@ def _rotation(obj: bpy.types.Object, quaternions: np.ndarray) -> tuple[str, np.n
     raise ValueError(
         f"{obj.name}: rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first"
     )
+
+
+def bake(
+    obj: bpy.types.Object, *, step: float = 1.0, first: float | None = None, last: float | None = None
+) -> tuple[float, float]:
+    """Put the in-betweens of an object on its own channels, as real keys.
+
+    The animator's keys stay where they are; the others are of type GENERATED, and straight lines run between all of
+    them. The object gets a copy of its Action for it. The original stays in the file, for `unbake`.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    step : float
+        Frames from key to key, counted from the first. The animator's own keys are kept whatever the step.
+    first, last : float, optional
+        The frames to bake, widened to whole segments. From the first key to the last, otherwise.
+
+    Returns
+    -------
+    tuple of float
+        The first and last frame with baked keys.
+
+    Raises
+    ------
+    Refused
+        Where there is nothing to bake, or no way. Nothing is changed then.
+    """
+    if not step > 0.0:
+        raise Refused(f"{obj.name}: the step between baked keys has to be above zero, not {step}")
+    if obj.animation_data is not None and obj.animation_data.use_tweak_mode:
+        raise Refused(f"{obj.name}: leave the strip that is being edited first (NLA Editor, Tab)")
+    readings = [(slot, read(slot, curves_in(slot.channelbag))) for slot in slots_of([obj])]
+    readings = [(slot, source) for slot, source in readings if source.is_live]
+    if not readings:
+        raise Refused(f"{obj.name} has no rigid in-betweens to bake: choose a mode for its keys first")
+    ranges = [_widened(obj, source, first, last) for _, source in readings]
+    with live.paused():
+        for (slot, source), (begin, end) in zip(readings, ranges, strict=True):
+            _bake_slot(obj, slot, source, _frames(source, begin, end, step))
+    live.refresh([obj])
+    return min(begin for begin, _ in ranges), max(end for _, end in ranges)
+
+
+def unbake(obj: bpy.types.Object) -> None:
+    """Give an object the Actions back that it had before it was baked, to the last handle.
+
+    Raises
+    ------
+    Refused
+        Where it is not baked, or its Actions cannot be exchanged. Nothing is changed then.
+    """
+    if not is_baked(obj):
+        raise Refused(f"{obj.name} is not baked, or has another Action by now")
+    if obj.animation_data.use_tweak_mode:
+        raise Refused(f"{obj.name}: leave the strip that is being edited first (NLA Editor, Tab)")
+    bakes = obj.rigid_motion.bakes
+    with live.paused():
+        for place in reversed(range(len(bakes))):
+            baked, original = bakes[place].baked, bakes[place].original
+            if baked is not None and original is not None:
+                _exchange(obj, baked, original)
+                # The mode is animated in the baked Action, and need not be in the original.
+                obj.rigid_motion.mode = bakes[place].mode
+            bakes.remove(place)
+            if baked is not None and not baked.users:
+                bpy.data.actions.remove(baked)
+        for slot in slots_of([obj]):
+            adopt(slot, curves_in(slot.channelbag))
+    live.refresh([obj])
+
+
+def is_baked(obj: bpy.types.Object) -> bool:
+    """Whether an object moves by an Action with baked keys, and its original is still in the file."""
+    actions = {slot.action for slot in slots_of([obj])}
+    return any(entry.baked in actions and entry.original is not None for entry in obj.rigid_motion.bakes)
+
+
+def _widened(obj: bpy.types.Object, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
+    """The range from key to key that has the frames from first to last in it."""
+    keys = source.key_frames
+    if source.span is not None:
+        # What goes on outside of the keys is baked as far as it is seen, and all of it: cycles end where keys are.
+        return tuple(map(float, source.frame_range))
+    if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
+        raise Refused(f"{obj.name} has its keys from frame {keys[0]:g} to {keys[-1]:g}: none of them is in that range")
+    begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
+    end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
+    return float(keys[np.clip(begin, 0, len(keys) - 2)]), float(keys[np.clip(end, 1, len(keys) - 1)])
+
+
+def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray:
+    """Every step from begin to end, and the keys in between."""
+    keys = source.key_frames
+    keys = keys[(keys >= begin - SAME_FRAME) & (keys <= end + SAME_FRAME)]
+    frames = begin + step * np.arange(np.floor((end - begin) / step + 1e-9) + 1)
+    near = np.abs(frames[:, None] - keys[np.clip(np.searchsorted(keys, frames)[:, None] - (0, 1), 0, len(keys) - 1)])
+    return np.sort(
+        np.concatenate((frames[near.min(axis=1) >= SAME_FRAME], keys, (end,) if keys[-1] < end - SAME_FRAME else ()))
+    )
+
+
+def _bake_slot(obj: bpy.types.Object, slot: Slot, source: Source, frames: np.ndarray) -> None:
+    motion = in_betweens(source, frames)
+    original, baked, mode = slot.action, slot.action.copy(), obj.rigid_motion.mode
+    baked.name = f"{original.name} Baked"
+    for other in [other for other in baked.slots if other.handle != slot.handle]:
+        baked.slots.remove(other)
+    _exchange(obj, original, baked)
+    copy = next(copy for copy in slots_of([obj]) if copy.action == baked)
+    curves = curves_in(copy.channelbag)
+    for path, values in _channels(Transformable.of(obj), source, motion).items():
+        for index, column in enumerate(values.T):
+            fcurve = curves.get((path, index)) or copy.channelbag.fcurves.new(path, index=index)
+            _bake_channel(fcurve, frames, column)
+    set_mode_in(copy, "BLENDER", frames[:-1])
+    entry = obj.rigid_motion.bakes.add()
+    entry.baked, entry.original, entry.mode = baked, original, mode
+
+
+def _exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
+    """Let an object move by another Action, with the slot of the same name in it."""
+    data = obj.animation_data
+    strips = [strip for track in data.nla_tracks for strip in track.strips]
+    for user in (data, *strips):
+        if user.action == old:
+            name = user.action_slot.identifier
+            user.action = new
+            user.action_slot = new.slots[name]
+
+
+def _channels(what: Transformable, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
+    """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
+    own, poses, channels = source.own, motion.wanted, {}
+    first = components_at(source, motion.frames[0])
+    if LOCATION in source.keyed:
+        channels["location"] = poses.positions - own[:3]
+    if ROTATION in source.keyed:
+        # In the sign and the turn that the animator's first key has, for what lies before goes up to there.
+        quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))
+        if source.order is None:
+            channels[what.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
+        else:
+            angles = eulers_from_quaternions(quaternions, source.order)
+            channels[what.rotation] = angles + 2.0 * np.pi * np.rint((first[3:6] - angles[0]) / (2.0 * np.pi))
+    if poses.scales is not None:
+        channels["scale"] = np.repeat(poses.scales[:, None] / own[7:].mean(), 3, axis=1)
+    return {what.prefix + prop: values for prop, values in channels.items()}
+
+
+def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
+    """Put keys on these frames, straight lines between them, and leave what is before and behind as it is."""
+    keys = fcurve.keyframe_points
+    old = {name: np.empty((len(keys), width), kind) for name, (width, kind) in FIELDS.items()}
+    for name, numbers in old.items():
+        keys.foreach_get(name, numbers.ravel())
+    at = old["co"][:, 0]
+    before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
+    new = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in FIELDS.items()}
+    own = np.flatnonzero(~(before | behind))
+    places = np.abs(frames[:, None] - at[own]).argmin(axis=0)
+    _set_code(new, "type", "GENERATED")
+    for name, numbers in new.items():
+        numbers[places] = old[name][own]
+    _set_code(new, "interpolation", "LINEAR")
+    points = np.stack((frames, values), axis=1).astype(np.float32)
+    for outside, place in ((before, 0), (behind, -1)):
+        # What is left alone goes on from the value that the animator gave, whatever sign or turn the baked keys are in.
+        at_place = own[places == place % len(frames)]
+        if outside.any() and len(at_place):
+            points[place, 1] = old["co"][at_place[0], 1]
+            if place:
+                new["interpolation"][place] = old["interpolation"][at_place[0]]
+    # Handles keep their distance from the key, where there were any; the outer ones shape what is left alone.
+    for side in ("handle_left", "handle_right"):
+        handles = points.copy()
+        handles[places] += old[side][own] - old["co"][own]
+        new[side] = handles
+    new["co"] = points
+    for name in ("handle_left_type", "handle_right_type"):
+        code = bpy.types.Keyframe.bl_rna.properties[name].enum_items["FREE"].value
+        new[name][[0, -1]] = code
+    keys.clear()
+    keys.add(int(before.sum() + len(frames) + behind.sum()))
+    for name, numbers in new.items():
+        keys.foreach_set(name, np.concatenate((old[name][before], numbers, old[name][behind])).ravel())
+    for modifier in list(fcurve.modifiers):
+        fcurve.modifiers.remove(modifier)
+    fcurve.update()
+
+
+def _set_code(fields: dict[str, np.ndarray], name: str, value: str) -> None:
+    fields[name][:] = bpy.types.Keyframe.bl_rna.properties[name].enum_items[value].value

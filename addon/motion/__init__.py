@@ -5,7 +5,7 @@ No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and 
 
 from .decimation import decimate
 from .measures import Errors, measure, rms, shell_error
-from .modes import MODES, Mode, interpolate
+from .modes import MODES, Mode, in_betweens, interpolate
 from .poses import Poses
 from .repair import Repair, repair
 
@@ -16,6 +16,7 @@ __all__ = [
     "Poses",
     "Repair",
     "decimate",
+    "in_betweens",
     "interpolate",
     "measure",
     "repair",

@@ -51,6 +51,20 @@ def eulers_from_quaternions(quaternions: np.ndarray, order: str) -> np.ndarray:
     return _nearest_to_zero(angles)
 
 
+def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
+    """The rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
+    i, j, k = ("XYZ".index(axis) for axis in order)
+    sign = (i - j) * (j - k) * (k - i) // 2
+    half = 0.5 * angles.T
+    (ci, cj, ck), (si, sj, sk) = np.cos(half[[i, j, k]]), np.sin(half[[i, j, k]])
+    quaternions = np.empty((4, len(angles)))
+    quaternions[0] = ci * cj * ck + sign * si * sj * sk
+    quaternions[1 + i] = si * cj * ck - sign * ci * sj * sk
+    quaternions[1 + j] = ci * sj * ck + sign * si * cj * sk
+    quaternions[1 + k] = ci * cj * sk - sign * si * sj * ck
+    return quaternions.T
+
+
 def _direction(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
     length = np.hypot(x, y)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
 from .poses import Poses
-from .segments import Curves, Segments, interpolate_along
+from .segments import Curves, Segments, interpolate_along, interpolate_within
 
 
 @dataclass(frozen=True)
@@ -136,6 +136,49 @@ def interpolate(
         np.take_along_axis(poses.quaternions, back[..., None], axis=-2),
         None if poses.scales is None else np.take_along_axis(poses.scales, back, axis=-1),
     )
+
+
+def in_betweens(
+    key_times: ArrayLike, keys: Poses, counts: ArrayLike, progress: ArrayLike, mode: str = "dq_sclerp"
+) -> Poses:
+    """The poses of segments that are run through at a timing of their own, such as an easing.
+
+    Parameters
+    ----------
+    key_times : array-like, shape (n,) or (..., n)
+        Strictly rising, in any unit.
+    keys : Poses, shape (n,) or (..., n)
+        As in `interpolate`, at least two a row.
+    counts : array-like of int, shape (n - 1,) or (..., n - 1)
+        How many poses are wanted of each segment.
+    progress : array-like, shape (m,), m the sum of the counts
+        How far each has come in its segment, from 0 at the first key to 1 at the second. Where it passes them, the
+        motion of the segment goes on.
+    mode : str
+        A key of `MODES`.
+
+    Returns
+    -------
+    Poses, shape (m,)
+        One segment after the other. The arrays may be views that are not contiguous.
+
+    Raises
+    ------
+    ValueError
+        As `interpolate` does.
+    """
+    if mode not in MODES:
+        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    key_times, progress = np.asarray(key_times, dtype=np.float64), np.asarray(progress, dtype=np.float64)
+    counts = np.asarray(counts)
+    keys = _checked(key_times, keys)
+    if counts.shape != (*keys.shape[:-1], keys.shape[-1] - 1) or progress.shape != (int(counts.sum()),):
+        raise ValueError(
+            f"counts of shape {counts.shape} and {progress.size} progresses do not fit keys of {keys.shape}"
+        )
+    if not np.isfinite(progress).all():
+        raise ValueError("progress needs to be made of finite numbers")
+    return interpolate_within(MODES[mode].curves, key_times, keys, counts.ravel(), progress)
 
 
 def _checked(key_times: np.ndarray, keys: Poses) -> Poses:

@@ -6,18 +6,18 @@ import numpy as np
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Hamilton's product a b, shapes (..., 4): the rotation b first, then a."""
+    """Hamilton's product a b, shapes (..., 4): the rotation b first, then a. A view, components apart in memory."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    return np.stack(
+    components = np.stack(
         (
             aw * bw - ax * bx - ay * by - az * bz,
             aw * bx + ax * bw + ay * bz - az * by,
             aw * by - ax * bz + ay * bw + az * bx,
             aw * bz + ax * by - ay * bx + az * bw,
-        ),
-        axis=-1,
+        )
     )
+    return np.moveaxis(components, 0, -1)
 
 
 def conjugate(q: np.ndarray) -> np.ndarray:

@@ -165,25 +165,67 @@ def _fill(
     Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
     """
     segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
-    mode = curves(segments)
-    numbers = np.concatenate(((segments.start, segments.rate), mode.parameters))
     bounds = _sample_bounds(key_times, times, len(keys))
-    all_counts = np.diff(bounds)
     samples = np.broadcast_to(times, out.shape[1:]).ravel()
-    flat = out.reshape(len(out), -1)
     outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
-    for segment, sample in _blocks(bounds):
-        counts = all_counts[segment]
-        start, rate, *parameters = np.repeat(numbers[:, segment], counts, axis=1)
+
+    def position(sample: slice, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         s = samples[sample] - start
         s *= rate
         s -= 1.0
         if outside and not extrapolate:
             np.clip(s, -1.0, 1.0, out=s)
-        basis, scales = mode.basis(s, parameters, not (outside and extrapolate))
-        _combine(mode, segment, basis, counts, flat[:7, sample])
+        return s
+
+    numbers = np.stack((segments.start, segments.rate))
+    _evaluate(curves(segments), numbers, bounds, position, not (outside and extrapolate), out.reshape(len(out), -1))
+
+
+def interpolate_within(
+    curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses, counts: np.ndarray, progress: np.ndarray
+) -> Poses:
+    """Poses of shape (m,), where each segment says how many there are in it, and each how far it has come.
+
+    `key_times` and keys are (..., n), at least two a row and with unit quaternions. `counts` of shape (..., n - 1) sum
+    up to m. `progress` (m,) is 0 at a segment's first key and 1 at its second, and may pass both.
+    """
+    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
+    bounds = np.concatenate(((0,), np.cumsum(counts)))
+    out = np.empty((7 if keys.scales is None else 8, progress.size))
+    within = progress.size == 0 or bool(progress.min() >= 0.0 and progress.max() <= 1.0)
+    _evaluate(
+        curves(segments),
+        np.empty((0, segments.start.size)),
+        bounds,
+        lambda sample: 2.0 * progress[sample] - 1.0,
+        within,
+        out,
+    )
+    return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
+
+
+def _evaluate(
+    mode: Curves,
+    numbers: np.ndarray,
+    bounds: np.ndarray,
+    position: Callable[..., np.ndarray],
+    within: bool,
+    out: np.ndarray,
+) -> None:
+    """Fill out (7 or 8, m) with what the curves of S segments are at the samples between their bounds (S + 1,).
+
+    `position` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
+    """
+    all_counts = np.diff(bounds)
+    own = len(numbers)
+    numbers = np.concatenate((numbers, mode.parameters))
+    for segment, sample in _blocks(bounds):
+        counts = all_counts[segment]
+        repeated = np.repeat(numbers[:, segment], counts, axis=1)
+        basis, scales = mode.basis(position(sample, *repeated[:own]), [*repeated[own:]], within)
+        _combine(mode, segment, basis, counts, out[:7, sample])
         if scales is not None:
-            flat[7, sample] = scales
+            out[7, sample] = scales
 
 
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:

@@ -1,0 +1,110 @@
+"""What there is to tell of an object's motion at one frame, in numbers.
+
+Frames are those of the Action, angles are radians, lengths are Blender's units in the space of the object's channels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from .fcurves import Keys, cycled, evaluate
+from .filling import recorded
+from .inbetweens import in_betweens
+from .mode_keys import active_slot
+from .sources import MODE_IDS, ROTATION, SAME_FRAME, SCALE, Source
+
+HALF_TURN = np.pi + 1e-3
+"""Half a turn, and what single precision makes of it."""
+
+
+@dataclass(frozen=True)
+class SegmentFacts:
+    """One segment, from one key to the next."""
+
+    first: float
+    """The frame it starts on."""
+
+    last: float
+    """The frame it ends on."""
+
+    key: float
+    """The frame of the key that decides its mode: its first one, or what that is a copy of where cycles repeat it."""
+
+    mode: str
+    """One of `MODE_IDS`."""
+
+    turn: float
+    """The angle from its first pose to its last, 0 to pi."""
+
+    distance: float
+    """From its first position to its last."""
+
+    long_way: bool
+    """Whether Blender's own in-betweens turn by more than half a turn where the modes turn by less."""
+
+    scales_unevenly: bool
+    """Whether it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
+
+
+def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
+    """A frame of the scene, as the keys in the editors have it: in tweak mode those of the strip."""
+    data = obj.animation_data
+    if data is None or not data.use_tweak_mode:
+        return frame
+    return data.nla_tweak_strip_time_to_scene(frame, invert=True)
+
+
+def segment_at(source: Source, frame: float) -> SegmentFacts | None:
+    """The segment that a frame is in, None before the first key and after the last.
+
+    A key is in the segment that it starts; the last one in the segment that it ends.
+    """
+    keys = source.key_frames
+    if len(keys) < 2 or not keys[0] - SAME_FRAME <= frame <= keys[-1] + SAME_FRAME:
+        return None
+    place = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
+    ends = keys[place : place + 2]
+    poses = in_betweens(source, ends, "BLENDER").native
+    alike = float(poses.quaternions[0] @ poses.quaternions[1])
+    channels = {name: _values(source, name, ends) for name in (ROTATION, SCALE)}
+    if source.order is None:
+        long_way = ROTATION in source.keyed and -1.0 + 1e-6 < alike < -1e-6
+    else:
+        long_way = bool(np.any(np.abs(np.diff(channels[ROTATION])) > HALF_TURN))
+    return SegmentFacts(
+        first=float(ends[0]),
+        last=float(ends[1]),
+        key=_deciding_key(source, ends[0]),
+        mode=MODE_IDS[source.modes[place]],
+        turn=2.0 * float(np.arccos(np.clip(abs(alike), 0.0, 1.0))),
+        distance=float(np.linalg.norm(poses.positions[1] - poses.positions[0])),
+        long_way=long_way,
+        scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(channels[SCALE])) > 1e-6)),
+    )
+
+
+def is_up_to_date(obj: bpy.types.Object, source: Source) -> bool:
+    """Whether an object is filled in from its keys as they are, which it need not be while live update is off."""
+    return recorded(active_slot(obj)) == (source.digest if source.is_live else "")
+
+
+def _values(source: Source, name: str, frames: np.ndarray) -> np.ndarray:
+    """What the channels of a property have at these frames, shape (channels, m); no rows where it is not keyed."""
+    channels = source.keyed.get(name, ())
+    rows = [
+        evaluate([keys], [frames])[0] if isinstance(keys, Keys) else np.full(len(frames), keys) for keys in channels
+    ]
+    return np.array(rows).reshape(len(channels), len(frames))
+
+
+def _deciding_key(source: Source, start: float) -> float:
+    """The key that a segment's mode hangs on."""
+    cyclic = next((keys for keys in source.curves if keys.cycles is not None), None)
+    if cyclic is None:
+        return float(start)
+    moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]
+    keys = np.unique(np.concatenate([keys.times for keys in source.curves]))
+    return float(keys[max(np.searchsorted(keys, moment, side="right") - 1, 0)])

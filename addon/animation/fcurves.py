@@ -1,0 +1,683 @@
+"""F-curves in NumPy: what `FCurve.evaluate` returns, for many curves and many frames at once.
+
+Frames and values are Blender's, in its single precision; results are doubles. The rules are those of Blender's own
+evaluation (source/blender/blenkernel/intern/fcurve.cc, fmodifier.cc).
+
+A curve of n keys has n + 1 *spans*: before its first key, from each key to the next, and from its last key on. In every
+span the value is a cubic polynomial of a parameter, and the parameter depends on the frames of keys and handles alone.
+Channels keyed together have these in common, so that their parameters are worked out once, which is most of the work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import bpy
+import numpy as np
+
+from .easings import ease, elastic
+
+INTERPOLATIONS = {
+    item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items
+}
+"""From the code of `Keyframe.interpolation` to its name."""
+
+EASINGS = {item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items}
+"""From the code of `Keyframe.easing` to its name."""
+
+CONSTANT, LINEAR, BEZIER, ELASTIC = (
+    {name: code for code, name in INTERPOLATIONS.items()}[name] for name in ("CONSTANT", "LINEAR", "BEZIER", "ELASTIC")
+)
+
+NEAR = float(np.float32(1e-4))
+"""Frames from a key within which Blender takes its value."""
+
+BLOCK = 16384
+"""Values worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
+
+STEP = 1e-5
+"""Last step of Newton's method: the error left is about its square."""
+
+MOST_COPIES = 2**22
+"""Of key times that `cyclic_times` returns."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """A Cycles modifier. Modes are NONE, REPEAT, REPEAT_OFFSET or MIRROR; a count of 0 is without end."""
+
+    before: str
+    after: str
+    before_count: int
+    after_count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """One F-curve of n keys, and what it does outside of them. What does not bear on its values is None.
+
+    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`.
+    """
+
+    points: np.ndarray
+    """Frame and value, shape (n, 2)."""
+
+    interpolation: np.ndarray
+    """Codes of the segments that the keys begin, shape (n,)."""
+
+    left: np.ndarray | None = None
+    """The handles before the keys, frame and value, shape (n, 2)."""
+
+    right: np.ndarray | None = None
+    """The handles behind the keys, frame and value, shape (n, 2)."""
+
+    easing: np.ndarray | None = None
+    """Codes, shape (n,)."""
+
+    easing_settings: np.ndarray | None = None
+    """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, n)."""
+
+    linear: bool = False
+    """Whether the curve goes on at its slope outside of the keys, instead of holding its value."""
+
+    cycles: Cycles | None = None
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Frames of the keys, shape (n,), double precision."""
+        return self.points[:, 0].astype(np.float64)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """Values of the keys, shape (n,), double precision."""
+        return self.points[:, 1].astype(np.float64)
+
+    @property
+    def raw(self) -> bytes:
+        """All of it as bytes, for a digest that tells whether anything has changed."""
+        arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
+        read = [array for array in arrays if array is not None]
+        header = f"{len(self.points)} {len(read)} {self.linear} {self.cycles};"
+        return b"".join((header.encode(), *(array.tobytes() for array in read)))
+
+
+def read_keys(fcurve: bpy.types.FCurve) -> Keys:
+    """The keys of `fcurve`, and the first of its Cycles modifiers that is not muted; none of its other modifiers.
+
+    Parameters
+    ----------
+    fcurve : bpy.types.FCurve
+        With keys: of a sampled curve there are none.
+    """
+    keys = fcurve.keyframe_points
+    count = len(keys)
+    points, interpolation = np.empty(2 * count, np.float32), np.empty(count, np.int32)
+    keys.foreach_get("co", points)
+    keys.foreach_get("interpolation", interpolation)
+    kinds = set(interpolation.tolist())
+    eased = not kinds <= {CONSTANT, LINEAR, BEZIER}
+    linear = fcurve.extrapolation == "LINEAR"
+    left = right = easing = settings = None
+    if BEZIER in kinds or (linear and eased):
+        left, right = np.empty(2 * count, np.float32), np.empty(2 * count, np.float32)
+        keys.foreach_get("handle_left", left)
+        keys.foreach_get("handle_right", right)
+        left, right = left.reshape(count, 2), right.reshape(count, 2)
+    if eased:
+        easing, settings = np.empty(count, np.int32), np.empty((3, count), np.float32)
+        keys.foreach_get("easing", easing)
+        for row, name in zip(settings, ("back", "amplitude", "period"), strict=True):
+            keys.foreach_get(name, row)
+    return Keys(
+        points.reshape(count, 2),
+        interpolation,
+        left,
+        right,
+        easing,
+        settings,
+        linear,
+        _read_cycles(fcurve.modifiers) if fcurve.modifiers else None,
+    )
+
+
+def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
+    for modifier in modifiers:
+        if modifier.type == "CYCLES" and not modifier.mute:
+            return Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
+    return None
+
+
+def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elastic: bool = False) -> list[np.ndarray]:
+    """The values of each curve at its times.
+
+    Parameters
+    ----------
+    curves : sequence of Keys
+        Without keys a curve is 0 everywhere, as in Blender.
+    times : sequence of array, shape (m,)
+        Frames for each curve, sub-frames allowed, best in rising order. Curves that are given the very same array, and
+        that have their keys and handles on the same frames, share the work.
+    unit_elastic : bool
+        Take the amplitude of ELASTIC relative to the change of value in its segment, instead of in units of value:
+        then curves keyed together have the same timing there too.
+
+    Returns
+    -------
+    list of array, shape (m,)
+        NaN where keys or handles are not finite. Some of them may be views of one array.
+    """
+    if not curves:
+        return []
+    results: list[np.ndarray] = [np.empty(0)] * len(curves)
+    with np.errstate(all="ignore"):
+        spans = _Spans.of(curves, unit_elastic)
+        for groups in _blocks(_groups(curves, list(times), spans)):
+            begin = 0
+            rows = _values(groups, spans)
+            for group in groups:
+                end = begin + len(group.moments)
+                for number, values in zip(group.curves.tolist(), group.finished(rows[:, begin:end]), strict=True):
+                    results[number] = values
+                begin = end
+    return results
+
+
+def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times folded back into the range of the keys by the curve's cycles.
+
+    Parameters
+    ----------
+    keys : Keys
+        The curve. Without cycles times stay what they are.
+    times : array, shape (m,)
+        Frames.
+
+    Returns
+    -------
+    folded : array, shape (m,)
+        In the range of the keys, or as they were where no cycle reaches.
+    backwards : array of bool, shape (m,)
+        Whether time runs backwards there.
+    """
+    with np.errstate(all="ignore"):
+        folded, backwards, _ = _fold(keys, np.asarray(times))
+    return folded, backwards
+
+
+def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np.ndarray:
+    """Key times and their copies in the curve's cycles.
+
+    Parameters
+    ----------
+    keys : Keys
+        The curve whose cycles count. Times outside the range of its keys are not copied.
+    times : array, shape (k,)
+        Key times, of this curve or of several.
+    first, last : float
+        Frames that the times returned are between, both included.
+
+    Returns
+    -------
+    array, shape (c,)
+        Rising, each time once.
+
+    Raises
+    ------
+    ValueError
+        Where the cycles are so short, and so many, that there would be millions.
+    """
+    times = np.asarray(times, dtype=np.float64)
+    copies = [times]
+    if keys.cycles is not None and len(keys.points):
+        begin, end = keys.times[0].item(), keys.times[-1].item()
+        period = end - begin
+        inside = times[(times >= begin) & (times <= end)]
+        for mode, count, room, side in (
+            (keys.cycles.before, keys.cycles.before_count, begin - first, -1.0),
+            (keys.cycles.after, keys.cycles.after_count, last - end, 1.0),
+        ):
+            if mode == "NONE" or not (0.0 < period < np.inf and room > 0.0) or count < 0:
+                continue
+            rounds = np.ceil(room / period)
+            rounds = min(rounds, count) if count else rounds
+            if rounds * len(inside) > MOST_COPIES:
+                raise ValueError(f"{rounds:.0f} rounds of {period:g} frames are too many: give Cycles a count")
+            number = np.arange(1.0, rounds + 1.0)[:, None]
+            mirrored = (number % 2 == 1) & (mode == "MIRROR")
+            copies.append((np.where(mirrored, begin + end - inside, inside) + side * number * period).ravel())
+    found = np.unique(np.concatenate(copies))
+    return found[(found >= first) & (found <= last)]
+
+
+def _fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times folded, whether they run backwards, and the change of value from first to last key that is to be added.
+
+    All in single precision and in Blender's order of steps: it decides on which side of a key a frame falls.
+    """
+    folded = times.astype(np.float32)
+    backwards, offset = np.zeros(times.shape, dtype=bool), np.zeros(times.shape)
+    if keys.cycles is None or not len(keys.points) or keys.points[0, 0] == keys.points[-1, 0]:
+        return folded.astype(np.float64), backwards, offset
+    (begin, low), (end, high) = keys.points[0], keys.points[-1]
+    period, rise = end - begin, high - low
+    for mode, count, outside, side in (
+        (keys.cycles.before, keys.cycles.before_count, folded < begin, -1),
+        (keys.cycles.after, keys.cycles.after_count, folded > end, 1),
+    ):
+        if mode == "NONE":
+            continue
+        near, far = (begin, end) if side < 0 else (end, begin)
+        distance = folded[outside] - near
+        cycle = side * distance / period
+        reached = (cycle <= count) | (count == 0)
+        where = np.flatnonzero(outside)[reached]
+        distance, cycle = distance[reached], cycle[reached]
+        rest = np.fmod(distance, period)
+        odd = (np.trunc(cycle) % 2 == 1) & (mode == "MIRROR")
+        reverse = (np.trunc(cycle.astype(np.float64) + 1.0) % 2 == 1) & (mode == "MIRROR")
+        time = np.where(reverse, near - rest, begin + rest)
+        time = np.where(rest == 0.0, np.where(odd, far, near), time)
+        folded[where] = np.where(time < begin, time + period, time)
+        backwards[where] = reverse
+        if mode == "REPEAT_OFFSET":
+            whole = np.floor if side < 0 else np.ceil
+            offset[where] = whole(distance / period) * rise
+    return folded.astype(np.float64), backwards, offset
+
+
+_NO_KEYS = Keys(np.zeros((1, 2), np.float32), np.full(1, CONSTANT, np.int32))
+"""Stands for a curve without keys, which is 0 everywhere in Blender."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Curves with the same timing, and which spans their moments fall into."""
+
+    curves: np.ndarray
+    """Numbers of the curves, shape (c,)."""
+
+    moments: np.ndarray
+    """Frames, rising, shape (m,)."""
+
+    spans: np.ndarray
+    """Spans of the first of the curves, shape (s,)."""
+
+    counts: np.ndarray
+    """How many of the moments, one after the other, fall into each, shape (s,)."""
+
+    order: np.ndarray | None
+    """Where the moments belong in the result, shape (m,). None: where they are."""
+
+    offsets: list[np.ndarray] | None
+    """What cycles add to each curve, in the order of the result. None: nothing."""
+
+    def finished(self, values: np.ndarray) -> np.ndarray:
+        """Values (c, m) at the moments, as they were asked for."""
+        if self.order is not None:
+            sorted_values, values = values, np.empty_like(values)
+            values[:, self.order] = sorted_values
+        if self.offsets is not None:
+            values += self.offsets
+        return values
+
+
+def _groups(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: _Spans) -> Iterator[_Group]:
+    """Curves that share their timing and are asked for the same frames, wherever in the list they are."""
+    requests, distinct = _requests(times)
+    together: dict[tuple, list[int]] = {}
+    for number, key in enumerate(zip(requests, spans.timings(curves), strict=True)):
+        together.setdefault(key, []).append(number)
+    rising = [bool(np.all(moments[1:] >= moments[:-1])) for moments in distinct]
+    for (request, _), numbers in together.items():
+        leader, moments = curves[numbers[0]], distinct[request]
+        offsets = order = None
+        if leader.cycles is not None:
+            offsets = [_fold(curves[number], moments)[2] for number in numbers]
+            moments = _fold(leader, moments)[0]
+        if leader.cycles is not None or not rising[request]:
+            order = np.argsort(moments, kind="stable")
+            moments = moments[order]
+        yield _Group(np.array(numbers), moments, *spans.place(numbers[0], moments), order, offsets)
+
+
+def _requests(times: Sequence[np.ndarray]) -> tuple[list[int], list[np.ndarray]]:
+    """Which of the distinct arrays of frames each curve is asked for, and those, in Blender's precision."""
+    requests: list[int] = []
+    distinct: list[np.ndarray] = []
+    of_array: dict[int, int] = {}
+    of_content: dict[bytes, int] = {}
+    for asked in times:
+        if id(asked) not in of_array:
+            single = np.asarray(asked).astype(np.float32)
+            request = of_array[id(asked)] = of_content.setdefault(single.tobytes(), len(distinct))
+            if request == len(distinct):
+                distinct.append(single.astype(np.float64))
+        requests.append(of_array[id(asked)])
+    return requests, distinct
+
+
+def _blocks(groups: Iterable[_Group]) -> Iterator[list[_Group]]:
+    """Groups of equally many curves, in lists of about BLOCK moments."""
+    block: list[_Group] = []
+    size = 0
+    for group in sorted(groups, key=lambda group: len(group.curves)):
+        if block and (size >= BLOCK or len(block[0].curves) != len(group.curves)):
+            yield block
+            block, size = [], 0
+        block.append(group)
+        size += len(group.moments)
+    yield block
+
+
+def _values(groups: list[_Group], spans: _Spans) -> np.ndarray:
+    """The values of groups of c curves each at their moments, m in all: shape (c, m)."""
+    leading = np.concatenate([group.spans for group in groups])
+    counts = np.concatenate([group.counts for group in groups])
+    parameters = spans.parameters(leading, counts, np.concatenate([group.moments for group in groups]))
+    first = spans.first[np.stack([group.curves for group in groups], axis=1)]
+    each = [len(group.spans) for group in groups]
+    own = leading + np.repeat(first - first[0], each, axis=1)
+    degree = 3 if BEZIER in spans.interpolation[leading] else 1
+    values = np.empty((len(own), len(parameters)))
+    at_once = max(1, BLOCK // max(1, len(parameters)))
+    for row in range(0, len(values), at_once):
+        rows = values[row : row + at_once]
+        polynomials = spans.polynomials[:, own[row : row + at_once]]
+        rows[:] = polynomials[degree].repeat(counts, axis=-1)
+        for power in range(degree - 1, -1, -1):
+            rows *= parameters
+            rows += polynomials[power].repeat(counts, axis=-1)
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class _Spans:
+    """The spans of C curves, one curve after the other: N in all."""
+
+    first: np.ndarray
+    """The first span of each curve, and the end, shape (C + 1,)."""
+
+    start: np.ndarray
+    """Frame of the key that begins the span; of the first key for the time before it; shape (N,)."""
+
+    earliest: np.ndarray
+    """First frame in the span, shape (N,)."""
+
+    rate: np.ndarray
+    """One over the duration in frames; 0 where the value stays or there is no end; shape (N,)."""
+
+    side: np.ndarray
+    """-1 before the first key, 1 after the last, 0 between, shape (N,)."""
+
+    interpolation: np.ndarray
+    """Codes, CONSTANT where the rate is 0, shape (N,)."""
+
+    easing: np.ndarray
+    """Codes, shape (N,)."""
+
+    settings: np.ndarray
+    """BACK's overshoot, ELASTIC's change, amplitude and period (in durations), shape (4, N)."""
+
+    bezier: np.ndarray
+    """Time as a cubic of the parameter, both from 0 to 1: coefficients of t, t^2, t^3, shape (3, N)."""
+
+    polynomials: np.ndarray
+    """Value as a cubic of the parameter: coefficients of 1, t, t^2, t^3, shape (4, N)."""
+
+    timing: bytes
+    """All that the parameters of BEZIER depend on, 16 bytes for each key."""
+
+    crowded: frozenset[int]
+    """Curves that have keys so close together that a frame may be near to two, or out of order."""
+
+    linear: bool
+    """Whether any curve goes on at its slope outside of its keys."""
+
+    unit_elastic: bool
+
+    @classmethod
+    def of(cls, curves: Sequence[Keys], unit_elastic: bool) -> _Spans:
+        curves = [curve if len(curve.points) else _NO_KEYS for curve in curves]
+        first = np.cumsum([0, *(len(curve.points) + 1 for curve in curves)])
+        before, after = first[:-1], first[1:] - 1
+        # The span before the first key is that of a second key in the same place.
+        key = np.arange(first[-1]) - np.repeat(np.arange(1, len(curves) + 1), np.diff(first))
+        key[before] += 1
+
+        points = np.concatenate([curve.points for curve in curves])[key]
+        left = np.concatenate([curve.points if curve.left is None else curve.left for curve in curves])[key]
+        right = np.concatenate([curve.points if curve.right is None else curve.right for curve in curves])[key]
+        codes = np.concatenate([curve.interpolation for curve in curves])[key]
+        following, following_left = np.roll(points, -1, axis=0), np.roll(left, -1, axis=0)
+        duration = following[:, 0] - points[:, 0]
+        crowded = ~(duration > 2.1 * NEAR)
+        crowded[before] = crowded[after] = False
+        duration[after] = 0.0
+        moving = (duration != 0.0) & (codes != CONSTANT)
+        duration = duration.astype(np.float64)
+        change = np.where(moving, following[:, 1] - points[:, 1], 0.0).astype(np.float64)
+
+        polynomials, bezier = np.zeros((4, len(key))), np.zeros((3, len(key)))
+        polynomials[0], polynomials[1], bezier[0] = points[:, 1], change, 1.0
+        curved = np.flatnonzero(moving & (codes == BEZIER))
+        if len(curved):
+            cubics = _cubics(points[curved], right[curved], following_left[curved], following[curved])
+            bezier[:, curved] = cubics[..., 0] / duration[curved]
+            polynomials[1:, curved] = cubics[..., 1]
+        linear = [number for number, curve in enumerate(curves) if curve.linear]
+        if linear:
+            for outside, inwards, handles in ((before[linear], 2, left), (after[linear], -1, right)):
+                # The neighbour of an only key is that key itself.
+                neighbours = np.clip(outside + inwards, before[linear] + 1, after[linear])
+                slopes = _slopes(points[outside], points[neighbours], handles[outside], codes[outside])
+                polynomials[1, outside] = slopes
+
+        easing, settings = np.zeros(len(key), dtype=np.int32), np.zeros((4, len(key)))
+        if any(curve.easing is not None for curve in curves):
+            easing = np.concatenate(
+                [np.zeros_like(curve.interpolation) if curve.easing is None else curve.easing for curve in curves]
+            )[key]
+            back, amplitude, period = np.concatenate(
+                [
+                    np.zeros((3, len(curve.points))) if curve.easing_settings is None else curve.easing_settings
+                    for curve in curves
+                ],
+                axis=1,
+            )[:, key]
+            settings[:] = back, np.ones_like(change) if unit_elastic else change, amplitude, period / duration
+            if not unit_elastic:
+                polynomials[1, moving & (codes == ELASTIC)] = 1.0
+
+        start = points[:, 0].astype(np.float64)
+        earliest = start - NEAR
+        earliest[before + 1] = start[before]
+        side = np.zeros(len(key))
+        side[before], side[after] = -1.0, 1.0
+        timing = np.column_stack((points[:, 0], left[:, 0], right[:, 0], codes.astype(np.float32)))
+        return cls(
+            first=first,
+            start=start,
+            earliest=earliest,
+            rate=np.where(moving, 1.0 / duration, 0.0),
+            side=side,
+            interpolation=np.where(moving, codes, CONSTANT),
+            easing=easing,
+            settings=settings,
+            bezier=bezier,
+            polynomials=polynomials,
+            timing=timing.tobytes(),
+            crowded=frozenset((np.searchsorted(first, np.flatnonzero(crowded), side="right") - 1).tolist()),
+            linear=bool(linear),
+            unit_elastic=unit_elastic,
+        )
+
+    def timings(self, curves: Sequence[Keys]) -> Iterator[tuple]:
+        """For each curve all that its parameters depend on."""
+        ends = (16 * self.first).tolist()
+        for number, curve in enumerate(curves):
+            eased = None
+            if curve.easing is not None:
+                eased = curve.easing.tobytes(), curve.easing_settings.tobytes()
+                if not self.unit_elastic and ELASTIC in curve.interpolation:
+                    eased = number
+            yield self.timing[ends[number] : ends[number + 1]], eased, curve.cycles
+
+    def place(self, number: int, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The spans of one curve that rising moments fall into one after the other, and how many into each."""
+        begin, end = self.first[number : number + 2]
+        if number in self.crowded:
+            found = _search(self.start[begin + 1 : end], moments)
+            runs = np.flatnonzero(np.diff(found, prepend=-1))
+            return begin + found[runs], np.diff(runs, append=len(moments))
+        bounds = np.empty(end - begin + 1, dtype=np.int64)
+        bounds[0], bounds[-1] = 0, len(moments)
+        bounds[1:-1] = np.searchsorted(moments, self.earliest[begin + 1 : end])
+        return np.arange(begin, end), bounds[1:] - bounds[:-1]
+
+    def parameters(self, spans: np.ndarray, counts: np.ndarray, moments: np.ndarray) -> np.ndarray:
+        """The parameters of the cubics for moments (m,), of which each of `spans` (s,) has the next `counts` (s,)."""
+
+        def spread(of_spans: np.ndarray) -> np.ndarray:
+            return of_spans[..., spans].repeat(counts, axis=-1)
+
+        frames = moments - spread(self.start)
+        parameters = np.where(np.abs(frames) <= NEAR, 0.0, frames) * spread(self.rate)
+        codes = set(self.interpolation[spans].tolist())
+        if BEZIER in codes:
+            parameters = _solve(parameters, spread(self.bezier))
+        if not codes <= {CONSTANT, LINEAR, BEZIER}:
+            self._ease(parameters, np.repeat(spans, counts))
+        if self.linear:
+            side = spread(self.side)
+            parameters = np.where(side != 0.0, side * np.maximum(side * frames, 0.0), parameters)
+        return parameters
+
+    def _ease(self, parameters: np.ndarray, spans: np.ndarray) -> None:
+        """Replace the times in these spans, each of shape (m,), by what easings make of them."""
+        manners = self.interpolation * len(EASINGS) + self.easing
+        manner_of = manners[spans]
+        for manner in np.unique(manner_of).tolist():
+            code, easing = divmod(manner, len(EASINGS))
+            if code in (CONSTANT, LINEAR, BEZIER):
+                continue
+            here = np.flatnonzero(manner_of == manner)
+            back, *swing = self.settings[:, spans[here]]
+            u, easing = parameters[here], EASINGS[easing]
+            if code == ELASTIC:
+                parameters[here] = elastic(easing, u, *swing)
+            else:
+                parameters[here] = ease(INTERPOLATIONS[code], easing, u, back)
+
+
+def _cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Bezier curves as cubics, after the correction that keeps frames from running backwards.
+
+    Parameters
+    ----------
+    start, right, left, end : array, shape (k, 2)
+        Key, its handle, the handle of the next key and that key. Single precision: Blender's rounding matters where
+        frames are many and segments short.
+
+    Returns
+    -------
+    array, shape (3, k, 2)
+        Coefficients of t, t^2 and t^3 for frame and value from the first key on.
+    """
+    duration = end[:, :1] - start[:, :1]
+    flat = np.max(np.abs((start - end, right - left, left - end))[..., 1], axis=0) < np.finfo(np.float32).eps
+    right, left = _shortened(start, right, duration), _shortened(end, left, duration)
+    cubics = np.stack(
+        (3.0 * (right - start), 3.0 * (start - 2.0 * right + left), end - start + 3.0 * (right - left))
+    ).astype(np.float64)
+    cubics[:, flat, 1] = 0.0
+    return cubics
+
+
+def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.ndarray:
+    """The handle, no longer in time than the segment."""
+    arm = key - handle
+    length = np.abs(arm[:, :1])
+    return np.where(length > duration, key - duration / length * arm, handle)
+
+
+def _slopes(ends: np.ndarray, neighbours: np.ndarray, handles: np.ndarray, codes: np.ndarray) -> np.ndarray:
+    """Slopes beyond keys at the end of a curve, from points of shape (k, 2)."""
+    run, rise = (np.where(codes[:, None] == LINEAR, neighbours, handles) - ends).astype(np.float64).T
+    return np.where((run == 0.0) | (codes == CONSTANT), 0.0, rise / run)
+
+
+def _search(keys: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """The spans, counted from 0 for the time before the first key, that moments fall into by Blender's bisection.
+
+    Where several keys are near to a moment it decides for the one that it happens on first.
+    """
+    low, high = np.zeros(len(moments), dtype=np.int64), np.full(len(moments), len(keys))
+    spans = np.zeros(len(moments), dtype=np.int64)
+    searching = np.ones(len(moments), dtype=bool)
+    for near in (0, len(keys) - 1):
+        found = searching & (np.abs(moments - keys[near]) <= NEAR)
+        spans[found] = near + 1
+        searching &= ~found
+    for _ in range(len(keys).bit_length() + 1):
+        middle = np.minimum((low + high) // 2, len(keys) - 1)
+        frames = moments - keys[middle]
+        found = searching & (np.abs(frames) <= NEAR)
+        spans[found] = middle[found] + 1
+        searching &= ~found
+        low = np.where(searching & (frames > 0.0), middle + 1, low)
+        high = np.where(searching & (frames < 0.0), middle - 1, high)
+        going = searching & (low <= high)
+        spans[searching & ~going] = low[searching & ~going]
+        searching = going
+    spans[moments <= keys[0]] = 0
+    spans[moments >= keys[-1]] = len(keys)
+    return spans
+
+
+def _solve(u: np.ndarray, cubic: np.ndarray) -> np.ndarray:
+    """The t from 0 to 1 at which the cubic c1 t + c2 t^2 + c3 t^3 is u.
+
+    There is one for every u from 0 to 1: the cubic goes from 0 to 1, and handles no longer than the segment let it turn
+    at most before it leaves 0 for good and after it has reached 1.
+
+    Parameters
+    ----------
+    u : array, shape (m,)
+        Time, 0 to 1.
+    cubic : array, shape (3, m)
+        c1, c2 and c3.
+    """
+    c1, c2, c3 = cubic
+    twice, thrice = 2.0 * c2, 3.0 * c3
+    # Newton's method, from the cubic in u that goes through both ends with the slopes that t has there.
+    at_start, at_end = (np.clip(1.0 / slope, 0.0, 3.0) for slope in (c1, c1 + twice + thrice))
+    t = u * (at_start + u * (3.0 - 2.0 * at_start - at_end + u * (at_start + at_end - 2.0)))
+    for _ in range(4):
+        step = (((c3 * t + c2) * t + c1) * t - u) / ((thrice * t + twice) * t + c1)
+        t -= step
+        np.abs(step, out=step)
+        if step.max(initial=0.0) < STEP:
+            break
+    missed = np.flatnonzero(~((step < STEP) & (np.abs(t - 0.5) < 0.5 + STEP)))
+    if len(missed):
+        t[missed] = _solve_bracketed(u[missed], cubic[:, missed])
+    return t
+
+
+def _solve_bracketed(u: np.ndarray, cubic: np.ndarray) -> np.ndarray:
+    """As `_solve`, for the few where the slope vanishes close by: Newton's steps, or bisection where they lead out."""
+    c1, c2, c3 = cubic
+    low, high = np.zeros_like(u), np.ones_like(u)
+    t = np.clip(u, 0.0, 1.0)
+    for _ in range(100):
+        excess = ((c3 * t + c2) * t + c1) * t - u
+        low, high = np.where(excess < 0.0, t, low), np.where(excess > 0.0, t, high)
+        following = t - excess / ((3.0 * c3 * t + 2.0 * c2) * t + c1)
+        following = np.where((following > low) & (following < high), following, 0.5 * (low + high))
+        following = np.where(excess == 0.0, t, following)
+        if not np.any(np.abs(following - t) > 1e-12):
+            break
+        t = following
+    return t

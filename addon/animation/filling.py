@@ -1,0 +1,150 @@
+"""Writing in-betweens: delta transforms as sampled F-curves, in the slot that has the keys.
+
+A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
+nothing of it. The delta transforms that an object has of its own are remembered while in-betweens are in their place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from .inbetweens import Deltas, deltas
+from .reading import GROUP, WIDTHS, Curves, Slot, curves_in, slots_of
+from .sources import LOCATION, ROTATION, SCALE, Source
+
+OWN = {
+    "delta_location": ("own_location", 0),
+    "delta_rotation_quaternion": ("own_quaternion", 1),
+    "delta_rotation_euler": ("own_euler", 2),
+    "delta_scale": ("own_scale", 3),
+}
+"""Each delta transform: where an object's own is remembered, and its place in `filled`."""
+
+
+def fill_in(readings: Sequence[tuple[Slot, Curves, Source]]) -> None:
+    """Compute and write the in-betweens of these slots."""
+    for (slot, curves, source), delta in zip(readings, deltas([source for *_, source in readings]), strict=True):
+        _write(slot, curves, _values(source, delta), delta.first)
+        _record(slot, source.digest)
+
+
+def is_complete(curves: Curves, source: Source) -> bool:
+    """Whether all F-curves are there that the in-betweens of a source go into."""
+    return all(
+        (path, index) in curves for path in _paths(source) for index in range(WIDTHS[path.removeprefix("delta_")])
+    )
+
+
+def clear(slot: Slot, curves: Curves) -> None:
+    """Take the in-betweens out of a slot, and give its objects their own delta transforms back."""
+    _write(slot, curves, {}, 0)
+    _record(slot, "")
+
+
+def recorded(slot: Slot) -> str:
+    """The digest of the source that a slot was filled in from, "" where it was not."""
+    return next((record.digest for record in slot.action.rigid_motion.slots if record.handle == slot.handle), "")
+
+
+def _record(slot: Slot, digest: str) -> None:
+    records = slot.action.rigid_motion.slots
+    for place, record in enumerate(records):
+        if record.handle == slot.handle:
+            if digest:
+                record.digest = digest
+            else:
+                records.remove(place)
+            return
+    if digest:
+        record = records.add()
+        record.handle, record.digest = slot.handle, digest
+
+
+def _paths(source: Source) -> dict[str, str]:
+    """The delta transforms that a source needs, and which of its properties each is for."""
+    rotation = "delta_rotation_quaternion" if source.order is None else "delta_rotation_euler"
+    paths = {"delta_location": LOCATION, rotation: ROTATION}
+    needed = {path: name for path, name in paths.items() if name in source.keyed}
+    return {**needed, "delta_scale": SCALE} if source.uniform_scale else needed
+
+
+def _values(source: Source, delta: Deltas) -> dict[str, np.ndarray]:
+    return {path: getattr(delta, name) for path, name in _paths(source).items()}
+
+
+def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], first: int) -> None:
+    """Replace the in-betweens of a slot by these values of delta transforms, (channels, m) from the first frame on."""
+    channelbag = slot.channelbag
+    gone = set()
+    for path in OWN:
+        rows = values.get(path)
+        for index in range(WIDTHS[path.removeprefix("delta_")]):
+            fcurve = curves.get((path, index))
+            if fcurve is not None and (rows is None or not _covers(fcurve, first, rows.shape[1])):
+                channelbag.fcurves.remove(fcurve)
+                del curves[path, index]
+                gone.add(path)
+    for path, rows in values.items():
+        for obj in slot.users:
+            _remember(obj, path)
+        points = np.empty((rows.shape[1], 2), dtype=np.float32)
+        points[:, 0] = np.arange(first, first + len(points))
+        for index, row in enumerate(rows):
+            points[:, 1] = row
+            fcurve = curves.get((path, index)) or _new(channelbag, curves, path, index, first, len(points))
+            fcurve.sampled_points.foreach_set("co", points.ravel())
+    if gone - set(values):
+        group = channelbag.groups.get(GROUP)
+        if group is not None and not group.channels:
+            channelbag.groups.remove(group)
+        for obj in slot.users:
+            give_back(obj)
+    for obj in slot.users:
+        obj.update_tag(refresh={"TIME"})
+
+
+def _covers(fcurve: bpy.types.FCurve, first: int, count: int) -> bool:
+    points = fcurve.sampled_points
+    return len(points) == count and points[0].co[0] == first
+
+
+def _new(channelbag, curves: Curves, path: str, index: int, first: int, count: int) -> bpy.types.FCurve:
+    """A sampled F-curve out of the animator's way: locked, and hidden in the Graph Editor."""
+    fcurve = curves[path, index] = channelbag.fcurves.new(path, index=index)
+    fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
+    fcurve.keyframe_points.insert(first, 0.0)
+    fcurve.convert_to_samples(first, first + count)
+    fcurve.lock = fcurve.hide = True
+    fcurve.select = False
+    return fcurve
+
+
+def adopt(slot: Slot, curves: Curves) -> None:
+    """Remember the own delta transforms of objects that move by a slot which is filled in already."""
+    for path in {path for path, _ in curves if path in OWN}:
+        for obj in slot.users:
+            _remember(obj, path)
+
+
+def _remember(obj: bpy.types.Object, path: str) -> None:
+    """Keep the object's own delta transform, which in-betweens take the place of."""
+    own, place = OWN[path]
+    motion = obj.rigid_motion
+    if not motion.filled[place]:
+        setattr(motion, own, getattr(obj, path))
+        motion.filled[place] = True
+
+
+def give_back(obj: bpy.types.Object) -> None:
+    """Give an object its own delta transforms back where no in-betweens are in their place any more."""
+    motion = obj.rigid_motion
+    if not any(motion.filled):
+        return
+    curves = {path for slot in slots_of([obj]) for path, _ in curves_in(slot.channelbag)}
+    for path, (own, place) in OWN.items():
+        if motion.filled[place] and path not in curves:
+            setattr(obj, path, getattr(motion, own))
+            motion.filled[place] = False

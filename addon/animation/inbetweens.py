@@ -1,0 +1,297 @@
+"""From what was keyed to what is to happen between the keys, and to the delta transforms that make Blender do it.
+
+Arrays alone, many sources at once: the ten components of location, rotation and scale are rows, and the samples (or
+segments, or keys) of all sources stand one behind the other along the last axis. A segment runs from one frame that has
+a key in any channel to the next. How far the object has come in it is what Blender's own in-betweens say: their share
+of the chord over all channels, a radian counting as much as a unit of length. So a segment follows the easing, the
+handles and the overshoot of its keys, whatever its mode.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..motion import Poses
+from ..motion import in_betweens as segment_poses
+from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
+from ..motion.quaternions import conjugate, multiply
+from .fcurves import Keys, evaluate
+from .sources import LOCATION, MODE_IDS, REST, ROTATION, SAME_FRAME, SCALE, Source
+
+AT_ONCE = 16384
+"""Samples worked on at once: few enough for the processor's caches."""
+
+ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
+"""Where the components of each property are. Euler angles leave their fourth row alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class InBetweens:
+    """The motion of one source, in the space of its channels, with the delta transforms that the object has anyway."""
+
+    frames: np.ndarray
+    """Shape (m,)."""
+
+    native: Poses
+    """What Blender's own in-betweens make of the keys, shape (m,)."""
+
+    wanted: Poses
+    """What the modes make of them, shape (m,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Deltas:
+    """The values of delta transforms on whole frames; None for a property that the modes leave alone."""
+
+    first: int
+    """The first frame."""
+
+    location: np.ndarray | None
+    """Shape (3, m)."""
+
+    rotation: np.ndarray | None
+    """Shape (4, m) or, for a source that turns by Euler angles, (3, m)."""
+
+    scale: np.ndarray | None
+    """Shape (3, m)."""
+
+
+def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> InBetweens:
+    """The motion of a source at any rising frames, sub-frames included.
+
+    Parameters
+    ----------
+    source : Source
+    frames : array, shape (m,)
+    mode : str, optional
+        One of `MODE_IDS` for all segments, instead of the modes that they have.
+    """
+    frames = np.asarray(frames, dtype=np.float64)
+    native, delta = _motion([source], [frames], None if mode is None else MODE_IDS.index(mode))
+
+    def moved_by(deltas: np.ndarray) -> Poses:
+        return Poses(
+            (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T,
+            multiply(deltas[ROWS[ROTATION]].T, native[ROWS[ROTATION]].T),
+            (native[ROWS[SCALE]] * deltas[ROWS[SCALE]]).mean(axis=0) if source.uniform_scale else None,
+        )
+
+    return InBetweens(frames, moved_by(source.own[: len(native), None]), moved_by(delta))
+
+
+def components_at(source: Source, frame: float) -> np.ndarray:
+    """What Blender's own in-betweens give the channels on one frame, shape (10,)."""
+    found = _sampled([(source, slice(0, 1))], [np.array([frame])])[:, 0]
+    return np.concatenate((found, REST[len(found) :]))
+
+
+def deltas(sources: Sequence[Source]) -> list[Deltas]:
+    """The delta transforms that turn Blender's in-betweens into the wanted ones, on the whole frames of each source."""
+    found = {}
+    for portion in _portions(sources):
+        frames = [np.arange(source.frame_range[0], source.frame_range[1] + 1.0) for source in portion]
+        _, delta = _motion(portion, frames)
+        for source, samples in _each(portion, map(len, frames)):
+            own = {name: delta[rows, samples] for name, rows in ROWS.items() if name in source.keyed}
+            if ROTATION in own and source.order is not None:
+                own[ROTATION] = eulers_from_quaternions(own[ROTATION].T, source.order).T
+            scale = own.get(SCALE) if source.uniform_scale else None
+            found[id(source)] = Deltas(source.frame_range[0], own.get(LOCATION), own.get(ROTATION), scale)
+    return [found[id(source)] for source in sources]
+
+
+def _portions(sources: Sequence[Source]) -> Iterator[list[Source]]:
+    """The sources in lists of about `AT_ONCE` samples, those with uniform scale apart."""
+    for scaled in (False, True):
+        portion, samples = [], 0
+        for source in sources:
+            if source.uniform_scale is scaled:
+                portion.append(source)
+                samples += source.frame_range[1] - source.frame_range[0] + 1
+                if samples >= AT_ONCE:
+                    yield portion
+                    portion, samples = [], 0
+        if portion:
+            yield portion
+
+
+def _each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
+    """Each source with the place of what it has this many of."""
+    bounds = [0, *itertools.accumulate(counts)]
+    return [(source, slice(*place)) for source, place in zip(sources, itertools.pairwise(bounds), strict=True)]
+
+
+def _motion(
+    sources: Sequence[Source], frames: Sequence[np.ndarray], mode: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Blender's own in-betweens (10, m), rotations as unit quaternions, and the deltas (10, m) to the wanted ones."""
+    samples = _each(sources, map(len, frames))
+    segments = _each(sources, (len(source.key_frames) - 1 for source in sources))
+    native = _sampled(samples, frames)
+    start, end = _ends(segments)
+    counts, on_keys, owners = _counts(sources, frames)
+    elastic = any(source.is_elastic for source in sources)
+    timing = _sampled(samples, frames, unit_elastic=True) if elastic else native
+    progress = _progress(timing, start, end, counts, segments)
+    modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
+
+    _turn_into_quaternions(native, samples)
+    keys = _key_poses(start, end, segments)
+    times = np.tile((0.0, 1.0), (len(counts), 1))
+    delta = np.empty_like(native)
+    own = np.stack([source.own[: len(native)] for source in sources], axis=1)
+    for number, (_, place) in enumerate(samples):
+        delta[:, place] = own[:, number, None]
+    for code in np.unique(modes[(modes > 0) & (counts > 0)]):
+        chosen = modes == code
+        some = slice(None) if chosen.all() else np.repeat(chosen, counts)
+        poses = segment_poses(times, keys, np.where(chosen, counts, 0)[:, None], progress[some], MODE_IDS[code])
+        _differ(poses, native[:, some], delta, some)
+    # A key is the animator's: nothing is added to it, not even a rounding error.
+    delta[:, on_keys] = own[:, owners]
+    return native, delta
+
+
+def _sampled(
+    samples: list[tuple[Source, slice]], frames: Sequence[np.ndarray], *, unit_elastic: bool = False
+) -> np.ndarray:
+    """The channels' own values at the frames of each source, shape (10, m), or (7, m) where no scale is keyed."""
+    places, curves, times = [], [], []
+    rows = np.empty((_height(samples), samples[-1][1].stop))
+    for (source, place), at in zip(samples, frames, strict=True):
+        _rest(rows[:, place], source)
+        for row, keys in source.components():
+            if isinstance(keys, Keys):
+                places.append((row, place))
+                curves.append(keys)
+                times.append(at)
+            else:
+                rows[row, place] = keys
+    for place, values in zip(places, evaluate(curves, times, unit_elastic=unit_elastic), strict=True):
+        rows[place] = values
+    return rows
+
+
+def _ends(segments: list[tuple[Source, slice]]) -> tuple[np.ndarray, np.ndarray]:
+    """The channels' own values where each segment starts and where it ends, rows as `_sampled` has them."""
+    start, end = np.empty((2, _height(segments), segments[-1][1].stop))
+    places, curves, times = [], [], []
+    for source, place in segments:
+        _rest(start[:, place], source)
+        _rest(end[:, place], source)
+        for row, keys in source.components():
+            if not isinstance(keys, Keys):
+                start[row, place] = end[row, place] = keys
+            elif source.is_together:
+                start[row, place], end[row, place] = keys.values[:-1], keys.values[1:]
+            else:
+                places.append((row, place))
+                curves.append(keys)
+                times.append(source.key_frames)
+    for place, keys, at, values in zip(places, curves, times, evaluate(curves, times), strict=True):
+        start[place], end[place] = values[:-1], values[1:]
+        # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its first.
+        jumps = _jumps(keys, at)
+        start[place][jumps[:-1]], end[place][jumps[1:]] = keys.values[0], keys.values[-1]
+    return start, end
+
+
+def _height(places: list[tuple[Source, slice]]) -> int:
+    return 10 if any(SCALE in source.keyed for source, _ in places) else 7
+
+
+def _rest(rows: np.ndarray, source: Source) -> None:
+    """Fill in what a source does not key."""
+    for name, own in ROWS.items():
+        if name not in source.keyed:
+            rows[own] = REST[own, None][: len(rows[own])]
+    if source.order is not None:
+        rows[6] = 0.0
+
+
+def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
+    """At which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
+    cycles = keys.cycles
+    first, last = keys.times[[0, -1]]
+    if cycles is None or first == last:
+        return np.zeros(times.shape, dtype=bool)
+    rounds = (times - first) / (last - first)
+    whole = np.rint(rounds)
+    after = (whole >= 1) & (cycles.after == "REPEAT") & ((whole <= cycles.after_count) | (cycles.after_count == 0))
+    before = (whole <= 0) & (cycles.before == "REPEAT") & ((whole > -cycles.before_count) | (cycles.before_count == 0))
+    return (np.abs(rounds - whole) * (last - first) < SAME_FRAME) & (after | before)
+
+
+def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How many samples each segment has, shape (segments,); which samples of all are on a key; and of which source."""
+    counts, on_keys, owners, before = [], [], [], 0
+    for number, (source, own) in enumerate(zip(sources, frames, strict=True)):
+        keys = source.key_frames
+        at = np.searchsorted(own, keys)
+        counts.append(np.diff(at[1:-1], prepend=0, append=len(own)))
+        hit = own[np.minimum(at, len(own) - 1)] == keys
+        on_keys.append(before + at[hit])
+        owners.append(np.full(len(on_keys[-1]), number))
+        before += len(own)
+    return np.concatenate(counts), np.concatenate(on_keys), np.concatenate(owners)
+
+
+def _progress(
+    timing: np.ndarray, start: np.ndarray, end: np.ndarray, counts: np.ndarray, segments: list[tuple[Source, slice]]
+) -> np.ndarray:
+    """How far each sample has come in its segment, from the channels (10, m) and their values at both ends."""
+    chord = end - start
+    weights = chord.copy()
+    for source, place in segments:
+        if source.order is None:
+            # A unit quaternion moves by half of the angle that the object turns.
+            weights[ROWS[ROTATION], place] *= 4.0
+    total = np.einsum("rs,rs->s", weights, chord)
+    weights /= np.where(total > 0.0, total, np.inf)
+    rows = np.flatnonzero(weights.any(axis=1))
+    progress = np.einsum("rm,rm->m", np.repeat(weights[rows], counts, axis=1), timing[rows])
+    progress -= np.repeat(np.einsum("rs,rs->s", weights, start), counts)
+    return progress
+
+
+def _turn_into_quaternions(rows: np.ndarray, places: list[tuple[Source, slice]]) -> None:
+    """Put unit quaternions in place of what the channels turn by."""
+    for source, place in places:
+        if source.order is not None and ROTATION in source.keyed:
+            rows[ROWS[ROTATION], place] = quaternions_from_eulers(rows[3:6, place].T, source.order).T
+    quaternions = rows[ROWS[ROTATION]]
+    lengths = np.sqrt(np.einsum("rm,rm->m", quaternions, quaternions))
+    if not lengths.all():
+        # Blender turns by half a turn about x where a quaternion has no length.
+        quaternions[1, lengths == 0.0] = lengths[lengths == 0.0] = 1.0
+    quaternions /= lengths
+
+
+def _key_poses(start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]]) -> Poses:
+    """The poses that each segment runs between, shape (segments, 2), with the object's own delta transforms."""
+    own = np.repeat(
+        np.stack([source.own for source, _ in segments], axis=1),
+        [place.stop - place.start for _, place in segments],
+        axis=1,
+    )[:, :, None]
+    for rows in (start, end):
+        _turn_into_quaternions(rows, segments)
+    ends = np.stack((start, end), axis=2)
+    return Poses(
+        np.moveaxis(ends[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1),
+        multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(ends[ROWS[ROTATION]], 0, -1)),
+        ends[7] if segments[0][0].uniform_scale else None,
+    )
+
+
+def _differ(poses: Poses, native: np.ndarray, delta: np.ndarray, some: slice | np.ndarray) -> None:
+    """Set some of the deltas (10, m) to what takes Blender's in-betweens (10, .) to these poses."""
+    delta[ROWS[LOCATION], some] = poses.positions.T - native[ROWS[LOCATION]]
+    delta[ROWS[ROTATION], some] = multiply(poses.quaternions, conjugate(native[ROWS[ROTATION]].T)).T
+    if poses.scales is not None:
+        scale = native[ROWS[SCALE]]
+        delta[ROWS[SCALE], some] *= np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)

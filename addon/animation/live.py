@@ -1,0 +1,238 @@
+"""Keeping in-betweens up to date: whatever the animator edits, by hand or by script, shows at once.
+
+Blender's handlers tell that something was edited. Whether it matters, the digest of the source tells: the Action keeps
+that of what it was filled in from. It travels with the file through undo, redo, saving and loading, so nothing has to
+be remembered here for the in-betweens to be right. A frame that is merely played costs nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import ClassVar
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import insertion
+from .filling import clear, fill_in, give_back, is_complete, recorded
+from .inbetweens import deltas
+from .reading import Curves, Slot, curves_in, explain_numbers, is_filled_in, read, slots_in, slots_of
+from .sources import Source
+
+log = logging.getLogger(__package__)
+
+
+class _State:
+    """What the handlers share."""
+
+    enabled = True
+    """Whether edits are followed at once."""
+
+    busy = False
+    """Whether the edits that Blender tells of are our own."""
+
+    unseen = True
+    """Whether the file has yet to be looked through since the extension was switched on."""
+
+    frame = 0.0
+    """The frame that was last shown."""
+
+    ranges: ClassVar[dict[int, tuple[int, int]]] = {}
+    """First and last frame of each scene when last seen, by session id."""
+
+
+def set_enabled(enabled: bool) -> None:
+    """Follow edits at once, or else only when `refresh` is called."""
+    _State.enabled, _State.unseen = enabled, enabled
+
+
+def refresh(objects: Iterable[bpy.types.Object] | None = None) -> int:
+    """Bring the in-betweens of these objects up to date, or of all in the file.
+
+    Returns
+    -------
+    int
+        How many slots had to be filled in anew.
+    """
+    objects = list(bpy.data.objects) if objects is None else list(objects)
+    with _turn() as ours:
+        if not ours:
+            return 0
+        slots = slots_of(objects)
+        moved = {obj for slot in slots for obj in slot.users}
+        for obj in objects:
+            if obj not in moved:
+                give_back(obj)
+        return _refresh(slots)
+
+
+def problem_of(obj: bpy.types.Object) -> str:
+    """Why an object keeps Blender's own in-betweens whatever its mode, and the way out; "" where nothing is amiss."""
+    try:
+        for slot in slots_of([obj]):
+            source = read(slot, curves_in(slot.channelbag))
+            explain_numbers(obj.name, source)
+            if source.is_live:
+                deltas([source])
+    except ValueError as problem:
+        return str(problem)
+    return ""
+
+
+def _refresh(slots: Iterable[Slot]) -> int:
+    stale = []
+    for slot in slots:
+        curves = curves_in(slot.channelbag)
+        source = _live_source(slot, curves)
+        before = recorded(slot)
+        if source is None:
+            if before or any(is_filled_in(fcurve) for fcurve in curves.values()):
+                clear(slot, curves)
+            for obj in slot.users:
+                give_back(obj)
+        elif source.digest != before or not is_complete(curves, source):
+            if insertion.keep_pose(slot, curves, before, source, _State.frame):
+                curves = curves_in(slot.channelbag)
+                source = _live_source(slot, curves)
+            stale.append((slot, curves, source))
+    try:
+        fill_in(stale)
+    except ValueError:
+        # One of them has numbers that make no motion: it keeps Blender's own, and the others get theirs.
+        for one in stale:
+            try:
+                fill_in([one])
+            except ValueError:
+                clear(*one[:2])
+    return len(stale)
+
+
+def _live_source(slot: Slot, curves: Curves) -> Source | None:
+    """What is keyed in a slot, None where Blender's own in-betweens are all that is wanted or can be had."""
+    try:
+        source = read(slot, curves)
+    except ValueError:
+        return None
+    if not source.is_live:
+        return None
+    insertion.remember(source)
+    return source
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """Do several things, and refresh after them."""
+    with _turn():
+        yield
+
+
+@contextmanager
+def _turn() -> Iterator[bool]:
+    """Whether it is our turn: not while we are at it, for what we write is no edit to follow."""
+    ours = not _State.busy
+    _State.busy = True
+    try:
+        yield ours
+    finally:
+        if ours:
+            _State.busy = False
+
+
+def _follow(depsgraph: bpy.types.Depsgraph) -> None:
+    """Refresh what an update may have to do with."""
+    if _State.unseen:
+        _look_through()
+    elif depsgraph.id_type_updated("ACTION"):
+        actions = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+        with _turn() as ours:
+            if ours:
+                _refresh(slots_in(actions))
+
+
+def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float) -> None:
+    """Refresh after an edit of objects or scenes themselves, and notice how an object was posed by hand."""
+    acted = depsgraph.id_type_updated("ACTION")
+    for update in depsgraph.updates:
+        block = update.id
+        if isinstance(block, bpy.types.Object):
+            motion = block.rigid_motion
+            if motion.mode != "BLENDER" or any(motion.filled):
+                if not acted:
+                    insertion.notice_pose(block.original, frame)
+                refresh([block.original])
+        elif isinstance(block, bpy.types.Scene):
+            frames = block.frame_start, block.frame_end
+            if _State.ranges.get(block.session_uid, frames) != frames:
+                refresh(block.original.objects)
+            _State.ranges[block.session_uid] = frames
+
+
+def _look_through(*_: object) -> None:
+    """Refresh all there is in the file."""
+    _State.unseen = False
+    _State.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
+    refresh()
+
+
+def _careful(handler: Callable) -> Callable:
+    """A handler that stays quiet while edits are not followed, and never raises into Blender."""
+
+    @persistent
+    @functools.wraps(handler)
+    def follow(*arguments: object) -> None:
+        if _State.enabled:
+            try:
+                handler(*arguments)
+            except Exception:
+                log.exception("In-betweens could not be brought up to date")
+
+    return follow
+
+
+@_careful
+def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _State.frame = scene.frame_current_final
+    _follow(depsgraph)
+    if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
+        _follow_objects(depsgraph, _State.frame)
+
+
+@_careful
+def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    # Edits that nobody has seen yet were made on the frame before this one.
+    _follow(depsgraph)
+    _State.frame = scene.frame_current_final
+
+
+@_careful
+def _on_file(*_: object) -> None:
+    _State.frame = bpy.context.scene.frame_current_final if bpy.context.scene else 0.0
+    _look_through()
+
+
+HANDLERS = {
+    "depsgraph_update_post": _on_update,
+    "frame_change_post": _on_frame,
+    "undo_post": _on_file,
+    "redo_post": _on_file,
+    "load_post": _on_file,
+    "save_pre": _on_file,
+    "render_init": _on_file,
+}
+
+
+def register() -> None:
+    _State.unseen = True
+    for name, handler in HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+    if not bpy.app.background:
+        # While an extension is switched on, the file is out of its reach.
+        bpy.app.timers.register(_look_through, first_interval=0.0)
+
+
+def unregister() -> None:
+    for name, handler in HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(handler)

@@ -1,0 +1,113 @@
+"""What is kept in the file: an object's mode and its own delta transforms, and what an Action was filled in for.
+
+Without the extension all of it is inert, and stays in the file.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import (
+    BoolVectorProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..motion import MODES
+from . import live
+
+MODE_ITEMS = [
+    ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
+    *((name, mode.label, mode.description, number) for number, (name, mode) in enumerate(MODES.items(), 1)),
+]
+
+
+class SlotRecord(bpy.types.PropertyGroup):
+    """What the in-betweens of one slot were computed from."""
+
+    handle: IntProperty(options={"HIDDEN"})
+    digest: StringProperty(options={"HIDDEN"})
+
+
+class ActionMotion(bpy.types.PropertyGroup):
+    slots: CollectionProperty(type=SlotRecord)
+
+
+class BakedAction(bpy.types.PropertyGroup):
+    """An Action with baked keys, what it was baked from, and the mode that the object had then."""
+
+    baked: PointerProperty(type=bpy.types.Action)
+    original: PointerProperty(type=bpy.types.Action)
+    mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
+
+
+def _refresh(motion: ObjectMotion, _context: bpy.types.Context) -> None:
+    live.refresh([motion.id_data])
+
+
+class ObjectMotion(bpy.types.PropertyGroup):
+    mode: EnumProperty(
+        name="Mode",
+        description="What happens between the keys. A key of this property decides from its frame on",
+        items=MODE_ITEMS,
+        options={"ANIMATABLE"},
+        override={"LIBRARY_OVERRIDABLE"},
+        update=_refresh,
+    )
+    filled: BoolVectorProperty(
+        description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
+        size=4,
+        options=set(),
+    )
+    own_location: FloatVectorProperty(
+        name="Delta Location",
+        description="The object's own delta location, to which the in-betweens are added",
+        subtype="TRANSLATION",
+        options=set(),
+        update=_refresh,
+    )
+    own_quaternion: FloatVectorProperty(
+        name="Delta Rotation",
+        description="The object's own delta rotation, to which the in-betweens are added",
+        size=4,
+        default=(1.0, 0.0, 0.0, 0.0),
+        subtype="QUATERNION",
+        options=set(),
+        update=_refresh,
+    )
+    own_euler: FloatVectorProperty(
+        name="Delta Rotation",
+        description="The object's own delta rotation, to which the in-betweens are added",
+        subtype="EULER",
+        options=set(),
+        update=_refresh,
+    )
+    own_scale: FloatVectorProperty(
+        name="Delta Scale",
+        description="The object's own delta scale, by which the in-betweens are multiplied",
+        default=(1.0, 1.0, 1.0),
+        subtype="XYZ",
+        options=set(),
+        update=_refresh,
+    )
+    bakes: CollectionProperty(type=BakedAction)
+
+
+CLASSES = (SlotRecord, ActionMotion, BakedAction, ObjectMotion)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.rigid_motion = PointerProperty(type=ObjectMotion, override={"LIBRARY_OVERRIDABLE"})
+    bpy.types.Action.rigid_motion = PointerProperty(type=ActionMotion)
+
+
+def unregister() -> None:
+    del bpy.types.Action.rigid_motion
+    del bpy.types.Object.rigid_motion
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

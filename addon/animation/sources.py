@@ -1,0 +1,143 @@
+"""What the animator keyed: the location, rotation, scale and mode channels of one slot, as arrays.
+
+A source is read, never written. Its digest tells whether anything changed that in-betweens depend on. Frames are those
+of the Action; values are in the channels' own units.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..motion import MODES
+from .fcurves import ELASTIC, Keys, cycled, cyclic_times, evaluate
+
+MODE_IDS = ("BLENDER", *MODES)
+"""What the values of the mode channel stand for: Blender's own in-betweens, and then the modes in their order."""
+
+LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
+FIRST_ROW = {LOCATION: 0, ROTATION: 3, SCALE: 7}
+"""Where the components of each are, in arrays with a row for each of the ten. Euler angles leave row 6 alone."""
+
+REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
+"""The components of something that is not moved. Rotations are quaternions where they are not channels."""
+
+SAME_FRAME = 0.01
+"""Keys closer than this are one key to Blender, and here."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The keys of one slot, and the values that what it does not key rests at."""
+
+    order: str | None
+    """The order of Euler angles, or None for quaternions."""
+
+    keyed: dict[str, tuple[Keys | float, ...]]
+    """The channels of location, rotation and scale, as far as they are keyed; a value for a component without keys."""
+
+    own: np.ndarray
+    """The delta transforms that the object has of its own, as components, shape (10,)."""
+
+    mode: int | Keys
+    """The mode of all segments, as `MODE_IDS` counts them, or the mode channel."""
+
+    span: tuple[int, int] | None
+    """First and last frame of the scenes it is in, where something goes on outside of the keys."""
+
+    @cached_property
+    def digest(self) -> str:
+        """Differs wherever anything differs that the in-betweens depend on."""
+        summary = hashlib.blake2b(digest_size=16)
+        for row, keys in self.components():
+            summary.update(b"%d" % row)
+            summary.update(keys.raw if isinstance(keys, Keys) else repr(keys).encode())
+        summary.update(self.own.tobytes())
+        summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
+        summary.update(repr((self.order, self.span)).encode())
+        return summary.hexdigest()
+
+    def components(self) -> Iterator[tuple[int, Keys | float]]:
+        """Each component of what is keyed: its row, and its keys or the value it rests at."""
+        for name, channels in self.keyed.items():
+            yield from enumerate(channels, FIRST_ROW[name])
+
+    @cached_property
+    def curves(self) -> list[Keys]:
+        """The channels that have keys."""
+        return [keys for _, keys in self.components() if isinstance(keys, Keys)]
+
+    @cached_property
+    def is_together(self) -> bool:
+        """Whether all channels have their keys on the same frames, and go through them once."""
+        together = self.curves[0].times.tobytes()
+        return self._cyclic is None and all(keys.times.tobytes() == together for keys in self.curves[1:])
+
+    @cached_property
+    def key_frames(self) -> np.ndarray:
+        """Where any of the channels has a key, shape (n,), with the copies that cycles make in the span."""
+        if self.is_together:
+            return self.curves[0].times
+        times = [keys.times for keys in self.curves]
+        if self._cyclic is not None:
+            # A whole round more on both sides, for the span may begin and end in the middle of a segment.
+            margin = max(own[-1] - own[0] for own in times)
+            first = min(self.span[0], *(own[0] for own in times)) - margin
+            last = max(self.span[1], *(own[-1] for own in times)) + margin
+            times = [cyclic_times(keys, keys.times, first, last) for keys in self.curves]
+        frames = np.unique(np.concatenate(times))
+        return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+
+    @cached_property
+    def modes(self) -> np.ndarray:
+        """The mode of each segment, as `MODE_IDS` counts them, shape (n - 1,)."""
+        # A moment into the segment; in a copy that runs backwards that is a moment before its original's end.
+        starts = self.key_frames[:-1] + SAME_FRAME
+        return self.modes_at(starts if self._cyclic is None else cycled(self._cyclic, starts)[0])
+
+    def modes_at(self, frames: np.ndarray) -> np.ndarray:
+        """The modes at these frames, as `MODE_IDS` counts them: each key of the mode channel holds until the next."""
+        if not isinstance(self.mode, Keys):
+            return np.full(len(frames), self.mode)
+        modes = self.mode.values[np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
+        return np.where((modes >= 0) & (modes < len(MODE_IDS)), modes, 0).astype(int)
+
+    @property
+    def is_live(self) -> bool:
+        """Whether there is a segment that is to be filled in otherwise than Blender does."""
+        return len(self.curves) > 0 and len(self.key_frames) > 1 and bool(np.any(self.modes))
+
+    @cached_property
+    def frame_range(self) -> tuple[int, int]:
+        """The first and last whole frame that in-betweens are for."""
+        first, last = self.span or (np.inf, -np.inf)
+        first = min(first, *(float(keys.times[0]) for keys in self.curves))
+        last = max(last, *(float(keys.times[-1]) for keys in self.curves))
+        return math.floor(first), math.ceil(last)
+
+    @cached_property
+    def uniform_scale(self) -> bool:
+        """Whether the scale is animated, and at every key the same along all axes and positive. Else Blender scales."""
+        if SCALE not in self.keyed:
+            return False
+        channels = self.keyed[SCALE]
+        curves = [keys for keys in channels if isinstance(keys, Keys)]
+        keyed = evaluate(curves, [self.key_frames] * len(curves))
+        rows = iter(keyed)
+        x, y, z = (next(rows) if isinstance(keys, Keys) else np.full(len(self.key_frames), keys) for keys in channels)
+        return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether any key eases elastically, which depends on how far a channel goes."""
+        return any(keys.easing is not None and np.any(keys.interpolation == ELASTIC) for keys in self.curves)
+
+    @cached_property
+    def _cyclic(self) -> Keys | None:
+        """The first of the channels that repeat."""
+        return next((keys for keys in self.curves if keys.cycles is not None), None)
