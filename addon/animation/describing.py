@@ -10,14 +10,20 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..motion.eulers import quaternions_from_eulers
 from .fcurves import Keys, cycled, evaluate
 from .filling import recorded
-from .inbetweens import in_betweens
 from .mode_keys import active_slot
-from .sources import MODE_IDS, ROTATION, SAME_FRAME, SCALE, Source
+from .sources import MODE_IDS, REST, SAME_FRAME, Source
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
+
+NEAR = 1e-6
+"""What differs by less is the same."""
+
+MOMENT = 1e-3
+"""A time too short to see, in frames."""
 
 
 @dataclass(frozen=True)
@@ -67,22 +73,19 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         return None
     place = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
     ends = keys[place : place + 2]
-    poses = in_betweens(source, ends, "BLENDER").native
-    alike = float(poses.quaternions[0] @ poses.quaternions[1])
-    channels = {name: _values(source, name, ends) for name in (ROTATION, SCALE)}
-    if source.order is None:
-        long_way = ROTATION in source.keyed and -1.0 + 1e-6 < alike < -1e-6
-    else:
-        long_way = bool(np.any(np.abs(np.diff(channels[ROTATION])) > HALF_TURN))
+    location, rotation, scale = np.split(_components(source, ends), (3, 7))
+    quaternions = quaternions_from_eulers(rotation[:3].T, source.order) if source.order else rotation.T
+    alike = float(quaternions[0] @ quaternions[1]) / float(np.prod(np.linalg.norm(quaternions, axis=1)) or 1.0)
+    swept = np.abs(np.diff(rotation))
     return SegmentFacts(
         first=float(ends[0]),
         last=float(ends[1]),
         key=_deciding_key(source, ends[0]),
         mode=MODE_IDS[source.modes[place]],
         turn=2.0 * float(np.arccos(np.clip(abs(alike), 0.0, 1.0))),
-        distance=float(np.linalg.norm(poses.positions[1] - poses.positions[0])),
-        long_way=long_way,
-        scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(channels[SCALE])) > 1e-6)),
+        distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
+        long_way=bool(np.any(swept > HALF_TURN)) if source.order else -1.0 + NEAR < alike < -NEAR,
+        scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(scale)) > NEAR)),
     )
 
 
@@ -91,18 +94,23 @@ def is_up_to_date(obj: bpy.types.Object, source: Source) -> bool:
     return recorded(active_slot(obj)) == (source.digest if source.is_live else "")
 
 
-def _values(source: Source, name: str, frames: np.ndarray) -> np.ndarray:
-    """What the channels of a property have at these frames, shape (channels, m); no rows where it is not keyed."""
-    channels = source.keyed.get(name, ())
-    rows = [
-        evaluate([keys], [frames])[0] if isinstance(keys, Keys) else np.full(len(frames), keys) for keys in channels
-    ]
-    return np.array(rows).reshape(len(channels), len(frames))
+def _components(source: Source, ends: np.ndarray) -> np.ndarray:
+    """What the channels have at both ends of a segment, shape (10, 2), as seen from within it where cycles jump."""
+    rows = np.repeat(REST[:, None], 2, axis=1)
+    at = ends if _cyclic(source) is None else ends + (MOMENT, -MOMENT)
+    values = iter(evaluate(source.curves, [at] * len(source.curves)))
+    for row, keys in source.components():
+        rows[row] = next(values) if isinstance(keys, Keys) else keys
+    return rows
+
+
+def _cyclic(source: Source) -> Keys | None:
+    return next((keys for keys in source.curves if keys.cycles is not None), None)
 
 
 def _deciding_key(source: Source, start: float) -> float:
     """The key that a segment's mode hangs on."""
-    cyclic = next((keys for keys in source.curves if keys.cycles is not None), None)
+    cyclic = _cyclic(source)
     if cyclic is None:
         return float(start)
     moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]

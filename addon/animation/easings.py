@@ -65,6 +65,7 @@ def elastic(
     array, shape (n,)
         0 at the start and `change` at the end.
     """
+    change, amplitude = np.asarray(change), np.asarray(amplitude)
     period = np.where(period == 0.0, 0.45 if easing == "EASE_IN_OUT" else 0.3, period)
     weak = (amplitude == 0.0) | (amplitude < np.abs(change))
     swing = np.where(weak, change, amplitude)

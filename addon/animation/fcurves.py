@@ -631,8 +631,8 @@ def _search(keys: np.ndarray, moments: np.ndarray) -> np.ndarray:
         going = searching & (low <= high)
         spans[searching & ~going] = low[searching & ~going]
         searching = going
-    spans[moments <= keys[0]] = 0
     spans[moments >= keys[-1]] = len(keys)
+    spans[moments <= keys[0]] = 0
     return spans
 
 

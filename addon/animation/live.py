@@ -40,6 +40,9 @@ class _State:
     frame = 0.0
     """The frame that was last shown."""
 
+    edited = False
+    """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
+
     ranges: ClassVar[dict[int, tuple[int, int]]] = {}
     """First and last frame of each scene when last seen, by session id."""
 
@@ -141,27 +144,27 @@ def _turn() -> Iterator[bool]:
             _State.busy = False
 
 
-def _follow(depsgraph: bpy.types.Depsgraph) -> None:
-    """Refresh what an update may have to do with."""
+def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[bpy.types.Object]:
+    """Refresh after an update in which Actions were edited or not, and say which objects those move."""
     if _State.unseen:
         _look_through()
-    elif depsgraph.id_type_updated("ACTION"):
-        actions = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
-        with _turn() as ours:
-            if ours:
-                _refresh(slots_in(actions))
+    if not edited:
+        return set()
+    slots = slots_in(update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action))
+    with _turn() as ours:
+        if ours:
+            _refresh(slots)
+    return {obj for slot in slots for obj in slot.users}
 
 
-def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float) -> None:
-    """Refresh after an edit of objects or scenes themselves, and notice how an object was posed by hand."""
-    acted = depsgraph.id_type_updated("ACTION")
+def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[bpy.types.Object]) -> None:
+    """Refresh after an edit of scenes, or of other objects than these, and notice how one was posed by hand."""
     for update in depsgraph.updates:
         block = update.id
         if isinstance(block, bpy.types.Object):
             motion = block.rigid_motion
-            if motion.mode != "BLENDER" or any(motion.filled):
-                if not acted:
-                    insertion.notice_pose(block.original, frame)
+            if (motion.mode != "BLENDER" or any(motion.filled)) and block.original not in seen:
+                insertion.notice_pose(block.original, frame)
                 refresh([block.original])
         elif isinstance(block, bpy.types.Scene):
             frames = block.frame_start, block.frame_end
@@ -195,15 +198,23 @@ def _careful(handler: Callable) -> Callable:
 @_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
-    _follow(depsgraph)
+    seen = _follow(depsgraph, edited=depsgraph.id_type_updated("ACTION"))
     if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
-        _follow_objects(depsgraph, _State.frame)
+        _follow_objects(depsgraph, _State.frame, seen)
+
+
+@_careful
+def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
+    graphs = [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
+    _State.edited = any(graph.id_type_updated("ACTION") for graph in graphs)
+    # A script that edits an object and goes on to another frame leaves no trace of which object it was.
+    _State.unseen |= any(graph.id_type_updated("OBJECT") for graph in graphs)
 
 
 @_careful
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     # Edits that nobody has seen yet were made on the frame before this one.
-    _follow(depsgraph)
+    _follow(depsgraph, edited=_State.edited)
     _State.frame = scene.frame_current_final
 
 
@@ -215,6 +226,7 @@ def _on_file(*_: object) -> None:
 
 HANDLERS = {
     "depsgraph_update_post": _on_update,
+    "frame_change_pre": _before_frame,
     "frame_change_post": _on_frame,
     "undo_post": _on_file,
     "redo_post": _on_file,
