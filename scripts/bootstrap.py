@@ -5,6 +5,7 @@
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py benchmark
+    python scripts/bootstrap.py build                       dist/rigid_motion-VERSION.zip, the extension to install
 
 The packages go into .venv/ of this checkout; the first run downloads about 400 MB. What is behind the command goes to
 it: `python scripts/bootstrap.py compare --help` shows the options of compare.
@@ -25,9 +26,10 @@ ROOT = Path(__file__).resolve().parents[1]
 PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 COMMANDS = {
-    "compare": (["scripts/compare.py"], ()),
+    "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "test": (["-m", "pytest"], ("test",)),
-    "benchmark": (["scripts/benchmark.py"], ("test",)),
+    "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
+    "build": ([ROOT / "scripts" / "build_extension.py"], ()),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 
@@ -57,7 +59,8 @@ def main(arguments: list[str]) -> int:
     python = install(blender, _requirements(project, blender, extras))
     if python is None or not _blender_starts(python):
         return 1
-    return subprocess.call([str(python), *run, *rest], cwd=None if command == "compare" else ROOT)
+    # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
+    return subprocess.call([python, *run, *rest], cwd=ROOT if command == "test" else None)
 
 
 def install(blender: str, requirements: list[str]) -> Path | None:

@@ -1,11 +1,14 @@
-"""Blender in the test process: `bpy` first, since `mathutils` comes with it, and an empty file for whoever asks."""
+"""Blender in the test process: `bpy` first, since `mathutils` comes with it; an empty file and the zip for who asks."""
 
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import bpy
 import pytest
+
+from scripts.build_extension import build
 
 EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 
@@ -25,3 +28,9 @@ def empty_file() -> bpy.types.Context:
     """A new file without objects, at factory settings."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy.context
+
+
+@pytest.fixture(scope="session")
+def extension_zip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What users install, built from this checkout."""
+    return build(tmp_path_factory.mktemp("dist"))

@@ -97,7 +97,7 @@ def is_up_to_date(obj: bpy.types.Object, source: Source) -> bool:
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:
     """What the channels have at both ends of a segment, shape (10, 2), as seen from within it where cycles jump."""
     rows = np.repeat(REST[:, None], 2, axis=1)
-    at = ends if _cyclic(source) is None else ends + (MOMENT, -MOMENT)
+    at = ends if _cyclic(source) is None else ends + np.array((MOMENT, -MOMENT))
     values = iter(evaluate(source.curves, [at] * len(source.curves)))
     for row, keys in source.components():
         rows[row] = next(values) if isinstance(keys, Keys) else keys

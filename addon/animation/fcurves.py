@@ -10,6 +10,7 @@ Channels keyed together have these in common, so that their parameters are worke
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -157,8 +158,8 @@ def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elasti
     curves : sequence of Keys
         Without keys a curve is 0 everywhere, as in Blender.
     times : sequence of array, shape (m,)
-        Frames for each curve, sub-frames allowed, best in rising order. Curves that are given the very same array, and
-        that have their keys and handles on the same frames, share the work.
+        Frames for each curve, sub-frames allowed, best in rising order. Curves that have their keys and handles on the
+        same frames, and that are asked for the same frames, share the work.
     unit_elastic : bool
         Take the amplitude of ELASTIC relative to the change of value in its segment, instead of in units of value:
         then curves keyed together have the same timing there too.
@@ -166,7 +167,8 @@ def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elasti
     Returns
     -------
     list of array, shape (m,)
-        NaN where keys or handles are not finite. Some of them may be views of one array.
+        NaN where keys or handles are not finite. Several may be views of one array. What Blender does to the channels
+        of whole numbers and enumerations, which it rounds, is left out.
     """
     if not curves:
         return []
@@ -252,16 +254,16 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
 
 
 def _fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times folded, whether they run backwards, and the change of value from first to last key that is to be added.
+    """Times folded, whether they run backwards, and how many times the change from first to last key is to be added.
 
     All in single precision and in Blender's order of steps: it decides on which side of a key a frame falls.
     """
     folded = times.astype(np.float32)
-    backwards, offset = np.zeros(times.shape, dtype=bool), np.zeros(times.shape)
+    backwards, rounds = np.zeros(times.shape, dtype=bool), np.zeros(times.shape, np.float32)
     if keys.cycles is None or not len(keys.points) or keys.points[0, 0] == keys.points[-1, 0]:
-        return folded.astype(np.float64), backwards, offset
-    (begin, low), (end, high) = keys.points[0], keys.points[-1]
-    period, rise = end - begin, high - low
+        return folded.astype(np.float64), backwards, rounds
+    begin, end = keys.points[0, 0], keys.points[-1, 0]
+    period = end - begin
     for mode, count, outside, side in (
         (keys.cycles.before, keys.cycles.before_count, folded < begin, -1),
         (keys.cycles.after, keys.cycles.after_count, folded > end, 1),
@@ -283,8 +285,8 @@ def _fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
         backwards[where] = reverse
         if mode == "REPEAT_OFFSET":
             whole = np.floor if side < 0 else np.ceil
-            offset[where] = whole(distance / period) * rise
-    return folded.astype(np.float64), backwards, offset
+            rounds[where] = whole(distance / period)
+    return folded.astype(np.float64), backwards, rounds
 
 
 _NO_KEYS = Keys(np.zeros((1, 2), np.float32), np.full(1, CONSTANT, np.int32))
@@ -310,8 +312,8 @@ class _Group:
     order: np.ndarray | None
     """Where the moments belong in the result, shape (m,). None: where they are."""
 
-    offsets: list[np.ndarray] | None
-    """What cycles add to each curve, in the order of the result. None: nothing."""
+    offsets: np.ndarray | None
+    """What cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
 
     def finished(self, values: np.ndarray) -> np.ndarray:
         """Values (c, m) at the moments, as they were asked for."""
@@ -334,8 +336,10 @@ def _groups(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: _Spans) 
         leader, moments = curves[numbers[0]], distinct[request]
         offsets = order = None
         if leader.cycles is not None:
-            offsets = [_fold(curves[number], moments)[2] for number in numbers]
-            moments = _fold(leader, moments)[0]
+            moments, _, rounds = _fold(leader, moments)
+            if np.any(rounds):
+                rises = [curves[number].points[-1, 1] - curves[number].points[0, 1] for number in numbers]
+                offsets = np.multiply.outer(rises, rounds)
         if leader.cycles is not None or not rising[request]:
             order = np.argsort(moments, kind="stable")
             moments = moments[order]
@@ -474,21 +478,10 @@ class _Spans:
                 slopes = _slopes(points[outside], points[neighbours], handles[outside], codes[outside])
                 polynomials[1, outside] = slopes
 
-        easing, settings = np.zeros(len(key), dtype=np.int32), np.zeros((4, len(key)))
-        if any(curve.easing is not None for curve in curves):
-            easing = np.concatenate(
-                [np.zeros_like(curve.interpolation) if curve.easing is None else curve.easing for curve in curves]
-            )[key]
-            back, amplitude, period = np.concatenate(
-                [
-                    np.zeros((3, len(curve.points))) if curve.easing_settings is None else curve.easing_settings
-                    for curve in curves
-                ],
-                axis=1,
-            )[:, key]
-            settings[:] = back, np.ones_like(change) if unit_elastic else change, amplitude, period / duration
-            if not unit_elastic:
-                polynomials[1, moving & (codes == ELASTIC)] = 1.0
+        easing, (back, amplitude, period) = (rows[..., key] for rows in _easings(curves))
+        if not unit_elastic:
+            # The parameter is then how far the value has moved, and no longer what share of its change is done.
+            polynomials[1, moving & (codes == ELASTIC)] = 1.0
 
         start = points[:, 0].astype(np.float64)
         earliest = start - NEAR
@@ -504,7 +497,7 @@ class _Spans:
             side=side,
             interpolation=np.where(moving, codes, CONSTANT),
             easing=easing,
-            settings=settings,
+            settings=np.stack((back, np.ones_like(change) if unit_elastic else change, amplitude, period / duration)),
             bezier=bezier,
             polynomials=polynomials,
             timing=timing.tobytes(),
@@ -569,6 +562,16 @@ class _Spans:
                 parameters[here] = elastic(easing, u, *swing)
             else:
                 parameters[here] = ease(INTERPOLATIONS[code], easing, u, back)
+
+
+def _easings(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray]:
+    """Easings and their settings for the keys of all curves, shapes (n,) and (3, n); zeros where none were read."""
+    counts = [len(curve.points) for curve in curves]
+    easing, settings = np.zeros(sum(counts), dtype=np.int32), np.zeros((3, sum(counts)))
+    for curve, end, count in zip(curves, itertools.accumulate(counts), counts, strict=True):
+        if curve.easing is not None:
+            easing[end - count : end], settings[:, end - count : end] = curve.easing, curve.easing_settings
+    return easing, settings
 
 
 def _cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -136,7 +136,8 @@ def _motion(
     counts, on_keys, owners = _counts(sources, frames)
     elastic = any(source.is_elastic for source in sources)
     timing = _sampled(samples, frames, unit_elastic=True) if elastic else native
-    progress = _progress(timing, start, end, counts, segments)
+    bounds = _ends(segments, unit_elastic=True) if elastic else (start, end)
+    progress = _progress(timing, *bounds, counts, segments)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
 
     _turn_into_quaternions(native, samples)
@@ -176,7 +177,7 @@ def _sampled(
     return rows
 
 
-def _ends(segments: list[tuple[Source, slice]]) -> tuple[np.ndarray, np.ndarray]:
+def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """The channels' own values where each segment starts and where it ends, rows as `_sampled` has them."""
     start, end = np.empty((2, _height(segments), segments[-1][1].stop))
     places, curves, times = [], [], []
@@ -192,7 +193,8 @@ def _ends(segments: list[tuple[Source, slice]]) -> tuple[np.ndarray, np.ndarray]
                 places.append((row, place))
                 curves.append(keys)
                 times.append(source.key_frames)
-    for place, keys, at, values in zip(places, curves, times, evaluate(curves, times), strict=True):
+    sampled = evaluate(curves, times, unit_elastic=unit_elastic)
+    for place, keys, at, values in zip(places, curves, times, sampled, strict=True):
         start[place], end[place] = values[:-1], values[1:]
         # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its first.
         jumps = _jumps(keys, at)

@@ -158,4 +158,4 @@ def _set_key(fcurve: bpy.types.FCurve, frame: float, value: int, *, selected: bo
     """A key that holds, selected as the key of the pose is, so that both move together."""
     key = fcurve.keyframe_points.insert(frame, value)
     key.interpolation = "CONSTANT"
-    key.select_control_point = selected
+    key.select_control_point = key.select_left_handle = key.select_right_handle = selected

@@ -34,6 +34,12 @@ def test_an_unknown_command_is_refused_with_the_known_ones():
     assert "compare, test, benchmark" in done.stderr
 
 
+def test_every_script_is_found_from_whatever_folder():
+    scripts = [run[0] for run, _ in bootstrap.COMMANDS.values() if run[0] != "-m"]
+    assert scripts
+    assert all(Path(script).is_absolute() and Path(script).is_file() for script in scripts)
+
+
 @pytest.mark.parametrize("given", [["--blender", "2.79"], ["--blender"]])
 def test_a_blender_that_does_not_fit_the_python_is_refused(given):
     done = run("test", *given)

@@ -1,0 +1,32 @@
+"""What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
+
+targets      which objects and keys an editor means     operators    what can be done to them
+menus        entries in Blender's menus, and the pies   keymap       the pies' shortcut
+panels       the sidebar                                preferences  of the extension
+overlay      paths in the viewport                      look         how they look
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from . import keymap, menus, operators, overlay, panels, preferences
+
+CLASSES = (*preferences.CLASSES, *operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
+
+
+def register() -> None:
+    overlay.register()
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+    menus.register()
+    keymap.register()
+    preferences.apply()
+
+
+def unregister() -> None:
+    keymap.unregister()
+    menus.unregister()
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)
+    overlay.unregister()

@@ -1,0 +1,142 @@
+"""Rigid Motion in Blender's menus, and its pie menus.
+
+In the Dope Sheet and the Graph Editor modes are for the selected keys, as interpolation is; in the viewport for the
+whole object. The mode that is chosen at present is ticked, for the active object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from .targets import CURRENT, SELECTED, WHOLE, modes_meant
+from .wording import LABELS
+
+
+def _draw_modes(
+    context: bpy.types.Context, layout: bpy.types.UILayout, scope: str, modes: Iterable[str] = LABELS
+) -> None:
+    present = modes_meant(context, context.object, scope)
+    for mode in modes:
+        # One tick where all is one; dots where modes are mixed.
+        icon = "BLANK1" if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
+        properties = layout.operator("rigid_motion.set_mode", text=LABELS[mode], icon=icon)
+        properties.mode, properties.on = mode, scope
+
+
+def _draw_rest(layout: bpy.types.UILayout, pie: str) -> None:
+    layout.separator()
+    layout.operator("rigid_motion.bake", text="Bake to Keys...")
+    layout.operator("rigid_motion.unbake")
+    layout.separator()
+    layout.operator("rigid_motion.clear")
+    layout.operator("rigid_motion.refresh")
+    layout.separator()
+    layout.operator("wm.call_menu_pie", text="Pie Menu").name = pie
+
+
+class RIGID_MOTION_MT_object(bpy.types.Menu):
+    bl_label = "Rigid Motion"
+    bl_description = "How the selected objects move from key to key"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        _draw_modes(context, layout, WHOLE)
+        layout.separator()
+        layout.menu(RIGID_MOTION_MT_current.__name__)
+        _draw_rest(layout, RIGID_MOTION_MT_pie_object.__name__)
+
+
+class RIGID_MOTION_MT_keys(bpy.types.Menu):
+    bl_label = "Rigid Motion"
+    bl_description = "How objects move on from the selected keys"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        _draw_modes(context, layout, SELECTED)
+        layout.separator()
+        layout.menu(RIGID_MOTION_MT_whole.__name__)
+        _draw_rest(layout, RIGID_MOTION_MT_pie_keys.__name__)
+
+
+class RIGID_MOTION_MT_current(bpy.types.Menu):
+    bl_label = "Current Segment"
+    bl_description = "How the selected objects move between the two keys that the playhead is between"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_modes(context, self.layout, CURRENT)
+
+
+class RIGID_MOTION_MT_whole(bpy.types.Menu):
+    bl_label = "Whole Object"
+    bl_description = "One mode for all segments of the objects that are shown"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_modes(context, self.layout, WHOLE)
+
+
+class _Pie:
+    """Blender's own in-betweens on the left, the screw on the right, what is like each other side by side."""
+
+    scope: str
+
+    def draw(self, context: bpy.types.Context) -> None:
+        pie = self.layout.menu_pie()
+        pie.operator_context = "INVOKE_REGION_WIN"
+        _draw_modes(context, pie, self.scope, ("BLENDER", "dq_sclerp"))
+        pie.operator("rigid_motion.bake", text="Bake to Keys...")
+        _draw_modes(context, pie, self.scope, ("lerp_slerp", "pga_lerp", "pga_slerp", "cga_lerp", "cga_slerp"))
+
+
+class RIGID_MOTION_MT_pie_object(_Pie, bpy.types.Menu):
+    bl_label = "Rigid Motion of Object"
+    scope = WHOLE
+
+
+class RIGID_MOTION_MT_pie_keys(_Pie, bpy.types.Menu):
+    bl_label = "Rigid Motion of Keys"
+    scope = SELECTED
+
+
+CLASSES = (
+    RIGID_MOTION_MT_object,
+    RIGID_MOTION_MT_keys,
+    RIGID_MOTION_MT_current,
+    RIGID_MOTION_MT_whole,
+    RIGID_MOTION_MT_pie_object,
+    RIGID_MOTION_MT_pie_keys,
+)
+
+
+def _draw_object(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.menu(RIGID_MOTION_MT_object.__name__)
+
+
+def _draw_keys(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.menu(RIGID_MOTION_MT_keys.__name__)
+
+
+ENTRIES = {
+    "DOPESHEET_MT_key": _draw_keys,
+    "DOPESHEET_MT_context_menu": _draw_keys,
+    "GRAPH_MT_key": _draw_keys,
+    "GRAPH_MT_context_menu": _draw_keys,
+    "VIEW3D_MT_object_animation": _draw_object,
+    "VIEW3D_MT_object_context_menu": _draw_object,
+}
+"""Blender's menus, and what is appended to each."""
+
+
+def register() -> None:
+    for menu, draw in ENTRIES.items():
+        getattr(bpy.types, menu).append(draw)
+
+
+def unregister() -> None:
+    for menu, draw in ENTRIES.items():
+        getattr(bpy.types, menu).remove(draw)

@@ -1,0 +1,31 @@
+"""The overlay of the 3D viewport: the ways of the selected objects, Blender's own beside that of a rigid-motion mode.
+
+settings    what to show                    points      where the ways lead, as arrays
+cache       what is worked out already      drawing     lines and dots on the screen
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import PointerProperty
+
+from . import cache, drawing
+from .settings import RigidMotionOverlay, draw_settings, draw_toggle
+
+__all__ = ["draw_settings", "register", "unregister"]
+
+
+def register() -> None:
+    bpy.utils.register_class(RigidMotionOverlay)
+    bpy.types.Scene.rigid_motion_overlay = PointerProperty(type=RigidMotionOverlay)
+    bpy.types.VIEW3D_PT_overlay_object.append(draw_toggle)
+    cache.register()
+    drawing.register()
+
+
+def unregister() -> None:
+    drawing.unregister()
+    cache.unregister()
+    bpy.types.VIEW3D_PT_overlay_object.remove(draw_toggle)
+    del bpy.types.Scene.rigid_motion_overlay
+    bpy.utils.unregister_class(RigidMotionOverlay)

@@ -1,0 +1,120 @@
+"""Paths that were worked out already, and which of them an edit may have made wrong.
+
+Blender's handlers tell which objects and Actions were edited. Their paths are looked at again when they are next drawn,
+and worked out anew where the digest of the source, or something else that they depend on, is another one. So a frame
+that is merely played, or looked at from elsewhere, costs no more than looking paths up.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...animation import key_frames
+from ...animation.mode_keys import source_of
+from .points import Path, axis_length_of, trace
+
+SPARE = 64
+"""How many paths are kept that are not drawn any more."""
+
+
+@dataclass
+class _Entry:
+    path: Path | None
+    digest: tuple
+    """Of all that the path depends on."""
+
+    settings: tuple
+    """The part of it that is the scene's."""
+
+    action: int
+    """Session id of the Action that the path was read from, 0 for none."""
+
+    stale: bool = False
+
+
+_entries: OrderedDict[int, _Entry] = OrderedDict()
+"""By the session id of the object; those drawn last come last."""
+
+
+def path_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> Path | None:
+    """The path of an object, as the overlay of the scene is set.
+
+    None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
+    """
+    overlay = scene.rigid_motion_overlay
+    settings = (overlay.mode, overlay.tick_step, overlay.axes_size, scene.frame_start, scene.frame_end)
+    entry = _entries.get(obj.session_uid)
+    if entry is None or entry.stale or entry.settings != settings:
+        entry = _entries[obj.session_uid] = _read(obj, settings, entry)
+    _entries.move_to_end(obj.session_uid)
+    return entry.path
+
+
+def keep_only(drawn: int) -> None:
+    """Let go of paths that were not drawn for long, where this many were drawn just now."""
+    while len(_entries) > drawn + SPARE:
+        _entries.popitem(last=False)
+
+
+def _read(obj: bpy.types.Object, settings: tuple, before: _Entry | None) -> _Entry:
+    action = obj.animation_data.action if obj.animation_data else None
+    entry = _Entry(None, (), settings, action.session_uid if action else 0)
+    try:
+        source = source_of(obj)
+        if source is not None:
+            mode, tick_step, axes_size, *_ = settings
+            selected, axis_length = key_frames(obj, selected=True), axes_size * axis_length_of(obj, source)
+            entry.digest = (source.digest, selected.tobytes(), axis_length, settings)
+            if before is not None and before.digest == entry.digest:
+                entry.path = before.path
+            else:
+                entry.path = trace(source, None if mode == "CHOSEN" else mode, tick_step, axis_length, selected)
+    except ValueError:
+        # Refused. The panel says why.
+        pass
+    return entry
+
+
+@persistent
+def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if _entries:
+        edited = {update.id.original.session_uid for update in depsgraph.updates}
+        for uid, entry in _entries.items():
+            entry.stale |= uid in edited or entry.action in edited
+
+
+@persistent
+def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    # To Blender, whatever is animated was updated on every frame. Unless it plays, a script may really have edited it.
+    windows = bpy.context.window_manager.windows
+    if not any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows):
+        _on_update(scene, depsgraph)
+
+
+@persistent
+def _on_file(*_: object) -> None:
+    _entries.clear()
+
+
+HANDLERS = {
+    "depsgraph_update_post": _on_update,
+    "frame_change_post": _on_frame,
+    "undo_post": _on_file,
+    "redo_post": _on_file,
+    "load_post": _on_file,
+}
+
+
+def register() -> None:
+    for name, handler in HANDLERS.items():
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister() -> None:
+    for name, handler in HANDLERS.items():
+        getattr(bpy.app.handlers, name).remove(handler)
+    _entries.clear()

@@ -1,0 +1,244 @@
+"""Drawing paths in the 3D viewport: points, once computed, become batches on the graphics card, and stay there.
+
+Batches are in the space of the objects' channels; from there into the world it is a matrix at drawing, so a parent that
+moves costs nothing. Colours are as on the screen, widths in pixels at a resolution scale of 1.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import bpy
+import gpu
+import numpy as np
+from mathutils import Vector
+
+from ...animation.describing import frame_in_action
+from ..look import DEFAULT_LOOK, Color
+from ..preferences import preferences
+from . import cache
+from .points import TICKS, Path, space_of, thinned
+from .settings import RigidMotionOverlay, are_paths_shown
+
+log = logging.getLogger(__package__)
+
+OUTLINE: Color = (0.0, 0.0, 0.0, 1.0)
+"""Around lines and dots, so that they are told from any background."""
+
+WHITE: Color = (1.0, 1.0, 1.0, 1.0)
+"""Keys that are not selected, as in the Dope Sheet."""
+
+TICK, KEY, NOW = 6.0, 10.0, 12.0
+"""Diameters of dots, outline included: ticks, keys, and where the object is on the current frame."""
+
+AXIS_OPACITY = 0.8
+
+
+@functools.cache
+def _dot_shader() -> gpu.types.GPUShader:
+    """Round dots with an outline. Those of Blender are square."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("MAT4", "ModelViewProjectionMatrix")
+    info.push_constant("VEC4", "color")
+    info.push_constant("VEC4", "outline")
+    info.push_constant("FLOAT", "size")
+    info.push_constant("FLOAT", "border")
+    # Blender sets this where the screen turns linear colours into those it shows.
+    info.push_constant("BOOL", "srgbTarget")
+    info.vertex_in(0, "VEC3", "pos")
+    info.fragment_out(0, "VEC4", "fragColor")
+    info.vertex_source(
+        """
+        void main()
+        {
+          gl_Position = ModelViewProjectionMatrix * vec4(pos, 1.0);
+          gl_PointSize = size + 1.0;
+        }
+        """
+    )
+    # A pixel that the edge runs through is covered in part.
+    info.fragment_source(
+        """
+        void main()
+        {
+          float inside = 0.5 * size - length(gl_PointCoord - vec2(0.5)) * (size + 1.0);
+          fragColor = mix(outline, color, clamp(inside - border + 0.5, 0.0, 1.0));
+          fragColor.a *= clamp(inside + 0.5, 0.0, 1.0);
+          if (srgbTarget) {
+            vec3 bent = pow((fragColor.rgb + 0.055) / 1.055, vec3(2.4));
+            fragColor.rgb = mix(fragColor.rgb / 12.92, bent, step(vec3(0.04045), fragColor.rgb));
+          }
+        }
+        """
+    )
+    return gpu.shader.create_from_info(info)
+
+
+@dataclass(frozen=True)
+class _Batches:
+    """A path on the graphics card; None where there is nothing of the kind."""
+
+    native: gpu.types.GPUBatch
+    wanted: gpu.types.GPUBatch | None
+    native_ticks: gpu.types.GPUBatch | None
+    wanted_ticks: gpu.types.GPUBatch | None
+    axes: tuple[gpu.types.GPUBatch | None, ...]
+    keys: gpu.types.GPUBatch | None
+    selected: gpu.types.GPUBatch | None
+
+    @classmethod
+    def of(cls, path: Path) -> _Batches:
+        return cls(
+            native=_batch("LINE_STRIP", thinned(path.native)),
+            wanted=None if path.wanted is None else _batch("LINE_STRIP", thinned(path.wanted)),
+            native_ticks=_batch("POINTS", path.native_ticks),
+            wanted_ticks=_batch("POINTS", path.wanted_ticks),
+            axes=tuple(_batch("LINES", path.axes[:, axis].reshape(-1, 3)) for axis in range(3)),
+            keys=_batch("POINTS", path.keys[~path.selected]),
+            selected=_batch("POINTS", path.keys[path.selected]),
+        )
+
+
+_batches: WeakKeyDictionary[Path, _Batches] = WeakKeyDictionary()
+
+
+def _batch(kind: str, points: np.ndarray | list | None) -> gpu.types.GPUBatch | None:
+    if points is None or not len(points):
+        return None
+    vertices = gpu.types.GPUVertBuf(_vertex_format(), len(points))
+    vertices.attr_fill("pos", np.ascontiguousarray(points, dtype=np.float32))
+    return gpu.types.GPUBatch(type=kind, buf=vertices)
+
+
+@functools.cache
+def _vertex_format() -> gpu.types.GPUVertFormat:
+    form = gpu.types.GPUVertFormat()
+    form.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
+    return form
+
+
+class _Pen:
+    """Draws batches in one redraw of one viewport."""
+
+    def __init__(self, context: bpy.types.Context) -> None:
+        self.lines = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+        self.dots = _dot_shader()
+        self.look = preferences() or DEFAULT_LOOK
+        theme = context.preferences.themes[0].user_interface
+        self.axis_colors = [(*color, AXIS_OPACITY) for color in (theme.axis_x, theme.axis_y, theme.axis_z)]
+        self.size = context.region.width, context.region.height
+        self.scale = context.preferences.system.ui_scale
+
+    def line(self, batch: gpu.types.GPUBatch | None, color: Color, width: float) -> None:
+        if batch:
+            self.lines.uniform_float("viewportSize", self.size)
+            self.lines.uniform_float("lineWidth", width * self.scale)
+            self.lines.uniform_float("color", color)
+            batch.draw(self.lines)
+
+    def outlined_line(self, batch: gpu.types.GPUBatch | None, color: Color, width: float) -> None:
+        self.line(batch, OUTLINE, width + 2.0)
+        self.line(batch, color, width)
+
+    def dot(
+        self,
+        batch: gpu.types.GPUBatch | None,
+        color: Color,
+        diameter: float,
+        outline: Color = OUTLINE,
+        border: float = 1.0,
+    ) -> None:
+        if batch:
+            self.dots.uniform_float("color", color)
+            self.dots.uniform_float("outline", outline)
+            self.dots.uniform_float("size", diameter * self.scale)
+            self.dots.uniform_float("border", border * self.scale)
+            batch.draw(self.dots)
+
+
+def draw_paths() -> None:
+    """Draw the paths of the selected objects in the viewport that is being drawn. It never raises."""
+    global _complaint
+    try:
+        if are_paths_shown(bpy.context):
+            _draw(bpy.context)
+    except Exception as problem:
+        # Once: the next redraw is a moment away.
+        if repr(problem) != _complaint:
+            _complaint = repr(problem)
+            log.exception("The paths could not be drawn")
+
+
+def _draw(context: bpy.types.Context) -> None:
+    scene, depsgraph, selected = context.scene, context.view_layer.depsgraph, context.selected_objects
+    settings = scene.rigid_motion_overlay
+    paths = [(obj, path) for obj in selected if (path := cache.path_of(obj, scene)) is not None]
+    cache.keep_only(len(selected))
+    if not paths:
+        return
+    pen = _Pen(context)
+    native_now, wanted_now = [], []
+    gpu.state.blend_set("ALPHA")
+    gpu.state.depth_test_set("NONE")
+    gpu.state.program_point_size_set(True)
+    try:
+        for obj, path in paths:
+            space = space_of(obj, depsgraph)
+            with gpu.matrix.push_pop():
+                gpu.matrix.multiply_matrix(space)
+                _draw_path(pen, path, settings)
+            native, wanted = path.at(frame_in_action(obj, scene.frame_current_final))
+            if settings.show_native or wanted is None:
+                native_now.append(space @ Vector(native))
+            if wanted is not None:
+                wanted_now.append(space @ Vector(wanted))
+        pen.dot(_batch("POINTS", native_now), pen.look.native_color, NOW)
+        pen.dot(_batch("POINTS", wanted_now), pen.look.mode_color, NOW)
+    finally:
+        gpu.state.program_point_size_set(False)
+        gpu.state.blend_set("NONE")
+
+
+def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
+    batches = _batches.get(path)
+    if batches is None:
+        batches = _batches[path] = _Batches.of(path)
+    look = pen.look
+    if settings.show_axes:
+        for batch, color in zip(batches.axes, pen.axis_colors, strict=True):
+            pen.line(batch, color, 0.75 * look.line_width)
+    if settings.show_native or batches.wanted is None:
+        pen.outlined_line(batches.native, look.native_color, 0.6 * look.line_width)
+        pen.dot(batches.native_ticks, OUTLINE, TICK, look.native_color, 1.25)
+    if batches.wanted is not None:
+        pen.outlined_line(batches.wanted, look.mode_color, look.line_width)
+        pen.dot(batches.wanted_ticks, look.tick_color, TICK)
+    diameter = KEY if len(path.keys) <= TICKS else TICK
+    pen.dot(batches.keys, WHITE, diameter)
+    pen.dot(batches.selected, look.key_color, diameter)
+
+
+_handle: object | None = None
+"""What Blender knows the overlay by."""
+
+_complaint = ""
+"""What was wrong last."""
+
+
+def register() -> None:
+    global _handle
+    if not bpy.app.background:
+        _handle = bpy.types.SpaceView3D.draw_handler_add(draw_paths, (), "WINDOW", "POST_VIEW")
+
+
+def unregister() -> None:
+    global _handle
+    if _handle is not None:
+        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
+        _handle = None
+    _batches.clear()
+    _dot_shader.cache_clear()
+    _vertex_format.cache_clear()

@@ -1,0 +1,217 @@
+"""The points of a path: where an object comes through, natively and in a mode, as arrays for the overlay to draw.
+
+Points are (n, 3), in the space of the object's channels, its own delta transforms included; `space_of` leads from there
+into the world. Frames are those of the Action. No window and no graphics card is needed here.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...animation.inbetweens import in_betweens
+from ...animation.sources import Source
+from ...motion import Poses
+from ...motion.quaternions import rotate
+
+SMOOTH = 256
+"""A path gets this many samples, or one on every frame where those are more: bends look round then."""
+
+FINEST = 16
+"""The most samples in a frame."""
+
+MOST = 8192
+"""About the most samples, and the most ticks, of one path. Where it has more frames, samples are further apart."""
+
+TICKS, AXES = 60, 20
+"""About the most ticks of a path where nobody asked for more, and the most of them with axes."""
+
+
+FINENESS = 5000
+"""How many times its width a line may be wide on the screen until corners show."""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The way of one object's origin, as Blender's own in-betweens have it and as a mode has it."""
+
+    frames: np.ndarray
+    """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
+
+    native: np.ndarray
+    """Where it is on these frames if Blender fills in, shape (m, 3)."""
+
+    wanted: np.ndarray | None
+    """Where it is if the mode does, shape (m, 3). None where there is no other mode than Blender's."""
+
+    keys: np.ndarray
+    """The keys, shape (k, 3). They are the same in all modes."""
+
+    selected: np.ndarray
+    """Which of the keys are selected, shape (k,)."""
+
+    native_ticks: np.ndarray
+    """Where Blender has it at evenly spaced frames, shape (t, 3)."""
+
+    wanted_ticks: np.ndarray | None
+    """Where the mode has it on the same frames, shape (t, 3)."""
+
+    axes: np.ndarray
+    """How it is turned at some ticks, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
+
+    def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
+        """Where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
+        after = min(max(int(self.frames.searchsorted(frame)), 1), len(self.frames) - 1)
+        first, last = self.frames[after - 1], self.frames[after]
+        share = min(max((frame - first) / (last - first), 0.0), 1.0)
+
+        def point(line: np.ndarray) -> np.ndarray:
+            return line[after - 1] + share * (line[after] - line[after - 1])
+
+        return point(self.native), None if self.wanted is None else point(self.wanted)
+
+
+def trace(
+    source: Source,
+    mode: str | None = None,
+    tick_step: int = 0,
+    axis_length: float = 1.0,
+    selected: np.ndarray | None = None,
+) -> Path | None:
+    """The path of a source, None where it has fewer than two keys.
+
+    Parameters
+    ----------
+    source : Source
+    mode : str, optional
+        One of `MODE_IDS`, to see what it would do. None for the modes that the segments have.
+    tick_step : int
+        Frames from tick to tick, which are on multiples of it. 0 for as many as can be read.
+    axis_length : float
+        Of the axes at the ticks, in the unit of the channels, at scale 1.
+    selected : array, shape (n,), optional
+        The frames of the keys that are selected.
+
+    Raises
+    ------
+    ValueError
+        Where the keys make no motion.
+    """
+    if len(source.key_frames) < 2:
+        return None
+    first, last = source.frame_range
+    keys = np.unique(np.concatenate([keys.times for keys in source.curves]))
+    ticks = tick_frames(first, last, tick_step)
+    samples = np.unique(np.concatenate((sample_frames(first, last), keys)))
+    frames = np.union1d(samples, ticks)
+    motion = in_betweens(source, frames, mode)
+    on_samples, on_keys, on_ticks, on_axes = (
+        np.searchsorted(frames, some) for some in (samples, keys, ticks, axis_frames(ticks))
+    )
+    is_native = not source.is_live if mode is None else mode == "BLENDER"
+    native, wanted = motion.native.positions, motion.wanted.positions
+    return Path(
+        frames=samples,
+        native=native[on_samples],
+        wanted=None if is_native else wanted[on_samples],
+        keys=native[on_keys],
+        selected=np.isin(keys, () if selected is None else selected),
+        native_ticks=native[on_ticks],
+        wanted_ticks=None if is_native else wanted[on_ticks],
+        axes=_axes((motion.native if is_native else motion.wanted)[on_axes], axis_length),
+    )
+
+
+def sample_frames(first: int, last: int) -> np.ndarray:
+    """Evenly spaced frames from the first to the last whole one: close enough for a path to look round."""
+    length = last - first
+    if length > MOST:
+        return np.append(np.arange(first, last, -(-length // MOST)), last).astype(np.float64)
+    # Powers of two, so that whole frames are hit exactly.
+    finer = min(2 ** int(np.ceil(np.log2(max(SMOOTH / length, 1.0)))), FINEST)
+    return first + np.arange(length * finer + 1) / finer
+
+
+def tick_frames(first: int, last: int, step: int = 0) -> np.ndarray:
+    """The multiples of a step, the same for all objects, from the first frame to the last. 0 chooses 1, 2, 5, 10..."""
+    length = last - first
+    step = max(step, -(-length // MOST)) if step else _round_step(length, TICKS)
+    return np.arange(-(-first // step), last // step + 1.0) * step
+
+
+def axis_frames(ticks: np.ndarray) -> np.ndarray:
+    """Those of the ticks that have axes."""
+    if len(ticks) < 2:
+        return ticks
+    step = ticks[1] - ticks[0]
+    return ticks[ticks % (step * _round_step(len(ticks), AXES)) == 0.0]
+
+
+def _round_step(length: int, most: int) -> int:
+    """The least of 1, 2, 5, 10, 20... that a length has at most this many of."""
+    return next(
+        digit * power
+        for power in (10**n for n in itertools.count())
+        for digit in (1, 2, 5)
+        if length <= most * digit * power
+    )
+
+
+def _axes(poses: Poses, length: float) -> np.ndarray:
+    """Both ends of the local axes at each pose, shape (n, 3, 2, 3)."""
+    lengths = np.full(len(poses), length) if poses.scales is None else length * poses.scales
+    strokes = lengths[:, None, None] * rotate(poses.quaternions[:, None], np.eye(3))
+    starts = np.broadcast_to(poses.positions[:, None], strokes.shape)
+    return np.stack((starts, starts + strokes), axis=2)
+
+
+def thinned(line: np.ndarray) -> np.ndarray:
+    """The points of a line without those that nobody would miss, shape (fewer, 3).
+
+    Every other point goes where the line stays within 1/`FINENESS` of its extent, and so on until all have to stay.
+    """
+    if len(line) < 3:
+        return line
+    tolerance = float(np.ptp(line, axis=0).max()) / FINENESS
+    while True:
+        start, middle, end = line[:-2:2], line[1:-1:2], line[2::2]
+        chord, offset = end - start, middle - start
+        length = np.einsum("ij,ij->i", chord, chord)
+        share = np.einsum("ij,ij->i", chord, offset) / np.where(length > 0.0, length, 1.0)
+        away = offset - np.clip(share, 0.0, 1.0)[:, None] * chord
+        stays = np.ones(len(line), dtype=bool)
+        stays[1:-1:2] = np.einsum("ij,ij->i", away, away) > tolerance * tolerance
+        if stays.all():
+            return line
+        line = line[stays]
+
+
+def axis_length_of(obj: bpy.types.Object, source: Source) -> float:
+    """How long to draw an object's local axes: half as long as it is. At scale 1, where the source has a scale."""
+    if obj.type == "EMPTY":
+        size = np.full(3, obj.empty_display_size)
+    elif obj.type == "CAMERA":
+        size = np.full(3, obj.data.display_size)
+    else:
+        size = 0.5 * np.ptp(np.array(obj.bound_box), axis=0)
+    if not source.uniform_scale:
+        size *= np.abs(np.array(obj.scale) * np.array(obj.delta_scale))
+    return float(size.max()) or 1.0
+
+
+def space_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """From the space of an object's channels into the world, as its parent is on the current frame.
+
+    For a parent that is an object: that one's evaluated matrix, and the inverse at parenting. For a bone, vertices or a
+    lattice: what takes the object's evaluated location, rotation and scale to where it is seen, constraints included.
+    """
+    if obj.parent is None:
+        return Matrix.Identity(4)
+    if obj.parent_type == "OBJECT":
+        return obj.parent.evaluated_get(depsgraph).matrix_world @ obj.matrix_parent_inverse
+    evaluated = obj.evaluated_get(depsgraph)
+    return evaluated.matrix_world @ evaluated.matrix_basis.inverted_safe()

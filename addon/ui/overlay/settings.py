@@ -1,0 +1,86 @@
+"""What the overlay shows: settings of the scene, and where an animator finds them."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ...animation.properties import MODE_ITEMS
+
+MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
+
+
+class RigidMotionOverlay(bpy.types.PropertyGroup):
+    show_paths: BoolProperty(
+        name="Rigid Motion Paths",
+        description="Draw the ways of the selected objects, with their parents as they are on the current frame: how "
+        "Blender's own in-betweens run beside those of a rigid-motion mode",
+        options=set(),
+    )
+    mode: EnumProperty(
+        name="Mode",
+        description="The mode to draw. Another one than keyed shows what it would do, and changes nothing",
+        items=MODE_CHOICES,
+        options=set(),
+    )
+    show_native: BoolProperty(
+        name="Blender's Path",
+        description="Draw also how Blender's own in-betweens run",
+        default=True,
+        options=set(),
+    )
+    show_axes: BoolProperty(
+        name="Axes",
+        description="Draw how the object is turned on its way, by its local axes at some of the ticks",
+        default=True,
+        options=set(),
+    )
+    axes_size: FloatProperty(
+        name="Size",
+        description="Length of the axes. At 1 they are half as long as the object is",
+        default=1.0,
+        min=0.01,
+        soft_max=5.0,
+        options=set(),
+    )
+    tick_step: IntProperty(
+        name="Frame Step",
+        description="Frames from one tick to the next. With 0 there are as many ticks as can be read",
+        min=0,
+        soft_max=100,
+        options=set(),
+    )
+
+
+def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The settings of the overlay, for a panel."""
+    settings = context.scene.rigid_motion_overlay
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    layout.prop(settings, "show_paths", text="Show")
+    column = layout.column()
+    column.active = settings.show_paths
+    if settings.show_paths and not are_paths_shown(context):
+        column.label(text="Hidden by the Viewport Overlays", icon="INFO")
+    column.prop(settings, "mode")
+    column.prop(settings, "tick_step")
+    column.prop(settings, "show_native")
+    row = column.row(heading="Axes")
+    row.prop(settings, "show_axes", text="")
+    size = row.row()
+    size.active = settings.show_axes
+    size.prop(settings, "axes_size", text="")
+
+
+def draw_toggle(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
+    """The overlay's place among Blender's own, in the viewport's Overlays pop-over."""
+    column = panel.layout.column()
+    column.active = context.space_data.overlay.show_overlays and context.space_data.overlay.show_motion_paths
+    column.prop(context.scene.rigid_motion_overlay, "show_paths")
+
+
+def are_paths_shown(context: bpy.types.Context) -> bool:
+    """Whether the scene, and the viewport if the context is in one, show paths."""
+    overlay = getattr(context.space_data, "overlay", None)
+    in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)
+    return in_view and context.scene.rigid_motion_overlay.show_paths

@@ -1,0 +1,96 @@
+"""The preferences of the extension. They go with Blender's own, and not with a file."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
+
+from .. import animation
+from ..animation.properties import MODE_ITEMS
+from . import keymap
+from .look import DEFAULT_LOOK
+
+EXTENSION = __package__.rpartition(".")[0]
+"""What Blender knows the extension by: the package that this one is in."""
+
+DEFAULT_MODE = "dq_sclerp"
+
+
+def preferences() -> RigidMotionPreferences | None:
+    """The preferences, None while the package is registered without being an extension, as in tests of a checkout."""
+    addon = bpy.context.preferences.addons.get(EXTENSION)
+    return addon.preferences if addon is not None else None
+
+
+def default_mode() -> str:
+    """The mode to take where nobody named one."""
+    chosen = preferences()
+    return chosen.default_mode if chosen is not None else DEFAULT_MODE
+
+
+def apply() -> None:
+    """Act upon the preferences as they were read from Blender's."""
+    chosen = preferences()
+    animation.set_enabled(chosen is None or chosen.live_update)
+
+
+def _on_live_update(chosen: RigidMotionPreferences, _context: bpy.types.Context) -> None:
+    animation.set_enabled(chosen.live_update)
+    if chosen.live_update:
+        animation.refresh()
+
+
+def _color(name: str, description: str, default: tuple[float, float, float, float]) -> object:
+    return FloatVectorProperty(
+        name=name, description=description, size=4, subtype="COLOR_GAMMA", default=default, min=0.0, max=1.0
+    )
+
+
+class RigidMotionPreferences(bpy.types.AddonPreferences):
+    bl_idname = EXTENSION
+
+    default_mode: EnumProperty(
+        name="Default Mode",
+        description="What Set Rigid Motion Mode takes where no mode is named: in Search, by a shortcut of your own",
+        items=MODE_ITEMS,
+        default=DEFAULT_MODE,
+    )
+    live_update: BoolProperty(
+        name="Live Update",
+        description="Follow every edit at once. Otherwise in-betweens stay as they are until Refresh In-Betweens",
+        default=True,
+        update=_on_live_update,
+    )
+    native_color: _color(
+        "Blender's Path", "Color of the path as Blender's own in-betweens have it", DEFAULT_LOOK.native_color
+    )
+    mode_color: _color("Mode's Path", "Color of the path as the mode has it", DEFAULT_LOOK.mode_color)
+    key_color: _color("Keys", "Color of the keys on a path", DEFAULT_LOOK.key_color)
+    tick_color: _color("Ticks", "Color of the marks that are evenly timed along a path", DEFAULT_LOOK.tick_color)
+    line_width: FloatProperty(
+        name="Line Width",
+        description="Width of the paths",
+        default=DEFAULT_LOOK.line_width,
+        min=1.0,
+        max=10.0,
+        precision=1,
+        subtype="PIXEL",
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "default_mode")
+        layout.prop(self, "live_update")
+
+        layout.label(text="Path Overlay")
+        column = layout.column()
+        for name in ("native_color", "mode_color", "key_color", "tick_color", "line_width"):
+            column.prop(self, name)
+
+        layout.label(text="Pie Menu")
+        keymap.draw(context, layout)
+
+
+CLASSES = (RigidMotionPreferences,)

@@ -1,0 +1,60 @@
+"""The words of the interface: what modes are called, what is to be said of a segment, lines that fit a panel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from ..animation.describing import SegmentFacts
+from ..animation.properties import MODE_ITEMS
+
+LABELS = {name: label for name, label, *_ in MODE_ITEMS}
+"""Each mode as menus show it."""
+
+DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
+"""What each mode does for the motion, in one sentence without a full stop."""
+
+NEAR_HALF_TURN = math.radians(170.0)
+"""From here on a small change of a key may send the object round the other way."""
+
+
+def cautions(segment: SegmentFacts) -> list[str]:
+    """What an animator may not expect of a segment, and what to do about it. Nothing where it is Blender's own."""
+    if segment.mode == "BLENDER":
+        return []
+    said = []
+    if segment.long_way:
+        said.append(
+            "Blender turns this segment by more than half a turn; the mode goes the short way. "
+            "To go the long way, set a key in between"
+        )
+    if segment.turn > NEAR_HALF_TURN:
+        said.append(
+            f"{degrees(segment.turn)} is nearly half a turn: a small change of a key can send it the other way round. "
+            "To be sure, set a key in between"
+        )
+    if segment.scales_unevenly:
+        said.append("The scale is not the same along all axes, and stays Blender's own")
+    return said
+
+
+def degrees(angle: float) -> str:
+    """An angle in radians, to be read."""
+    return f"{math.degrees(angle):.1f}°"
+
+
+def listed(items: Sequence[str], most: int = 3) -> str:
+    """A list that fits into a line."""
+    rest = len(items) - most
+    return ", ".join(items[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:
+    """The lines of a text, broken between words. A word that does not fit gets a line of its own."""
+    lines: list[str] = []
+    for word in text.split():
+        if lines and fits(f"{lines[-1]} {word}"):
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return lines

@@ -1,0 +1,22 @@
+"""A new file with live in-betweens, in which a handler that fails makes the test fail."""
+
+from __future__ import annotations
+
+import logging
+
+import bpy
+import pytest
+
+from addon import animation
+
+
+@pytest.fixture
+def live_file(empty_file, caplog: pytest.LogCaptureFixture) -> bpy.types.Context:
+    """A new file without objects, edits followed."""
+    animation.register()
+    try:
+        with caplog.at_level(logging.WARNING):
+            yield empty_file
+    finally:
+        animation.unregister()
+    assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == []

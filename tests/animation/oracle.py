@@ -1,0 +1,292 @@
+"""Where objects have to be, worked out apart from `addon.animation`, and where Blender shows them.
+
+`expected_bases` asks Blender's own `FCurve.evaluate` for keys and timing and `addon.motion.interpolate` for the motion
+of each segment. Nothing here looks at delta transforms in the file: the ones an object has of its own are given. Matrices
+are (m, 4, 4), frames are the scene's.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
+from mathutils import Euler, Quaternion
+
+from addon.motion import MODES, Poses, interpolate
+from addon.motion.quaternions import multiply, normalise
+
+MODE_IDS = ("BLENDER", *MODES)
+WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
+KEY_FIELDS = (
+    *("interpolation", "easing", "back", "amplitude", "period", "type"),
+    *("handle_left_type", "handle_right_type"),
+)
+
+
+@dataclass(frozen=True)
+class Own:
+    """Delta transforms that an object has of its own."""
+
+    location: tuple[float, ...] = (0.0, 0.0, 0.0)
+    quaternion: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+
+
+def curves_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
+    """The F-curves of an object's slot."""
+    data = obj.animation_data
+    if data is None or data.action is None or data.action_slot is None:
+        return {}
+    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
+    return {(c.data_path, c.array_index): c for c in channelbag.fcurves} if channelbag else {}
+
+
+def rotation_path(obj: bpy.types.Object) -> str:
+    return "rotation_quaternion" if obj.rotation_mode == "QUATERNION" else "rotation_euler"
+
+
+def transform_paths(obj: bpy.types.Object) -> tuple[str, str, str]:
+    return "location", rotation_path(obj), "scale"
+
+
+def snapshot(obj: bpy.types.Object) -> dict[tuple[str, int], tuple]:
+    """All that the animator keyed, to the last handle: every channel but the in-betweens."""
+    return {
+        name: (
+            fcurve.extrapolation,
+            fcurve.mute,
+            tuple((modifier.type, modifier.mute) for modifier in fcurve.modifiers),
+            tuple(
+                (*key.co, *key.handle_left, *key.handle_right, *(getattr(key, field) for field in KEY_FIELDS))
+                for key in fcurve.keyframe_points
+            ),
+        )
+        for name, fcurve in curves_of(obj).items()
+        if not name[0].startswith("delta_")
+    }
+
+
+def key_frames(obj: bpy.types.Object) -> np.ndarray:
+    """Where any transform channel has a key; keys less than a hundredth of a frame apart are one."""
+    curves = curves_of(obj)
+    frames = sorted(
+        {
+            key.co[0]
+            for path in transform_paths(obj)
+            for index in range(WIDTHS[path])
+            if (path, index) in curves and not curves[path, index].mute
+            for key in curves[path, index].keyframe_points
+        }
+    )
+    return np.array([frame for i, frame in enumerate(frames) if i == 0 or frame - frames[i - 1] > 0.01])
+
+
+def mode_at(obj: bpy.types.Object, frame: float) -> str:
+    """The mode of the segment that begins on this frame."""
+    fcurve = curves_of(obj).get(("rigid_motion.mode", 0))
+    if fcurve is None or not len(fcurve.keyframe_points):
+        return obj.rigid_motion.mode
+    return MODE_IDS[round(fcurve.evaluate(frame + 0.002))]
+
+
+def expected_bases(obj: bpy.types.Object, frames: Sequence[float], own: Own | None = None) -> np.ndarray:
+    """What moves the object in its parent's space. `FCurve.evaluate` is asked on each frame, extrapolation included."""
+    own = own or Own()
+    frames = np.asarray(frames, dtype=np.float64)
+    location, quaternion, scale = _native(obj, frames)
+    location = location + own.location
+    quaternion = multiply(np.array(own.quaternion), quaternion)
+    scale = scale * own.scale
+    keys = key_frames(obj)
+    scaled = _scales_evenly(obj, keys)
+    for first, last in itertools.pairwise(keys):
+        mode = mode_at(obj, first)
+        inside = (frames > first if first > keys[0] else frames != first) & (frames < last if last < keys[-1] else True)
+        inside &= frames != last
+        if mode == "BLENDER" or not inside.any():
+            continue
+        positions, quaternions, scales = _native(obj, np.array((first, last)))
+        ends = Poses(
+            positions + own.location,
+            multiply(np.array(own.quaternion), quaternions),
+            scales[:, 0] if scaled else None,
+        )
+        poses = interpolate((0.0, 1.0), ends, progress(obj, first, last, frames[inside]), mode, extrapolate=True)
+        location[inside], quaternion[inside] = poses.positions, poses.quaternions
+        if scaled:
+            scale[inside] = poses.scales[:, None] * own.scale
+    return matrices(location, quaternion, scale)
+
+
+def expected_worlds(
+    obj: bpy.types.Object, frames: Sequence[float], owns: dict[str, Own] | None = None, at: float | None = None
+) -> np.ndarray:
+    """The same in the world, parents moving along. `owns` is by the objects' names."""
+    owns = owns or {}
+    bases = expected_bases(obj, frames, owns.get(obj.name))
+    if obj.parent is None:
+        return bases
+    return expected_worlds(obj.parent, frames, owns) @ np.array(obj.matrix_parent_inverse) @ bases
+
+
+def progress(obj: bpy.types.Object, first: float, last: float, frames: np.ndarray) -> np.ndarray:
+    """How far the channels have come between two keys: the share of the chord that they make up together."""
+    done, whole = np.zeros(len(frames)), 0.0
+    curves = curves_of(obj)
+    for path in transform_paths(obj):
+        weight = 4.0 if path == "rotation_quaternion" else 1.0
+        for index in range(WIDTHS[path]):
+            fcurve = curves.get((path, index))
+            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
+                begin, end, *values = _timing(fcurve, [first, last, *frames])
+                done += weight * (end - begin) * (np.array(values) - begin)
+                whole += weight * (end - begin) ** 2
+    return done / whole if whole > 0.0 else done
+
+
+def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Scaled first, then turned, then moved, shape (m, 4, 4)."""
+    w, x, y, z = normalise(quaternion).T
+    made = np.zeros((len(location), 4, 4))
+    made[:, :3, 0] = np.stack((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)), axis=1)
+    made[:, :3, 1] = np.stack((2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)), axis=1)
+    made[:, :3, 2] = np.stack((2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)), axis=1)
+    made[:, :3, :3] *= scale[:, None, :]
+    made[:, :3, 3], made[:, 3, 3] = location, 1.0
+    return made
+
+
+def shown_worlds(objects: Iterable[bpy.types.Object], frames: Sequence[float]) -> list[np.ndarray]:
+    """The world matrices of objects as the scene evaluates them. It returns to its frame."""
+    objects, scene = list(objects), bpy.context.scene
+    before, subframe = scene.frame_current, scene.frame_subframe
+    shown = [np.empty((len(frames), 4, 4)) for _ in objects]
+    for row, frame in enumerate(frames):
+        whole = int(np.floor(frame))
+        scene.frame_set(whole, subframe=float(frame - whole))
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for found, obj in zip(shown, objects, strict=True):
+            found[row] = obj.evaluated_get(depsgraph).matrix_world
+    scene.frame_set(before, subframe=subframe)
+    return shown
+
+
+def assert_shown(
+    objects: Iterable[bpy.types.Object], frames: Sequence[float], owns: dict[str, Own] | None = None
+) -> None:
+    """The scene shows these objects where they have to be, to 1e-5 of their size.
+
+    Where Blender's own quaternion passes near zero on its way, what single precision leaves of its direction is less,
+    and no delta transform can mend that: the tolerance grows by the same factor.
+    """
+    objects = list(objects)
+    for obj, shown in zip(objects, shown_worlds(objects, frames), strict=True):
+        expected = expected_worlds(obj, frames, owns)
+        size = max(1.0, np.abs(expected).max(initial=0.0), _reach(obj, frames))
+        error = np.abs(shown - expected).max(axis=(1, 2), initial=0.0) / size * _shortest_quaternion(obj, frames)
+        worst = int(np.argmax(error))
+        assert error[worst] < 1e-5, (
+            f"{obj.name} is off by {error[worst]:.3g} of its size on frame {frames[worst]} "
+            f"(keys on {key_frames(obj)}):\n{shown[worst]}\ninstead of\n{expected[worst]}"
+        )
+
+
+def _reach(obj: bpy.types.Object, frames: Sequence[float]) -> float:
+    """How large Blender's own in-betweens get, which single precision has to hold beside their difference."""
+    location, _, scale = _native(obj, np.asarray(frames))
+    own = max(np.abs(location).max(initial=0.0), np.abs(scale).max(initial=0.0))
+    return own if obj.parent is None else own * max(1.0, _reach(obj.parent, frames))
+
+
+def _shortest_quaternion(obj: bpy.types.Object, frames: Sequence[float]) -> np.ndarray:
+    values = _channels(obj, rotation_path(obj), np.asarray(frames))
+    own = np.minimum(np.linalg.norm(values, axis=1), 1.0) if obj.rotation_mode == "QUATERNION" else 1.0
+    return own if obj.parent is None else own * _shortest_quaternion(obj.parent, frames)
+
+
+def _native(obj: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Location, unit quaternion and scale from the object's channels alone."""
+    turned = _channels(obj, rotation_path(obj), frames)
+    if obj.rotation_mode == "QUATERNION":
+        lengths = np.linalg.norm(turned, axis=1)
+        # Blender's own way with a quaternion that has no length.
+        turned[lengths == 0.0] = (0.0, 1.0, 0.0, 0.0)
+        turned /= np.where(lengths == 0.0, 1.0, lengths)[:, None]
+    else:
+        turned = _from_eulers(turned, obj.rotation_mode)
+    return _channels(obj, "location", frames), turned, _channels(obj, "scale", frames)
+
+
+def _from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
+    """One turn after the other about the axes in their order."""
+    turned = np.zeros((len(angles), 4))
+    turned[:, 0] = 1.0
+    for axis in map("XYZ".index, order):
+        about = np.zeros_like(turned)
+        about[:, 0], about[:, 1 + axis] = np.cos(0.5 * angles[:, axis]), np.sin(0.5 * angles[:, axis])
+        turned = multiply(about, turned)
+    return turned
+
+
+def _channels(obj: bpy.types.Object, path: str, frames: np.ndarray) -> np.ndarray:
+    curves = curves_of(obj)
+    values = np.empty((len(frames), WIDTHS[path]))
+    for index, rest in enumerate(getattr(obj, path)):
+        fcurve = curves.get((path, index))
+        keyed = fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute
+        values[:, index] = [fcurve.evaluate(frame) for frame in frames] if keyed else rest
+    return values
+
+
+def _timing(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[float]:
+    """The channel's values; elastic segments as a curve from 0 to 1 with the same keys has them, stretched."""
+    values = [fcurve.evaluate(frame) for frame in frames]
+    keys = fcurve.keyframe_points
+    for first, last in itertools.pairwise(keys):
+        if first.interpolation == "ELASTIC":
+            inside = [place for place, frame in enumerate(frames) if first.co[0] <= frame <= last.co[0]]
+            share = _elastic(first, last.co[0], [frames[place] for place in inside])
+            for place, part in zip(inside, share, strict=True):
+                values[place] = first.co[1] + part * (last.co[1] - first.co[1])
+    return values
+
+
+def _elastic(key: bpy.types.Keyframe, end: float, frames: Sequence[float]) -> list[float]:
+    """Blender's own elastic easing from 0 to 1, in a spare Action."""
+    action = bpy.data.actions.new("Timing")
+    channelbag = (
+        action.layers.new("Layer")
+        .strips.new(type="KEYFRAME")
+        .channelbag(action.slots.new("OBJECT", "Timing"), ensure=True)
+    )
+    fcurve = channelbag.fcurves.new("location")
+    start = fcurve.keyframe_points.insert(key.co[0], 0.0)
+    fcurve.keyframe_points.insert(end, 1.0)
+    start = fcurve.keyframe_points[0]
+    for field in ("interpolation", "easing", "back", "amplitude", "period"):
+        setattr(start, field, getattr(key, field))
+    share = [fcurve.evaluate(frame) for frame in frames]
+    bpy.data.actions.remove(action)
+    return share
+
+
+def _scales_evenly(obj: bpy.types.Object, keys: np.ndarray) -> bool:
+    """Whether scale is animated, and on every key the same along all axes and positive."""
+    curves = curves_of(obj)
+    if len(keys) < 2 or not any(len(c.keyframe_points) for (path, _), c in curves.items() if path == "scale"):
+        return False
+    scales = _channels(obj, "scale", keys)
+    return bool(np.allclose(scales, scales[:, :1]) and np.all(scales > 0.0) and np.ptp(scales[:, 0]) > 0.0)
+
+
+def as_quaternion(angles: Sequence[float], order: str) -> tuple[float, ...]:
+    """What an object's own Euler delta is as a quaternion."""
+    return tuple(Euler(angles, order).to_quaternion())
+
+
+def unit(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(Quaternion(values).normalized())

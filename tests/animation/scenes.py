@@ -1,0 +1,64 @@
+"""Objects with keys, to be edited and looked at. Frames are the scene's, angles radians."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from addon.animation import write_channel
+from tests.animation.oracle import WIDTHS, Own, as_quaternion, rotation_path, unit
+
+FRAMES = (1.0, 11.0, 24.0, 40.0)
+
+
+def new_object(name: str = "Tool", rotation_mode: str = "QUATERNION", data: bpy.types.ID | None = None):
+    """An object in the scene; an empty unless it is given data."""
+    obj = bpy.data.objects.new(name, data)
+    obj.rotation_mode = rotation_mode
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def random_values(obj: bpy.types.Object, path: str, count: int, seed: int = 0, even: bool = True) -> np.ndarray:
+    """Values for the keys of a property, none of them half a turn apart."""
+    random = np.random.default_rng((seed, sum(map(ord, path))))
+    values = random.normal(size=(count, WIDTHS[path]))
+    if path == "scale":
+        return np.exp(0.5 * (np.repeat(values[:, :1], 3, axis=1) if even else values))
+    return 3.0 * values if path == "location" else values
+
+
+def key(
+    obj: bpy.types.Object,
+    frames: Sequence[float] = FRAMES,
+    *,
+    seed: int = 0,
+    scale: str | None = None,
+    interpolation: str = "BEZIER",
+) -> bpy.types.Object:
+    """Key location, rotation and (with scale "even" or "uneven") scale at random on these frames."""
+    for path in ("location", rotation_path(obj), *(["scale"] if scale else [])):
+        values = random_values(obj, path, len(frames), seed, scale == "even")
+        write_channel(obj, path, np.array(frames), values, interpolation=interpolation)
+    return obj
+
+
+def give_own_deltas(obj: bpy.types.Object, seed: int = 0) -> Own:
+    """Delta transforms of the object's own, at random."""
+    random = np.random.default_rng(seed)
+    obj.delta_location = random.normal(size=3)
+    obj.delta_scale = np.full(3, np.exp(0.3 * random.normal()))
+    obj.delta_rotation_quaternion = unit(random.normal(size=4))
+    obj.delta_rotation_euler = random.normal(size=3)
+    return own_deltas(obj)
+
+
+def own_deltas(obj: bpy.types.Object) -> Own:
+    """What an object without in-betweens has for delta transforms."""
+    if obj.rotation_mode == "QUATERNION":
+        turned = unit(obj.delta_rotation_quaternion)
+    else:
+        turned = as_quaternion(obj.delta_rotation_euler, obj.rotation_mode)
+    return Own(tuple(obj.delta_location), turned, tuple(obj.delta_scale))

@@ -1,0 +1,306 @@
+"""A hand on mouse and keyboard of a Blender window, for scenarios that run inside that Blender.
+
+A scenario is a generator: Blender only notes what the hand does, and deals with it and draws when the scenario yields.
+So all that a hand does is written `yield from hand.press("G")`; a plain `yield` lets Blender do it, `yield 0.5`
+lets half a second pass. Blender has to be started with --enable-event-simulate, which keeps the real mouse out.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+import bpy
+
+from tests.gui import places
+from tests.gui.pictures import read_screen, write_png
+from tests.gui.places import Place
+
+T = TypeVar("T")
+Steps = Generator[float | None, None, T]
+"""What a hand does: a generator of seconds to wait (None: as long as Blender needs), with a result at its end."""
+
+TURNS = 4
+"""Turns of Blender's main loop between two steps: an event may make others, and each turn ends with drawing."""
+
+PAUSE = 0.1
+"""Seconds between two steps: a button that is pressed flashes for a moment before it does what it is for."""
+
+PIE_RADIUS = 150
+"""Pixels from the middle of a pie menu to one of its items."""
+
+COMPASS = {
+    "W": (-1, 0),
+    "E": (1, 0),
+    "S": (0, -1),
+    "N": (0, 1),
+    "NW": (-1, 1),
+    "NE": (1, 1),
+    "SW": (-1, -1),
+    "SE": (1, -1),
+}
+"""The directions of a pie menu, in the order of its items."""
+
+DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
+"""Names of the keys that digits are typed with."""
+
+
+class Hand:
+    """Mouse and keyboard of Blender's first window, and a camera for it.
+
+    Parameters
+    ----------
+    pictures
+        Folder that pictures go to.
+    """
+
+    def __init__(self, pictures: Path) -> None:
+        self.pictures = pictures
+        self.place: Place = (self.window.width // 2, self.window.height // 2)
+
+    @property
+    def window(self) -> bpy.types.Window:
+        """The window, asked for anew each time: opening a file replaces it."""
+        return bpy.context.window_manager.windows[0]
+
+    def area(self, kind: str) -> bpy.types.Area:
+        """The largest area of this type in the window."""
+        return places.area(self.window, kind)
+
+    # What a mouse does
+
+    def hover(self, place: Place) -> Steps[None]:
+        """Move the mouse to a place. Keys are for the area that the mouse is in."""
+        self.place = place
+        self._event("MOUSEMOVE", "NOTHING")
+        yield 0  # nothing flashes under a mouse that moves
+
+    def glide(self, place: Place, steps: int = 5) -> Steps[None]:
+        """Move the mouse to a place by way of others on a straight line."""
+        (x, y), (to_x, to_y) = self.place, place
+        for step in range(1, steps + 1):
+            yield from self.hover((x + (to_x - x) * step // steps, y + (to_y - y) * step // steps))
+
+    def click(self, place: Place | None = None, button: str = "LEFTMOUSE", **modifiers: bool) -> Steps[None]:
+        """Click at a place, or where the mouse is."""
+        if place:
+            yield from self.hover(place)
+        yield from self.press(button, **modifiers)
+
+    def drag(self, start: Place, end: Place, button: str = "LEFTMOUSE") -> Steps[None]:
+        """Press a button at one place, and let go of it at another."""
+        yield from self.hover(start)
+        self._event(button, "PRESS")
+        yield
+        yield from self.glide(end)
+        self._event(button, "RELEASE")
+        yield
+
+    # What a keyboard does
+
+    def press(self, key: str, **modifiers: bool) -> Steps[None]:
+        """Press a key and let go of it: `press("Z", ctrl=True)`. Keys are called as in `bpy.types.Event.type`."""
+        held = [f"LEFT_{name.upper()}" for name, down in modifiers.items() if down]
+        for name in held:
+            self._event(name, "PRESS", **modifiers)
+        self._event(key, "PRESS", **modifiers)
+        self._event(key, "RELEASE", **modifiers)
+        for name in reversed(held):
+            self._event(name, "RELEASE")
+        yield
+
+    def type(self, text: str) -> Steps[None]:
+        """Type a text into the field that has the cursor, or a number into what is being dragged."""
+        for character in text:
+            # What has no key of its own comes from F24, which nothing listens to: only the character counts.
+            key = DIGITS[int(character)] if character.isdigit() else "F24"
+            self._event(key, "PRESS", unicode=character)
+            self._event(key, "RELEASE")
+        yield
+
+    def _event(self, kind: str, value: str, **details: object) -> None:
+        x, y = self.place
+        self.window.event_simulate(type=kind, value=value, x=x, y=y, **details)
+
+    # Menus and buttons
+
+    def open_menu(self, area: bpy.types.Area, menu: str) -> Steps[None]:
+        """Open a menu of an area's header by clicking along it. Menus are called by class: "DOPESHEET_MT_key"."""
+        header = places.region(area, "HEADER")
+        with _drawings_of(menu) as drawings:
+            for x in range(header.x + 30, header.x + header.width, 25):
+                yield from self.click((x, header.y + header.height // 2))
+                if drawings:
+                    return
+                yield from self.press("ESC")
+        raise LookupError(f"no click into the header of the {area.type} opens {menu}")
+
+    def choose(self, label: str) -> Steps[None]:
+        """Choose an entry of the menu that is open, or of its submenus, by typing its name."""
+        yield from self.press("SPACE")
+        yield from self._find_and_run(label)
+
+    def choose_row(self, row: int) -> Steps[None]:
+        """Choose a row, from 0, of the values that a click on a property has opened; they cannot be found by typing."""
+        yield from self.press("HOME")
+        for _ in range(row):
+            yield from self.press("DOWN_ARROW")
+        yield from self.press("RET")
+
+    def search(self, label: str) -> Steps[None]:
+        """Run what F3 finds first for a text, in the area that the mouse is in."""
+        yield from self.press("F3")
+        yield from self._find_and_run(label)
+
+    def _find_and_run(self, label: str) -> Steps[None]:
+        yield 0.2
+        yield from self.type(label)
+        yield 0.3
+        yield from self.press("RET")
+
+    def pie(self, key: str, direction: str, picture: str | None = None, **modifiers: bool) -> Steps[None]:
+        """Hold the key of a pie menu, move in a direction of `COMPASS`, and let go; with a picture before, if named."""
+        (x, y), (right, up) = self.place, COMPASS[direction]
+        self._event(key, "PRESS", **modifiers)
+        yield 0.3
+        yield from self.glide((x + right * PIE_RADIUS, y + up * PIE_RADIUS))
+        yield 0.2
+        if picture:
+            yield from self.picture(picture)
+        self._event(key, "RELEASE", **modifiers)
+        yield
+
+    def open_sidebar(self, area: bpy.types.Area, category: str) -> Steps[None]:
+        """Open the sidebar of an area at the tab of this name."""
+        sidebar = next(one for one in area.regions if one.type == "UI")
+        if not area.spaces.active.show_region_ui:
+            yield from self.hover(places.centre(places.region(area)))
+            yield from self.press("N")
+        yield from self.wait_until(lambda: sidebar.width > 1, "the sidebar opens")
+        # Over the tabs: a number field would take the wheel for itself.
+        yield from self.hover((sidebar.x + sidebar.width - 10, places.centre(sidebar)[1]))
+        seen = [sidebar.active_panel_category]
+        while seen[-1] != category:
+            yield from self.press("WHEELDOWNMOUSE", ctrl=True)
+            seen.append(sidebar.active_panel_category)
+            if seen[-1] == seen[-2]:
+                break
+        while seen[-1] != category:
+            yield from self.press("WHEELUPMOUSE", ctrl=True)
+            seen.append(sidebar.active_panel_category)
+            if seen[-1] == seen[-2]:
+                raise LookupError(f"the sidebar of the {area.type} has no tab {category!r}, only {sorted(set(seen))}")
+
+    def find_button(self, area: bpy.types.Area, kind: str, what: str) -> Steps[Place]:
+        """Where in a region the button of a property or an operator is, found by moving the mouse over all of it.
+
+        Parameters
+        ----------
+        kind
+            The region's type: "UI" for a sidebar, "HEADER" for a header.
+        what
+            The end of the property's data path ("rigid_motion.mode"), or the operator ("action.bake_keys").
+        """
+        part = places.region(area, kind)
+        flat = part.height < 40  # a header: one row of narrow buttons, where a sidebar has many rows of wide ones
+        right, down = (15, part.height // 2) if flat else (part.width // 6, 9)
+        for y in range(part.y + part.height - down, part.y, -down):
+            for x in range(part.x + right, part.x + part.width, right):
+                yield from self.hover((x, y))
+                if f".{self._under_the_mouse(area, part)}".endswith(f".{what}"):
+                    return x, y
+        raise LookupError(f"{what} has no button in the {kind} region of the {area.type}")
+
+    def _under_the_mouse(self, area: bpy.types.Area, part: bpy.types.Region) -> str:
+        """The data path of the property, or the operator, whose button the mouse is over; "" over anything else."""
+        copy_command = bpy.ops.ui.copy_python_command_button
+        with bpy.context.temp_override(window=self.window, area=area, region=part):
+            owned = getattr(bpy.context, "property", None)
+            if owned:
+                return owned[1]
+            # Which operator a button runs, Blender tells by way of the clipboard alone: "bpy.ops.action.bake_keys()".
+            if not copy_command.poll():
+                return ""
+            copy_command()
+        return bpy.context.window_manager.clipboard.partition("(")[0]
+
+    # What an eye does
+
+    def wait_until(self, condition: Callable[[], object], what: str, seconds: float = 10.0) -> Steps[None]:
+        """Wait for something to become true; an AssertionError that says what where it does not in that time."""
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, f"not within {seconds} s: {what}"
+            yield
+
+    def picture(self, name: str) -> Steps[None]:
+        """Keep what is on the screen as NAME.png."""
+        for area in self.window.screen.areas:
+            area.tag_redraw()
+        yield 0.5  # the screen is the affair of another process, which may be behind
+        path = self.pictures / f"{name}.png"
+        screen = os.environ.get("BLENDER_GUI_SCREEN")
+        if screen:
+            write_png(path, read_screen(Path(screen).read_bytes()))
+        else:
+            with bpy.context.temp_override(window=self.window):
+                bpy.ops.screen.screenshot(filepath=str(path))
+
+
+@contextmanager
+def _drawings_of(menu: str) -> Iterator[list[str]]:
+    """A list that grows whenever Blender draws this menu, which it does when the menu opens."""
+    drawings: list[str] = []
+
+    def draw(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+        drawings.append(menu)
+
+    kind = getattr(bpy.types, menu)
+    kind.append(draw)
+    try:
+        yield drawings
+    finally:
+        kind.remove(draw)
+
+
+def run(scenario: Steps[None], hand: Hand, seconds: float, done: Callable[[str | None], None]) -> None:
+    """Do a scenario from now on, step by step, in Blender's own time.
+
+    Parameters
+    ----------
+    seconds
+        What all of it may take; then it is stopped where it is.
+    done
+        Called at the end with what went wrong as a text, None where nothing did. There is a picture "failed" then.
+    """
+    end = time.monotonic() + seconds
+    turns = 0
+    failure: str | None = None
+
+    def step() -> float | None:
+        nonlocal turns, scenario, failure
+        turns = (turns + 1) % TURNS
+        if turns:
+            return 0.0
+        try:
+            late = time.monotonic() > end
+            wait = scenario.throw(TimeoutError(f"not done after {seconds} s")) if late else next(scenario)
+        except StopIteration:
+            done(failure)
+            return None
+        except Exception:
+            if failure is None:
+                # Only now: what is on the screen may say more than the traceback.
+                failure, scenario = traceback.format_exc(), hand.picture("failed")
+                return 0.0
+            done(failure)
+            return None
+        return PAUSE if wait is None else wait
+
+    # A timer that is not persistent ends when a scenario opens a file.
+    bpy.app.timers.register(step, first_interval=0.5, persistent=True)

@@ -1,0 +1,52 @@
+"""Pictures of a Blender window: read from the file in which a virtual screen keeps its pixels, written as PNG.
+
+Pixels are (height, width, 3) arrays of red, green, blue in 0 to 255, the top row first. NumPy alone, so that it runs in
+Blender's Python as well as in that of the tests. Formats: X Window Dump version 7 (X11/XWDFile.h), PNG (RFC 2083).
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+COLOUR_BYTES = 12
+"""Bytes of an entry in an X Window Dump's table of colours, which lies between header and pixels."""
+
+
+def read_screen(dump: bytes) -> np.ndarray:
+    """The pixels of an X Window Dump of a screen with true colours, 32 bits a pixel, as virtual screens have them.
+
+    Raises
+    ------
+    ValueError
+        For any other dump.
+    """
+    fields = struct.unpack_from(">25I", dump)
+    header_size, version, pixmap_format, _, width, height, _, byte_order = fields[:8]
+    bits_per_pixel, bytes_per_line, masks, colours = fields[11], fields[12], fields[14:17], fields[19]
+    if (version, pixmap_format, bits_per_pixel) != (7, 2, 32):
+        kind = f"version {version}, format {pixmap_format}, {bits_per_pixel} bits a pixel"
+        raise ValueError(f"a screen dump of {kind}; only version 7, format 2, 32 bits a pixel is read")
+    start = header_size + colours * COLOUR_BYTES
+    lines = np.frombuffer(dump, ">u4" if byte_order else "<u4", height * bytes_per_line // 4, start)
+    pixels = lines.reshape(height, bytes_per_line // 4)[:, :width]
+    shifts = [mask.bit_length() - 8 for mask in masks]
+    return np.stack([(pixels >> shift) & 0xFF for shift in shifts], axis=-1).astype(np.uint8)
+
+
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Write pixels as a PNG file, or nothing at all."""
+    height, width, _ = pixels.shape
+    rows = np.zeros((height, 1 + width * 3), np.uint8)  # each row begins with its filter: none
+    rows[:, 1:] = pixels.reshape(height, width * 3)
+    header = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b"")]
+    png = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
+    beside = path.with_name(f".{path.name}")
+    beside.write_bytes(png)
+    beside.replace(path)

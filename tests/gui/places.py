@@ -1,0 +1,61 @@
+"""Where things are in a Blender window: areas, regions, keys in the Dope Sheet, points of the scene.
+
+A place is x, y in pixels of the window, from its lower left corner, as Blender's mouse events have it. Types are
+Blender's own: `Area.type` ("VIEW_3D"), `Region.type` ("WINDOW", "HEADER", "UI").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+Place = tuple[int, int]
+
+
+def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
+    """The largest area of this type, for instance "VIEW_3D"."""
+    found = [one for one in window.screen.areas if one.type == kind]
+    if not found:
+        raise LookupError(f"no {kind} in the window, only {', '.join(one.type for one in window.screen.areas)}")
+    return max(found, key=lambda one: one.width * one.height)
+
+
+def region(area: bpy.types.Area, kind: str = "WINDOW") -> bpy.types.Region:
+    """The region of this type in an area; it has to be open."""
+    found = next((one for one in area.regions if one.type == kind), None)
+    if found is None or min(found.width, found.height) <= 1:
+        raise LookupError(f"the {kind} region of the {area.type} is not open")
+    return found
+
+
+def centre(part: bpy.types.Area | bpy.types.Region) -> Place:
+    """The middle of an area or a region."""
+    return part.x + part.width // 2, part.y + part.height // 2
+
+
+def key(area: bpy.types.Area, frame: float, row: int = 0) -> Place:
+    """A key in a Dope Sheet: in the summary (row 0), or in the row of a channel below it."""
+    scale = bpy.context.preferences.system.ui_scale
+    # Blender's anim_channels_defines: rows of 0.8 widgets, 0.1 widgets apart, below the strip with the frame numbers.
+    widget, time_strip = 20 * scale, 23 * scale
+    view_y = -time_strip - 0.1 * widget - (row + 0.5) * 0.9 * widget
+    window_region = region(area)
+    x, y = window_region.view2d.view_to_region(frame, view_y, clip=False)
+    return _inside(window_region, x, y, f"frame {frame}, row {row}")
+
+
+def point(area: bpy.types.Area, location: Sequence[float]) -> Place:
+    """A point of the scene, in a 3D View."""
+    window_region = region(area)
+    seen = location_3d_to_region_2d(window_region, area.spaces.active.region_3d, location)
+    if seen is None:
+        raise LookupError(f"the point {tuple(location)} is behind the viewer")
+    return _inside(window_region, *seen, f"the point {tuple(location)}")
+
+
+def _inside(part: bpy.types.Region, x: float, y: float, name: str) -> Place:
+    if not (0 <= x < part.width and 0 <= y < part.height):
+        raise LookupError(f"{name} is out of sight, at {x:.0f}, {y:.0f} of {part.width} x {part.height}")
+    return part.x + round(x), part.y + round(y)

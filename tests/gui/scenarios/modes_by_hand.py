@@ -1,0 +1,183 @@
+"""A mode chosen from the menus, by the pies and in the panel, with refusals, undo and baking, all by mouse and keys."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+
+FRAMES = (1, 20, 40)
+BLENDER, STRAIGHT, SCREW = "BLENDER", "lerp_slerp", "dq_sclerp"
+
+ROW = 26
+"""Pixels from one row of a panel to the next."""
+
+
+def cube() -> bpy.types.Object:
+    """The default cube, asked for anew each time: undo replaces it."""
+    return bpy.data.objects["Cube"]
+
+
+def is_filled_in() -> bool:
+    """Whether in-betweens are in the delta transforms of the cube half-way to its second key."""
+    bpy.context.scene.frame_set(10)
+    return any(abs(part) > 1e-3 for part in cube().delta_location)
+
+
+def mode_keys() -> dict[float, int]:
+    """The keys of the cube's modes: frame and number of the mode."""
+    bag = cube().animation_data.action.layers[0].strips[0].channelbag(cube().animation_data.action_slot)
+    curve = bag.fcurves.find("rigid_motion.mode")
+    return {} if curve is None else {key.co.x: round(key.co.y) for key in curve.keyframe_points}
+
+
+def key_the_cube() -> None:
+    """Three keys, each a move along x with a turn about z."""
+    obj = cube()
+    obj.rotation_mode = "QUATERNION"
+    for frame, x, angle in zip(FRAMES, (-3, 0, 3), (0, 1.5, 3), strict=True):
+        obj.location.x = x
+        obj.rotation_quaternion = (math.cos(angle / 2), 0, 0, math.sin(angle / 2))
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_quaternion", frame=frame)
+    bpy.context.scene.frame_set(10)
+    bpy.ops.ed.undo_push(message="Keys")
+
+
+def assert_the_shortcut_is_free() -> None:
+    """In all keymaps of this Blender that are asked in the three editors, Alt T is the extension's alone."""
+    asked = (
+        "Window",
+        "Screen",
+        "3D View",
+        "Object",
+        "Dopesheet",
+        "Graph Editor",
+        "Anim",
+        "Frames",
+        "Markers",
+        "View2D",
+    )
+    for keymap in bpy.context.window_manager.keyconfigs.user.keymaps:
+        if keymap.name.startswith(asked) and not keymap.is_modal:
+            items = [
+                item
+                for item in keymap.keymap_items
+                if item.type == "T" and item.alt and not item.shift and not item.ctrl
+            ]
+            assert all(item.properties.name.startswith("RIGID_MOTION") for item in items), (keymap.name, items)
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator tries modes on the cube in three editors, takes some back, and bakes."""
+    hand.window.workspace = bpy.data.workspaces["Animation"]
+    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
+    assert_the_shortcut_is_free()
+    key_the_cube()
+    yield from in_the_viewport(hand, view)
+    yield from in_the_panel(hand, view)
+    yield from in_the_dope_sheet(hand, sheet)
+    yield from baked(hand, view)
+    sheet.type = "GRAPH_EDITOR"
+    yield from in_the_graph_editor(hand, sheet)
+
+
+def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """By the pie, taken back, from the Object menu and from the context menu: for the whole object."""
+    centre = places.centre(places.region(view))
+    yield from hand.hover(centre)
+    yield from hand.pie("T", "E", picture="pie", alt=True)
+    assert cube().rigid_motion.mode == SCREW
+    assert is_filled_in()
+    yield from hand.press("Z", ctrl=True)
+    assert cube().rigid_motion.mode == BLENDER
+    assert not is_filled_in(), "undo takes the in-betweens back too"
+    yield from hand.press("Z", ctrl=True, shift=True)
+    assert cube().rigid_motion.mode == SCREW
+    assert is_filled_in(), "redo brings them again"
+
+    yield from hand.open_menu(view, "VIEW3D_MT_object")
+    yield from hand.choose("Vector + Quaternion")
+    assert cube().rigid_motion.mode == STRAIGHT
+    yield from hand.click(centre, button="RIGHTMOUSE")
+    yield from hand.picture("context-menu")
+    yield from hand.choose("Clear Modes")
+    assert cube().rigid_motion.mode == BLENDER
+
+    cube().rotation_mode = "AXIS_ANGLE"
+    yield from hand.hover(centre)
+    yield from hand.pie("T", "E", alt=True)
+    yield from hand.picture("refused")
+    yield from hand.press("ESC")
+    assert cube().rigid_motion.mode == BLENDER, "an object that turns by axis and angle refuses"
+    cube().rotation_mode = "QUATERNION"
+
+
+def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
+    """From the Key menu, the context menu and by the pie: for the selected keys."""
+    yield from hand.click(places.key(sheet, 1))
+    yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
+    yield from hand.choose("Screw (Dual Quaternion)")
+    assert mode_keys() == {1: 2, 20: 0}, mode_keys()
+    yield from hand.press("F9")
+    yield from hand.picture("adjust-last-operation")
+    yield from hand.press("ESC")
+    yield from hand.click(places.key(sheet, 20))
+    yield from hand.click(button="RIGHTMOUSE")
+    yield from hand.choose("Motor Blend (PGA)")
+    assert mode_keys() == {1: 2, 20: 3, 40: 0}, mode_keys()
+    yield from hand.hover(places.key(sheet, 100))
+    yield from hand.pie("T", "SE", picture="pie-of-keys", alt=True)
+    assert mode_keys() == {1: 2, 20: 6, 40: 0}, mode_keys()
+    yield from hand.press("A", alt=True)
+    yield from hand.pie("T", "E", alt=True)
+    yield from hand.picture("no-key-selected")
+    yield from hand.press("ESC")
+    assert mode_keys() == {1: 2, 20: 6, 40: 0}, "without a selected key nothing changes"
+
+
+def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """For the object by its property, then for the segment under the playhead."""
+    yield from hand.open_sidebar(view, "Animation")
+    x, y = yield from hand.find_button(view, "UI", "rigid_motion.mode")
+    yield from hand.click((x, y))
+    yield from hand.choose_row(1)
+    assert cube().rigid_motion.mode == STRAIGHT
+    yield from hand.click((x, y - ROW))
+    yield from hand.picture("modes-in-the-panel")
+    yield from hand.choose_row(2)
+    assert mode_keys() == {1: 2, 20: 1}, mode_keys()
+    yield from hand.picture("panel")
+    for _ in range(2):
+        yield from hand.press("Z", ctrl=True)
+    assert cube().rigid_motion.mode == BLENDER
+    assert mode_keys() == {}
+
+
+def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """By the pie and its dialog; and back by F3."""
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.pie("T", "S", alt=True)
+    yield from hand.picture("bake")
+    yield from hand.press("RET")
+    assert len(cube().rigid_motion.bakes) == 1, "the dialog bakes"
+    yield from hand.picture("baked")
+    yield from hand.search("Un-Bake")
+    assert len(cube().rigid_motion.bakes) == 0
+
+
+def in_the_graph_editor(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
+    """By the pie, and from the Key menu."""
+    yield
+    yield from hand.hover(places.centre(places.region(graph)))
+    yield from hand.press("A")
+    yield from hand.pie("T", "E", picture="pie-in-the-graph-editor", alt=True)
+    assert mode_keys() == {1: 2, 20: 2, 40: 2}, mode_keys()
+    yield from hand.open_menu(graph, "GRAPH_MT_key")
+    yield from hand.choose("Vector + Quaternion")
+    assert mode_keys() == {1: 1, 20: 1, 40: 1}, mode_keys()
+    yield from hand.picture("graph-editor")

@@ -1,0 +1,184 @@
+"""A path is worked out once, and again only after an edit that it depends on."""
+
+from __future__ import annotations
+
+import bpy
+import pytest
+
+from addon.animation import set_mode
+from addon.ui.overlay import cache
+from addon.ui.overlay.cache import SPARE, keep_only, path_of
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import key, new_object
+
+
+@pytest.fixture
+def obj(scene) -> bpy.types.Object:
+    return key(new_object())
+
+
+def updated() -> None:
+    """Let Blender tell what was edited."""
+    bpy.context.view_layer.update()
+
+
+def test_a_path_that_nothing_happened_to_is_not_worked_out_again(scene, obj, monkeypatch):
+    path = path_of(obj, scene)
+    updated()
+    assert path_of(obj, scene) is path
+    monkeypatch.setattr(cache, "_read", None)
+    assert path_of(obj, scene) is path
+
+
+def test_another_frame_is_no_edit(scene, obj):
+    path = path_of(obj, scene)
+    scene.frame_set(20)
+    assert path_of(obj, scene) is path
+
+
+def test_an_edit_elsewhere_is_not_looked_into(scene, obj, monkeypatch):
+    other = key(new_object("Other"))
+    updated()
+    path = path_of(obj, scene)
+    monkeypatch.setattr(cache, "_read", None)
+    curves_of(other)["location", 0].keyframe_points[0].co.y += 1
+    other.empty_display_size = 5
+    updated()
+    assert path_of(obj, scene) is path
+
+
+def test_an_edit_that_does_not_matter_leaves_the_path(scene, obj):
+    path = path_of(obj, scene)
+    obj.color = (1, 0, 0, 1)
+    obj["note"] = 7
+    updated()
+    assert path_of(obj, scene) is path
+
+
+def move_key(obj, scene):
+    curves_of(obj)["location", 0].keyframe_points[1].co.y += 1
+
+
+def ease(obj, scene):
+    curves_of(obj)["location", 0].keyframe_points[1].interpolation = "BOUNCE"
+
+
+def select(obj, scene):
+    for fcurve in curves_of(obj).values():
+        fcurve.keyframe_points[1].select_control_point = not fcurve.keyframe_points[1].select_control_point
+
+
+def unkey(obj, scene):
+    obj.animation_data.action = None
+
+
+def turn_otherwise(obj, scene):
+    obj.rotation_mode = "XYZ"
+
+
+def give_delta(obj, scene):
+    obj.delta_location.x = 3
+
+
+def enlarge(obj, scene):
+    obj.empty_display_size = 3
+
+
+def choose_mode(obj, scene):
+    set_mode(obj, "dq_sclerp")
+
+
+def compare(obj, scene):
+    scene.rigid_motion_overlay.mode = "cga_lerp"
+
+
+def step_ticks(obj, scene):
+    scene.rigid_motion_overlay.tick_step = 7
+
+
+def size_axes(obj, scene):
+    scene.rigid_motion_overlay.axes_size = 2.5
+
+
+EDITS = [
+    *(move_key, ease, select, unkey, turn_otherwise, give_delta, enlarge, choose_mode),
+    *(compare, step_ticks, size_axes),
+]
+
+
+@pytest.mark.parametrize("edit", EDITS, ids=lambda edit: edit.__name__)
+def test_an_edit_that_matters_gives_another_path(scene, obj, edit):
+    updated()
+    path = path_of(obj, scene)
+    edit(obj, scene)
+    updated()
+    assert path_of(obj, scene) is not path
+
+
+def test_a_script_that_edits_and_goes_to_another_frame_is_noticed(scene, obj):
+    path = path_of(obj, scene)
+    move_key(obj, scene)
+    scene.frame_set(9)
+    assert path_of(obj, scene) is not path
+
+
+def test_undo_shows_the_path_from_before(scene, obj):
+    updated()
+    bpy.ops.ed.undo_push(message="keyed")
+    before = path_of(obj, scene).keys
+    move_key(obj, scene)
+    updated()
+    bpy.ops.ed.undo_push(message="moved")
+    assert (path_of(obj, scene).keys != before).any()
+    bpy.ops.ed.undo()
+    obj, scene = bpy.data.objects["Tool"], bpy.context.scene
+    assert (path_of(obj, scene).keys == before).all()
+
+
+def test_a_moving_parent_costs_no_new_path(scene, obj):
+    obj.parent = new_object("Table")
+    updated()
+    path = path_of(obj, scene)
+    obj.parent.location.x = 4
+    updated()
+    assert path_of(obj, scene) is path
+
+
+def test_an_edit_of_a_shared_action_changes_both_paths(scene, obj):
+    other = new_object("Other")
+    data = other.animation_data_create()
+    data.action, data.action_slot = obj.animation_data.action, obj.animation_data.action_slot
+    updated()
+    paths = [path_of(one, scene) for one in (obj, other)]
+    move_key(obj, scene)
+    updated()
+    assert [path_of(one, scene) for one in (obj, other)] != paths
+    assert (path_of(obj, scene).native == path_of(other, scene).native).all()
+
+
+def test_a_path_appears_with_the_second_key(scene):
+    obj = new_object()
+    obj.keyframe_insert("location", frame=1)
+    updated()
+    assert path_of(obj, scene) is None
+    obj.location.x = 3
+    obj.keyframe_insert("location", frame=10)
+    updated()
+    assert len(path_of(obj, scene).keys) == 2
+
+
+def test_paths_that_were_not_drawn_for_long_are_let_go(scene):
+    objects = [new_object(f"Tool {number}") for number in range(SPARE + 20)]
+    for obj in objects:
+        path_of(obj, scene)
+    path_of(objects[0], scene)
+    keep_only(drawn=1)
+    assert len(cache._entries) == SPARE + 1
+    assert objects[0].session_uid in cache._entries
+    assert objects[1].session_uid not in cache._entries
+
+
+def test_another_file_starts_without_paths(scene, obj):
+    path_of(obj, scene)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert not cache._entries

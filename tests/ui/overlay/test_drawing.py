@@ -1,0 +1,32 @@
+"""What can be said of drawing without a window: it stays silent, or says once what is wrong, and never raises."""
+
+from __future__ import annotations
+
+import logging
+
+import bpy
+
+from addon.ui.overlay import drawing
+from tests.animation.scenes import key, new_object
+
+
+def test_nothing_is_drawn_until_someone_asks_for_it(scene, monkeypatch):
+    monkeypatch.setattr(drawing, "_draw", None)
+    drawing.draw_paths()
+
+
+def test_without_a_path_no_graphics_card_is_needed(scene):
+    scene.rigid_motion_overlay.show_paths = True
+    new_object().select_set(True)
+    drawing.draw_paths()
+
+
+def test_what_is_wrong_is_told_once_and_never_raised(scene, caplog):
+    scene.rigid_motion_overlay.show_paths = True
+    key(new_object()).select_set(True)
+    assert bpy.app.background
+    with caplog.at_level(logging.ERROR):
+        drawing.draw_paths()
+        drawing.draw_paths()
+    assert [record.getMessage() for record in caplog.records] == ["The paths could not be drawn"]
+    caplog.clear()

@@ -1,0 +1,339 @@
+"""The points of a path are where Blender shows the object, or would show it in the mode."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import MODE_IDS, set_mode
+from addon.animation.mode_keys import source_of
+from addon.motion import MODES, Poses, interpolate
+from addon.ui.overlay.cache import path_of
+from addon.ui.overlay.points import (
+    AXES,
+    FINENESS,
+    MOST,
+    TICKS,
+    Path,
+    axis_frames,
+    sample_frames,
+    space_of,
+    thinned,
+    tick_frames,
+    trace,
+)
+from tests.animation.oracle import shown_worlds
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
+
+WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1)
+ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+
+
+def in_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
+    """Points of a path as the overlay places them on the current frame."""
+    space = np.array(space_of(obj, bpy.context.evaluated_depsgraph_get()))
+    return points @ space[:3, :3].T + space[:3, 3]
+
+
+def on(path: Path, line: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """The points of a line of a path that are on these frames."""
+    assert np.isin(frames, path.frames).all()
+    return line[np.searchsorted(path.frames, frames)]
+
+
+def shown_origins(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
+    return shown_worlds([obj], frames)[0][:, :3, 3]
+
+
+def armature_with_bone() -> bpy.types.Object:
+    """An armature that stands somewhere, with one bone that is turned."""
+    armature = new_object("Rig", data=bpy.data.armatures.new("Rig"))
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = armature.data.edit_bones.new("Hand")
+    bone.head, bone.tail = (0, 0, 1), (0, 1, 2)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    armature.pose.bones["Hand"].rotation_quaternion = (0.8, 0.6, 0, 0)
+    armature.location = (1, 2, 3)
+    return armature
+
+
+def mesh() -> bpy.types.Object:
+    """A triangle that stands somewhere, 2 by 3 by 1 units large."""
+    data = bpy.data.meshes.new("Ground")
+    data.from_pydata([(0, 0, 0), (2, 0, 0), (0, 3, 1)], [], [(0, 1, 2)])
+    obj = new_object("Ground", data=data)
+    obj.location = (3, 2, 1)
+    return obj
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_blenders_path_leads_where_blender_shows_the_object(scene, order):
+    obj = key(new_object(rotation_mode=order))
+    path = path_of(obj, scene)
+    assert path.wanted is None
+    assert on(path, path.native, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, order):
+    obj = key(new_object(rotation_mode=order), scale="even")
+    scene.rigid_motion_overlay.mode = mode
+    before = path_of(obj, scene)
+    native = shown_origins(obj, WHOLE)
+    set_mode(obj, mode)
+    assert on(before, before.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
+    assert on(before, before.native, WHOLE) == pytest.approx(native, abs=1e-5)
+
+
+def test_looking_at_a_mode_changes_nothing(scene):
+    obj = key(new_object())
+    digest, shown = source_of(obj).digest, shown_origins(obj, WHOLE)
+    for mode in MODES:
+        scene.rigid_motion_overlay.mode = mode
+        assert path_of(obj, scene).wanted is not None
+    assert obj.rigid_motion.mode == "BLENDER"
+    assert source_of(obj).digest == digest
+    assert (shown_origins(obj, WHOLE) == shown).all()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_between_linear_keys_a_path_is_that_of_interpolate(scene, mode):
+    obj = key(new_object(), interpolation="LINEAR")
+    scene.rigid_motion_overlay.mode = mode
+    path = path_of(obj, scene)
+    keyed = source_of(obj).keyed
+    keys = Poses(*(np.stack([keys.values for keys in keyed[name]], axis=1) for name in ("location", "rotation")))
+    assert path.wanted == pytest.approx(interpolate(FRAMES, keys, path.frames, mode).positions, abs=1e-5)
+
+
+def test_each_segment_runs_in_its_own_mode(scene):
+    obj = key(new_object())
+    set_mode(obj, "lerp_slerp", [FRAMES[1]])
+    path = path_of(obj, scene)
+    same = np.isclose(path.native, path.wanted, atol=1e-9).all(axis=1)
+    inside = (path.frames > FRAMES[1]) & (path.frames < FRAMES[2])
+    assert same[~inside].all()
+    assert not same[inside].any()
+    assert on(path, path.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+
+
+@pytest.mark.parametrize("parenting", ["none", "object", "bone", "vertex", "object with an inverse"])
+def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
+    obj = key(new_object())
+    if parenting.startswith("object"):
+        parent = new_object("Table")
+        parent.location, parent.rotation_quaternion, parent.scale = (1, 2, 3), (0.5, 0.5, -0.5, 0.5), (2, 1, 1)
+        obj.parent = parent
+        if parenting.endswith("inverse"):
+            bpy.context.view_layer.update()
+            obj.matrix_parent_inverse = parent.matrix_world.inverted()
+            parent.location = (0, 5, 0)
+    elif parenting == "bone":
+        obj.parent, obj.parent_type, obj.parent_bone = armature_with_bone(), "BONE", "Hand"
+    elif parenting == "vertex":
+        obj.parent, obj.parent_type, obj.parent_vertices = mesh(), "VERTEX", (2, 0, 0)
+    set_mode(obj, "dq_sclerp")
+    path = path_of(obj, scene)
+    assert in_world(obj, on(path, path.wanted, WHOLE)) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
+
+
+def test_a_path_goes_along_with_a_parent_that_moves(scene):
+    parent, obj = key(new_object("Table"), seed=1), key(new_object())
+    obj.parent = parent
+    set_mode(obj, "dq_sclerp")
+    for frame in (1, 17, 30):
+        scene.frame_set(frame)
+        path = path_of(obj, scene)
+        wanted = in_world(obj, on(path, path.wanted, np.array([float(frame)])))
+        assert wanted[0] == pytest.approx(np.array(obj.matrix_world.translation), abs=2e-5)
+
+
+def test_own_delta_transforms_are_part_of_the_path(scene):
+    obj = key(new_object())
+    give_own_deltas(obj)
+    path = path_of(obj, scene)
+    assert on(path, path.native, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+    set_mode(obj, "dq_sclerp")
+    path = path_of(obj, scene)
+    assert on(path, path.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+
+
+def test_keys_off_whole_frames_are_on_the_path(scene):
+    obj = key(new_object(), frames=(1.25, 10.5, 20.0))
+    set_mode(obj, "dq_sclerp")
+    path = path_of(obj, scene)
+    keyed = np.stack([keys.values for keys in source_of(obj).keyed["location"]], axis=1)
+    assert path.keys == pytest.approx(keyed, abs=1e-6)
+    for frame, place in zip((1.25, 10.5, 20.0), keyed, strict=True):
+        native, wanted = path.at(frame)
+        assert native == pytest.approx(place, abs=1e-6)
+        assert wanted == pytest.approx(place, abs=1e-6)
+
+
+def test_selected_keys_are_told_apart(scene):
+    obj = key(new_object())
+    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
+        for number, point in enumerate(fcurve.keyframe_points):
+            point.select_control_point = number == 2
+    assert path_of(obj, scene).selected.tolist() == [False, False, True, False]
+
+
+def test_outside_of_its_path_an_object_stays_at_the_ends(scene):
+    obj = key(new_object())
+    path = path_of(obj, scene)
+    assert (path.at(-100)[0] == path.keys[0]).all()
+    assert path.at(1000)[0] == pytest.approx(path.keys[-1])
+
+
+def test_between_two_samples_it_is_on_the_line_between_them(scene):
+    path = path_of(key(new_object()), scene)
+    native, wanted = path.at(float(path.frames[20:22].mean()))
+    assert native == pytest.approx(path.native[20:22].mean(axis=0))
+    assert wanted is None
+
+
+@pytest.mark.parametrize("mode", ["CHOSEN", "dq_sclerp"])
+def test_axes_point_where_the_object_is_turned(scene, mode):
+    obj = key(new_object())
+    obj.empty_display_size = 0.5
+    scene.rigid_motion_overlay.mode, scene.rigid_motion_overlay.axes_size = mode, 3.0
+    path = path_of(obj, scene)
+    if mode != "CHOSEN":
+        set_mode(obj, mode)
+    frames = axis_frames(tick_frames(int(FRAMES[0]), int(FRAMES[-1])))
+    shown = shown_worlds([obj], frames)[0]
+    assert 3 < len(frames) == len(path.axes) <= AXES + 1
+    for axis in range(3):
+        assert path.axes[:, axis, 0] == pytest.approx(shown[:, :3, 3], abs=1e-5)
+        assert path.axes[:, axis, 1] - path.axes[:, axis, 0] == pytest.approx(1.5 * shown[:, :3, axis], abs=2e-5)
+
+
+def test_axes_grow_with_the_object(scene):
+    obj = key(new_object(), scale="even")
+    scene.rigid_motion_overlay.mode = "cga_slerp"
+    path = path_of(obj, scene)
+    set_mode(obj, "cga_slerp")
+    frames = axis_frames(tick_frames(int(FRAMES[0]), int(FRAMES[-1])))
+    scales = np.linalg.norm(shown_worlds([obj], frames)[0][:, :3, 0], axis=1)
+    assert np.linalg.norm(path.axes[:, 0, 1] - path.axes[:, 0, 0], axis=1) == pytest.approx(scales, rel=1e-4)
+    assert np.ptp(scales) > 0.1
+
+
+def test_axes_are_half_as_long_as_the_object(scene):
+    obj = key(mesh())
+    obj.scale = (1, 0.5, 1)
+    path = path_of(obj, scene)
+    lengths = np.linalg.norm(path.axes[..., 1, :] - path.axes[..., 0, :], axis=2)
+    assert lengths == pytest.approx(np.full(lengths.shape, 1.0))
+
+
+def test_ticks_are_on_the_same_frames_in_all_paths(scene):
+    obj = key(new_object())
+    scene.rigid_motion_overlay.tick_step, scene.rigid_motion_overlay.mode = 5, "dq_sclerp"
+    path = path_of(obj, scene)
+    fives = np.arange(5.0, 41.0, 5.0)
+    assert (path.native_ticks == on(path, path.native, fives)).all()
+    assert (path.wanted_ticks == on(path, path.wanted, fives)).all()
+
+
+@pytest.mark.parametrize(
+    ("length", "step"), [(1, 1), (60, 1), (61, 2), (240, 5), (600, 10), (1000, 20), (100_000, 2000)]
+)
+def test_as_many_ticks_as_can_be_read(length, step):
+    ticks = tick_frames(3, 3 + length)
+    assert len(ticks) <= TICKS + 1
+    assert (np.diff(ticks) == step).all()
+    assert (ticks % step == 0).all()
+
+
+def test_a_step_of_ticks_that_nobody_could_see_is_widened():
+    assert len(tick_frames(0, 200_000, 1)) <= MOST + 1
+
+
+def test_ticks_may_be_further_apart_than_the_path_is_long():
+    assert tick_frames(3, 8, 50).tolist() == []
+    assert len(axis_frames(tick_frames(3, 8, 50))) == 0
+
+
+@pytest.mark.parametrize("length", [1, 2, 39, 300, 7000, 200_000])
+def test_samples_run_evenly_from_end_to_end_over_whole_frames(length):
+    frames = sample_frames(-7, -7 + length)
+    assert (frames[0], frames[-1]) == (-7, -7 + length)
+    assert (np.diff(frames) > 0).all()
+    assert len(frames) <= 2 * MOST
+    if length <= MOST:
+        assert np.isin(np.arange(-7, -7 + length + 1), frames).all()
+
+
+def test_a_cycle_goes_on_to_the_end_of_the_scene_with_the_keys_of_its_first_round(scene):
+    obj = key(new_object(), frames=(1, 11, 21))
+    for fcurve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
+        fcurve.modifiers.new("CYCLES")
+    scene.frame_end = 100
+    set_mode(obj, "dq_sclerp")
+    path = path_of(obj, scene)
+    assert len(path.keys) == 3
+    frames = np.arange(1.0, 101.0)
+    # On the seam a cycle has both ends.
+    frames = frames[frames % 20 != 1]
+    assert on(path, path.wanted, frames) == pytest.approx(shown_origins(obj, frames), abs=1e-5)
+
+
+def test_without_a_second_key_there_is_no_path(scene):
+    assert path_of(new_object("None"), scene) is None
+    assert path_of(key(new_object("One"), frames=(7,)), scene) is None
+    still = new_object("Faded")
+    still.keyframe_insert("hide_viewport", frame=1)
+    assert path_of(still, scene) is None
+
+
+def test_what_rigid_motion_refuses_has_no_path(scene):
+    turned = key(new_object("Turned"))
+    turned.rotation_mode = "AXIS_ANGLE"
+    driven = key(new_object("Driven"))
+    driven.driver_add("location", 0)
+    assert path_of(turned, scene) is None
+    assert path_of(driven, scene) is None
+
+
+def test_other_objects_paths_are_none_of_an_objects_business(scene):
+    objects = [key(new_object(f"Tool {seed}"), seed=seed) for seed in range(3)]
+    for obj, mode in zip(objects, MODE_IDS[1:], strict=False):
+        set_mode(obj, mode)
+    for obj in objects:
+        path = path_of(obj, scene)
+        assert on(path, path.wanted, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
+
+
+def test_a_path_needs_no_more_than_a_source(scene):
+    source = source_of(key(new_object()))
+    path = trace(source, "lerp_slerp", tick_step=10)
+    assert len(path.wanted_ticks) == 4
+    assert not path.selected.any()
+
+
+def test_a_thinned_line_looks_the_same():
+    turns = np.linspace(0, 3 * math.pi, 4001)
+    line = np.stack((np.cos(turns), np.sin(turns), 0.1 * turns), axis=1)
+    thin = thinned(line)
+    assert len(thin) < 600
+    assert (thin[[0, -1]] == line[[0, -1]]).all()
+    start, chord = thin[:-1], np.diff(thin, axis=0)
+    offset = line[:, None] - start
+    share = np.clip((offset * chord).sum(axis=2) / (chord * chord).sum(axis=1), 0, 1)
+    away = np.linalg.norm(offset - share[..., None] * chord, axis=2).min(axis=1)
+    assert away.max() < 2 * 2.0 / FINENESS
+
+
+def test_a_line_with_corners_keeps_them():
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)], dtype=float)
+    assert (thinned(corners) == corners).all()
+
+
+def test_of_a_line_that_stays_where_it_is_two_points_are_left():
+    assert len(thinned(np.ones((100, 3)))) <= 3

@@ -1,0 +1,51 @@
+"""The shortcut: that it is there, and that Blender has nothing else on it."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon.ui import keymap
+
+SHARED = {"Window", "Screen", "Screen Editing", "Frames", "Animation", "Markers", "View2D", "Animation Channels"}
+"""Keymaps that are asked in all of the editors, or in parts of them."""
+
+OF_EDITORS = {"3D View", "3D View Generic", "Object Mode", "Object Non-modal", "Dopesheet", "Dopesheet Generic"} | {
+    "Graph Editor",
+    "Graph Editor Generic",
+}
+
+
+def keymaps_of_blender(name):
+    """The keymaps that Blender comes with: name, and the key and modifiers of each item."""
+    path = Path(bpy.utils.system_resource("SCRIPTS")) / "presets/keyconfig/keymap_data" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for keymap_name, _, content in module.generate_keymaps(module.Params()):
+        yield keymap_name, [event for _, event, _ in content["items"]]
+
+
+@pytest.mark.parametrize("name", ["blender_default", "industry_compatible_data"])
+def test_the_shortcut_is_free(name):
+    looked_through = set()
+    for keymap_name, events in keymaps_of_blender(name):
+        if keymap_name in SHARED | OF_EDITORS:
+            looked_through.add(keymap_name)
+            taken = [event for event in events if event["type"] == "T" and (event.get("alt") or event.get("any"))]
+            assert not [event for event in taken if not event.get("ctrl") and not event.get("shift")], keymap_name
+    assert looked_through == SHARED | OF_EDITORS
+
+
+def test_the_shortcut_is_in_all_three_editors(extension):
+    keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
+    for name, space, menu in keymap.PLACES:
+        items = keymaps.find(name, space_type=space).keymap_items
+        ours = [item for item in items if item.idname == keymap.OPERATOR and item.properties.name == menu]
+        assert [(item.type, bool(item.alt), bool(item.ctrl), bool(item.shift)) for item in ours] == [
+            ("T", True, False, False)
+        ]
+        assert hasattr(bpy.types, menu)

@@ -1,0 +1,239 @@
+"""Operators, called as scripts do: on the selected objects."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import MODE_IDS, is_baked, key_frames, modes_of, set_enabled
+from addon.ui.operators import CLASSES
+from tests.ui.conftest import FRAMES, keyed, select_keys
+
+operators = bpy.ops.rigid_motion
+
+
+def modes(obj):
+    """The modes of the three segments."""
+    return modes_of(obj, FRAMES[:-1])
+
+
+def values(obj):
+    """All keys of an object, values and frames."""
+    slot = obj.animation_data.action_slot
+    fcurves = obj.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves
+    return {
+        (fcurve.data_path, fcurve.array_index): [tuple(key.co) for key in fcurve.keyframe_points]
+        for fcurve in fcurves
+        if fcurve.keyframe_points
+    }
+
+
+@pytest.mark.parametrize("mode", MODE_IDS)
+def test_every_mode_can_be_set(tool, mode):
+    assert operators.set_mode(mode=mode) == {"FINISHED"}
+    assert modes(tool) == [mode] * 3
+
+
+def test_a_mode_fills_in_at_once_and_leaves_the_keys_alone(tool):
+    before = values(tool)
+    operators.set_mode(mode="dq_sclerp")
+    bpy.context.scene.frame_set(6)
+    assert np.linalg.norm(tool.delta_location) > 0.1
+    assert values(tool) == before
+
+
+def test_selected_keys_get_the_mode_for_the_segments_they_begin(tool):
+    select_keys(tool, 11.0)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    assert modes(tool) == ["BLENDER", "dq_sclerp", "BLENDER"]
+
+
+def test_a_mode_key_is_selected_with_its_pose_and_the_one_that_ends_it_is_not(tool):
+    select_keys(tool, 11.0)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    slot = tool.animation_data.action_slot
+    curve = tool.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves.find("rigid_motion.mode")
+    parts = ("select_control_point", "select_left_handle", "select_right_handle")
+    selected = {key.co.x: {getattr(key, part) for part in parts} for key in curve.keyframe_points}
+    assert selected[11.0] == {True}
+    assert selected[21.0] == {False}
+
+
+@pytest.mark.parametrize(("frame", "segment"), [(1, 0), (5, 0), (11, 1), (20.5, 1), (30, 2), (41, 2)])
+def test_the_segment_under_the_playhead_gets_the_mode(tool, frame, segment):
+    bpy.context.scene.frame_set(int(frame), subframe=frame % 1)
+    operators.set_mode(mode="pga_lerp", on="CURRENT")
+    assert modes(tool) == ["pga_lerp" if place == segment else "BLENDER" for place in range(3)]
+
+
+def test_under_the_playhead_of_a_repeated_motion_is_the_segment_that_is_repeated(tool):
+    channelbag = tool.animation_data.action.layers[0].strips[0].channelbag(tool.animation_data.action_slot)
+    for fcurve in channelbag.fcurves:
+        fcurve.modifiers.new("CYCLES")
+    bpy.context.scene.frame_set(40 + 15)
+    operators.set_mode(mode="dq_sclerp", on="CURRENT")
+    assert modes(tool) == ["BLENDER", "dq_sclerp", "BLENDER"]
+
+
+def test_outside_of_the_keys_there_is_no_current_segment(tool):
+    bpy.context.scene.frame_set(50)
+    with pytest.raises(RuntimeError, match="Tool: the playhead is not between two keys"):
+        operators.set_mode(mode="pga_lerp", on="CURRENT")
+
+
+def test_without_selected_keys_nothing_changes(tool):
+    select_keys(tool)
+    with pytest.raises(RuntimeError, match="Select keys of location, rotation or scale"):
+        operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    assert modes(tool) == ["BLENDER"] * 3
+
+
+def test_only_objects_with_selected_keys_are_meant_by_selected_keys(tool):
+    other = keyed("Other")
+    select_keys(tool, 1.0)
+    select_keys(other)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    assert modes(tool) == ["dq_sclerp", "BLENDER", "BLENDER"]
+    assert modes(other) == ["BLENDER"] * 3
+
+
+def test_setting_a_mode_for_the_whole_object_replaces_those_of_its_segments(tool):
+    select_keys(tool, 11.0)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    operators.set_mode(mode="lerp_slerp", on="WHOLE")
+    assert modes(tool) == ["lerp_slerp"] * 3
+    assert ("rigid_motion.mode", 0) not in values(tool)
+
+
+def test_one_that_refuses_is_named_and_the_others_are_done(tool, capfd):
+    stubborn = keyed("Stubborn", "AXIS_ANGLE")
+    assert operators.set_mode(mode="dq_sclerp") == {"FINISHED"}
+    assert modes(tool) == ["dq_sclerp"] * 3
+    assert stubborn.rigid_motion.mode == "BLENDER"
+    said = capfd.readouterr().out
+    assert "Tool: Screw (Dual Quaternion)" in said
+    assert "Stubborn turns by axis and angle" in said
+
+
+def test_where_all_refuse_nothing_has_changed(extension):
+    stubborn = keyed("Stubborn", "AXIS_ANGLE")
+    before = values(stubborn)
+    with pytest.raises(RuntimeError, match="Stubborn turns by axis and angle"):
+        operators.set_mode(mode="dq_sclerp")
+    assert stubborn.rigid_motion.mode == "BLENDER"
+    assert values(stubborn) == before
+
+
+def test_without_a_selection_the_active_object_is_meant(tool):
+    tool.select_set(False)
+    operators.set_mode(mode="dq_sclerp")
+    assert tool.rigid_motion.mode == "dq_sclerp"
+
+
+@pytest.mark.parametrize("name", ["set_mode", "clear", "bake", "unbake"])
+def test_without_any_object_an_operator_says_why_not(extension, name):
+    operator = getattr(operators, name)
+    assert not operator.poll()
+    with pytest.raises(
+        RuntimeError, match="None of these objects is baked" if name == "unbake" else "Select an object"
+    ):
+        operator()
+
+
+def test_clearing_brings_blenders_own_in_betweens_back_and_keeps_the_keys(tool):
+    before = values(tool)
+    select_keys(tool, 1.0, 11.0)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    assert operators.clear() == {"FINISHED"}
+    assert values(tool) == before
+    bpy.context.scene.frame_set(6)
+    assert tuple(tool.delta_location) == (0.0, 0.0, 0.0)
+
+
+def test_undo_and_redo_take_a_mode_back_and_bring_it_again(tool):
+    bpy.ops.ed.undo_push(message="before")
+    operators.set_mode(mode="dq_sclerp")
+    bpy.ops.ed.undo_push(message="mode")
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["Tool"].rigid_motion.mode == "BLENDER"
+    bpy.context.scene.frame_set(6)
+    assert tuple(bpy.data.objects["Tool"].delta_location) == (0.0, 0.0, 0.0)
+    bpy.ops.ed.redo()
+    assert bpy.data.objects["Tool"].rigid_motion.mode == "dq_sclerp"
+    bpy.context.scene.frame_set(6)
+    assert np.linalg.norm(bpy.data.objects["Tool"].delta_location) > 0.1
+
+
+def test_a_baked_object_gets_its_keys_back(tool):
+    operators.set_mode(mode="dq_sclerp")
+    before = values(tool)
+    assert operators.bake() == {"FINISHED"}
+    assert is_baked(tool)
+    assert np.array_equal(key_frames(tool), np.arange(1.0, 42.0))
+    assert operators.unbake() == {"FINISHED"}
+    assert values(tool) == before
+    assert modes(tool) == ["dq_sclerp"] * 3
+
+
+@pytest.mark.parametrize(
+    ("options", "frames"),
+    [
+        ({"step": 10.0}, [1, 11, 21, 31, 41]),
+        ({"frames": "CUSTOM", "first": 12.0, "last": 13.0, "step": 2.5}, [1, 11, 13.5, 16, 18.5, 21, 41]),
+        ({"frames": "SCENE", "step": 5.0}, [1, 6, 11, 21, 41]),
+    ],
+    ids=["action", "custom", "scene"],
+)
+def test_what_is_baked_is_the_range_asked_for_in_whole_segments(tool, options, frames):
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 2, 9
+    operators.set_mode(mode="dq_sclerp")
+    operators.bake(**options)
+    assert key_frames(tool).tolist() == frames
+
+
+def test_a_range_that_ends_before_its_start_is_refused(tool):
+    operators.set_mode(mode="dq_sclerp")
+    with pytest.raises(RuntimeError, match="before its start"):
+        operators.bake(frames="CUSTOM", first=20.0, last=10.0)
+    assert not is_baked(tool)
+
+
+def test_an_object_without_a_mode_has_nothing_to_bake(tool):
+    with pytest.raises(RuntimeError, match="Tool has no rigid in-betweens to bake"):
+        operators.bake()
+
+
+def test_refreshing_makes_up_for_edits_that_were_not_followed(tool):
+    operators.set_mode(mode="dq_sclerp")
+    bpy.context.scene.frame_set(6)
+    before = tuple(tool.delta_location)
+    set_enabled(False)
+    slot = tool.animation_data.action_slot
+    fcurve = tool.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves.find("location", index=0)
+    fcurve.keyframe_points[1].co_ui.y += 3.0
+    fcurve.update()
+    bpy.context.scene.frame_set(6)
+    assert tuple(tool.delta_location) == pytest.approx(before)
+    assert operators.refresh() == {"FINISHED"}
+    bpy.context.scene.frame_set(6)
+    assert tuple(tool.delta_location) != pytest.approx(before)
+
+
+@pytest.mark.parametrize("operator", CLASSES, ids=lambda operator: operator.bl_idname)
+def test_every_operator_and_property_says_what_it_is_for(extension, operator):
+    assert operator.bl_idname.startswith("rigid_motion.")
+    assert len(operator.bl_description) > 20
+    assert not operator.bl_description.endswith(".")
+    assert {"REGISTER", "UNDO"} <= operator.bl_options
+    kind = getattr(bpy.ops.rigid_motion, operator.bl_idname.partition(".")[2]).get_rna_type()
+    for prop in kind.properties:
+        if prop.identifier != "rna_type":
+            assert prop.name, prop.identifier
+            assert prop.description, prop.identifier
+            assert all(item.description for item in getattr(prop, "enum_items", ())), prop.identifier
+
+
+def test_the_names_of_operators_are_unique():
+    names = [operator.bl_idname for operator in CLASSES]
+    assert len(set(names)) == len(names)

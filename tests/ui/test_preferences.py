@@ -1,0 +1,83 @@
+"""The preferences, as they act once the package is an extension of Blender's."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+import addon
+from addon.animation import set_mode
+from addon.ui.look import DEFAULT_LOOK
+from addon.ui.preferences import EXTENSION, default_mode, preferences
+from tests.ui.conftest import keyed
+
+
+@pytest.fixture
+def chosen(empty_file):
+    """The preferences of the extension, switched on as Blender does it."""
+    entry = bpy.context.preferences.addons.new()
+    entry.module = EXTENSION
+    addon.register()
+    yield preferences()
+    addon.unregister()
+    bpy.context.preferences.addons.remove(entry)
+
+
+def test_without_preferences_there_are_defaults(extension):
+    assert preferences() is None
+    assert default_mode() == "dq_sclerp"
+
+
+def test_the_colors_and_widths_are_those_of_the_overlay_at_first(chosen):
+    for name, value in DEFAULT_LOOK._asdict().items():
+        assert np.allclose(np.array(getattr(chosen, name)), value), name
+
+
+def test_the_mode_where_none_is_named_is_the_default_one(chosen):
+    assert default_mode() == "dq_sclerp"
+    chosen.default_mode = "pga_lerp"
+    assert default_mode() == "pga_lerp"
+    obj = keyed("Tool")
+    bpy.ops.rigid_motion.set_mode()
+    assert obj.rigid_motion.mode == "pga_lerp"
+
+
+def test_without_live_update_edits_wait_until_it_is_on_again(chosen):
+    obj = keyed("Tool")
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(6)
+    before = tuple(obj.delta_location)
+    chosen.live_update = False
+    slot = obj.animation_data.action_slot
+    fcurve = obj.animation_data.action.layers[0].strips[0].channelbag(slot).fcurves.find("location", index=0)
+    fcurve.keyframe_points[1].co_ui.y += 3.0
+    fcurve.update()
+    bpy.context.scene.frame_set(6)
+    assert tuple(obj.delta_location) == pytest.approx(before)
+    chosen.live_update = True
+    bpy.context.scene.frame_set(6)
+    assert tuple(obj.delta_location) != pytest.approx(before)
+
+
+def test_live_update_that_was_off_is_off_when_the_extension_is_switched_on(chosen):
+    chosen.live_update = False
+    addon.unregister()
+    addon.register()
+    obj = keyed("Tool")
+    obj.rigid_motion.mode = "BLENDER"
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(6)
+    before = tuple(obj.delta_location)
+    obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot).fcurves.find(
+        "location", index=0
+    ).keyframe_points[1].co_ui.y += 3.0
+    bpy.context.scene.frame_set(6)
+    assert tuple(obj.delta_location) == pytest.approx(before)
+
+
+def test_every_preference_says_what_it_is_for(chosen):
+    for prop in chosen.bl_rna.properties:
+        if prop.identifier in type(chosen).__annotations__:
+            assert prop.name, prop.identifier
+            assert len(prop.description) > 15, prop.identifier

@@ -1,0 +1,68 @@
+"""What the panel says, and how it fits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians
+
+import pytest
+
+from addon.animation.describing import SegmentFacts
+from addon.ui.wording import cautions, degrees, listed, wrapped
+
+PLAIN = SegmentFacts(
+    first=1.0,
+    last=20.0,
+    key=1.0,
+    mode="dq_sclerp",
+    turn=radians(90.0),
+    distance=2.0,
+    long_way=False,
+    scales_unevenly=False,
+)
+
+
+def test_a_plain_segment_is_no_cause_for_caution():
+    assert cautions(PLAIN) == []
+
+
+@pytest.mark.parametrize(
+    ("facts", "words"),
+    [
+        ({"turn": radians(178.0)}, "178.0° is nearly half a turn"),
+        ({"long_way": True}, "goes the short way"),
+        ({"scales_unevenly": True}, "scale is not the same along all axes"),
+    ],
+)
+def test_what_one_may_not_expect_is_said_but_not_of_blenders_own(facts, words):
+    (caution,) = cautions(replace(PLAIN, **facts))
+    assert words in caution
+    assert cautions(replace(PLAIN, mode="BLENDER", **facts)) == []
+
+
+def test_angles_are_given_in_degrees():
+    assert degrees(radians(114.59)) == "114.6°"
+
+
+def test_a_long_list_is_cut():
+    assert listed(["1", "2", "3"]) == "1, 2, 3"
+    assert listed(["1", "2", "3", "4", "5"]) == "1, 2, 3 and 2 more"
+
+
+def test_lines_are_as_full_as_they_fit_and_lose_no_word():
+    text = "Cube turns by axis and angle, which has no rigid in-betweens"
+    lines = wrapped(text, lambda line: len(line) <= 20)
+    assert lines == ["Cube turns by axis", "and angle, which has", "no rigid in-betweens"]
+    assert " ".join(lines) == text
+
+
+def test_a_word_that_is_too_long_has_a_line_of_its_own():
+    assert wrapped("a Vergnuegungsdampferkapitaen b", lambda line: len(line) <= 5) == [
+        "a",
+        "Vergnuegungsdampferkapitaen",
+        "b",
+    ]
+
+
+def test_no_text_has_no_lines():
+    assert wrapped("", lambda line: True) == []
