@@ -1,8 +1,8 @@
 """Where objects have to be, worked out apart from `addon.animation`, and where Blender shows them.
 
 `expected_bases` asks Blender's own `FCurve.evaluate` for keys and timing and `addon.motion.interpolate` for the motion
-of each segment. Nothing here looks at delta transforms in the file: the ones an object has of its own are given. Matrices
-are (m, 4, 4), frames are the scene's.
+of each segment. Nothing here looks at delta transforms in the file: the ones an object has of its own are given.
+Matrices are (m, 4, 4), frames are the scene's.
 """
 
 from __future__ import annotations
