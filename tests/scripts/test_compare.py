@@ -262,7 +262,7 @@ AXES = {
 }
 
 
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the recordings are not beside the checkout")
+@pytest.mark.recordings
 @pytest.mark.parametrize("name", AXES)
 def test_real_recordings_run(name, tmp_path, capsys):
     assert run(RECORDINGS / name, "--axes", AXES[name], "--no-video", "--output", tmp_path) == 0

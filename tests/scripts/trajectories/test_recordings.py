@@ -11,7 +11,7 @@ from scripts.trajectories import read_trajectories
 FOLDER = Path(__file__).parents[4] / "shared" / "data" / "recordings"
 FILES = sorted(path for path in FOLDER.glob("*") if path.suffix != ".md")
 
-pytestmark = pytest.mark.skipif(not FILES, reason=f"no recordings in {FOLDER}")
+pytestmark = pytest.mark.recordings
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)

@@ -1,0 +1,72 @@
+"""Which objects an editor means. It needs no screen: areas and what they show are there in the background too."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import bpy
+import pytest
+
+from addon.animation import modes_of
+from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, objects_for, scope_for
+from tests.ui.conftest import FRAMES, keyed, select_keys
+
+
+@contextmanager
+def editor(kind):
+    """The context of an editor of this type."""
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, kind
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            yield area.spaces.active
+    finally:
+        area.type = before
+
+
+@pytest.mark.parametrize("kind", KEY_EDITORS)
+def test_a_key_editor_means_the_objects_that_it_shows(tool, kind):
+    other = keyed("Other")
+    other.select_set(False)
+    keyed("Unkeyed", "AXIS_ANGLE").animation_data_clear()
+    with editor(kind) as space:
+        assert scope_for(bpy.context) == SELECTED
+        space.dopesheet.show_only_selected = True
+        assert objects_for(bpy.context) == [tool]
+        space.dopesheet.show_only_selected = False
+        assert set(objects_for(bpy.context)) == {tool, other}
+
+
+@pytest.mark.parametrize("kind", KEY_EDITORS)
+def test_in_a_key_editor_modes_are_for_the_selected_keys_of_all_objects_shown(tool, kind):
+    other, left_out = keyed("Other"), keyed("Left Out")
+    left_out.select_set(False)
+    for obj in (tool, other, left_out):
+        select_keys(obj, 11.0)
+    with editor(kind) as space:
+        space.dopesheet.show_only_selected = True
+        bpy.ops.rigid_motion.set_mode(mode="dq_sclerp")
+    assert modes_of(tool, FRAMES[:-1]) == modes_of(other, FRAMES[:-1]) == ["BLENDER", "dq_sclerp", "BLENDER"]
+    assert modes_of(left_out, FRAMES[:-1]) == ["BLENDER"] * 3
+
+
+def test_elsewhere_the_selected_objects_are_meant_as_a_whole(tool):
+    other = keyed("Other")
+    keyed("Left Out").select_set(False)
+    with editor("VIEW_3D"):
+        assert scope_for(bpy.context) == WHOLE
+        assert set(objects_for(bpy.context)) == {tool, other}
+
+
+def test_the_modes_meant_are_those_of_the_scope(tool):
+    select_keys(tool, 11.0)
+    bpy.ops.rigid_motion.set_mode(mode="dq_sclerp", on=SELECTED)
+    bpy.context.scene.frame_set(5)
+    assert modes_meant(bpy.context, tool, WHOLE) == {"BLENDER", "dq_sclerp"}
+    assert modes_meant(bpy.context, tool, SELECTED) == {"dq_sclerp"}
+    assert modes_meant(bpy.context, tool, CURRENT) == {"BLENDER"}
+    bpy.context.scene.frame_set(50)
+    assert modes_meant(bpy.context, tool, CURRENT) == set()
+    assert modes_meant(bpy.context, None, WHOLE) == set()
