@@ -15,21 +15,15 @@ A mode's fast form is a function from `Segments` to `Curves`; they are in `addon
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from .piecewise import BLOCK, blocks, is_dense, multiply
 from .poses import Poses
 from .quaternions import align_signs
-
-BLOCK = 32768
-"""In-betweens worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
-
-DENSE = 128
-"""In-betweens in a row, equally many in each segment, from which on a matrix product beats repeating coefficients."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -219,7 +213,7 @@ def _evaluate(
     all_counts = np.diff(bounds)
     own = len(numbers)
     numbers = np.concatenate((numbers, mode.parameters))
-    for segment, sample in _blocks(bounds):
+    for segment, sample in blocks(bounds):
         counts = all_counts[segment]
         repeated = np.repeat(numbers[:, segment], counts, axis=1)
         basis, scales = mode.basis(position(sample, *repeated[:own]), [*repeated[own:]], within)
@@ -241,35 +235,17 @@ def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np
     return np.append(starts.ravel(), objects * times.shape[-1])
 
 
-def _blocks(bounds: np.ndarray) -> Iterator[tuple[slice, slice]]:
-    """Slices of segments and of their samples, of about `BLOCK` samples each."""
-    cuts = np.unique(np.append(np.searchsorted(bounds, np.arange(0, bounds[-1], BLOCK)), len(bounds) - 1))
-    for first, last in itertools.pairwise(cuts):
-        yield slice(int(first), int(last)), slice(int(bounds[first]), int(bounds[last]))
-
-
 def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
     """Fill out (7, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
 
     The i-th of the segments has counts[i] samples, and at least one has any.
     """
-    changes = np.flatnonzero(counts[1:] != counts[:-1])
-    if basis.shape[1] < DENSE * (len(changes) + 1) or counts.min() < 8:
+    if not is_dense(counts):
         positions, quaternions = mode.positions[..., segment], mode.quaternions[..., segment]
         np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
         np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:])
         return
-    matrices = mode.matrices[segment]
-    begin = 0
-    for first, last in itertools.pairwise((0, *(changes + 1).tolist(), len(counts))):
-        shape = (-1, last - first, int(counts[first]))
-        end = begin + shape[1] * shape[2]
-        np.matmul(
-            matrices[first:last],
-            basis[:, begin:end].reshape(shape).transpose(1, 0, 2),
-            out=out[:, begin:end].reshape(shape).transpose(1, 0, 2),
-        )
-        begin = end
+    multiply(mode.matrices[segment], basis, counts, out)
 
 
 def _components(vectors: np.ndarray) -> np.ndarray:
