@@ -18,6 +18,7 @@ from functools import cached_property
 import bpy
 import numpy as np
 
+from ..motion.piecewise import combine
 from .easings import ease, elastic
 
 INTERPOLATIONS = {
@@ -31,6 +32,8 @@ EASINGS = {item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.pro
 CONSTANT, LINEAR, BEZIER, ELASTIC = (
     {name: code for code, name in INTERPOLATIONS.items()}[name] for name in ("CONSTANT", "LINEAR", "BEZIER", "ELASTIC")
 )
+
+AUTO = {name: code for code, name in EASINGS.items()}["AUTO"]
 
 NEAR = float(np.float32(1e-4))
 """Frames from a key within which Blender takes its value."""
@@ -117,7 +120,7 @@ def read_keys(fcurve: bpy.types.FCurve) -> Keys:
     points, interpolation = np.empty(2 * count, np.float32), np.empty(count, np.int32)
     keys.foreach_get("co", points)
     keys.foreach_get("interpolation", interpolation)
-    kinds = set(interpolation.tolist())
+    kinds = _known(interpolation, INTERPOLATIONS, CONSTANT)
     eased = not kinds <= {CONSTANT, LINEAR, BEZIER}
     linear = fcurve.extrapolation == "LINEAR"
     left = right = easing = settings = None
@@ -129,6 +132,7 @@ def read_keys(fcurve: bpy.types.FCurve) -> Keys:
     if eased:
         easing, settings = np.empty(count, np.int32), np.empty((3, count), np.float32)
         keys.foreach_get("easing", easing)
+        _known(easing, EASINGS, AUTO)
         for row, name in zip(settings, ("back", "amplitude", "period"), strict=True):
             keys.foreach_get(name, row)
     return Keys(
@@ -141,6 +145,15 @@ def read_keys(fcurve: bpy.types.FCurve) -> Keys:
         linear,
         _read_cycles(fcurve.modifiers) if fcurve.modifiers else None,
     )
+
+
+def _known(codes: np.ndarray, names: dict[int, str], otherwise: int) -> set[int]:
+    """The codes there are, after Blender's own way with those that mean nothing, in a damaged file."""
+    found = set(codes.tolist())
+    if not found <= names.keys():
+        codes[~np.isin(codes, list(names))] = otherwise
+        found = found & names.keys() | {otherwise}
+    return found
 
 
 def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
@@ -384,15 +397,12 @@ def _values(groups: list[_Group], spans: _Spans) -> np.ndarray:
     each = [len(group.spans) for group in groups]
     own = leading + np.repeat(first - first[0], each, axis=1)
     degree = 3 if BEZIER in spans.interpolation[leading] else 1
+    powers = np.empty((degree + 1, len(parameters)))
+    powers[0] = 1.0
+    for power in range(degree):
+        np.multiply(powers[power], parameters, out=powers[power + 1])
     values = np.empty((len(own), len(parameters)))
-    at_once = max(1, BLOCK // max(1, len(parameters)))
-    for row in range(0, len(values), at_once):
-        rows = values[row : row + at_once]
-        polynomials = spans.polynomials[:, own[row : row + at_once]]
-        rows[:] = polynomials[degree].repeat(counts, axis=-1)
-        for power in range(degree - 1, -1, -1):
-            rows *= parameters
-            rows += polynomials[power].repeat(counts, axis=-1)
+    combine(spans.polynomials[: degree + 1, own].transpose(1, 0, 2), powers, counts, values)
     return values
 
 

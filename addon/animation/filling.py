@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from .inbetweens import Deltas, deltas
-from .reading import GROUP, WIDTHS, Curves, Slot, curves_in, slots_of
+from .reading import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, slots_of
 from .sources import LOCATION, ROTATION, SCALE, Source
 
 OWN = {
@@ -32,10 +32,10 @@ def fill_in(readings: Sequence[tuple[Slot, Curves, Source]]) -> None:
 
 
 def is_complete(curves: Curves, source: Source) -> bool:
-    """Whether all F-curves are there that the in-betweens of a source go into."""
-    return all(
-        (path, index) in curves for path in _paths(source) for index in range(WIDTHS[path.removeprefix("delta_")])
-    )
+    """Whether all F-curves are there that the in-betweens of a source go into, from its first frame to its last."""
+    first, last = source.frame_range
+    wanted = [(path, index) for path in _paths(source) for index in range(WIDTHS[path.removeprefix("delta_")])]
+    return all(name in curves and _covers(curves[name], first, last - first + 1) for name in wanted)
 
 
 def clear(slot: Slot, curves: Curves) -> None:
@@ -83,19 +83,21 @@ def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], first: int
         rows = values.get(path)
         for index in range(WIDTHS[path.removeprefix("delta_")]):
             fcurve = curves.get((path, index))
-            if fcurve is not None and (rows is None or not _covers(fcurve, first, rows.shape[1])):
+            if fcurve is None or not is_filled_in(fcurve):
+                continue
+            if rows is None or not _covers(fcurve, first, rows.shape[1]):
                 channelbag.fcurves.remove(fcurve)
                 del curves[path, index]
                 gone.add(path)
     for path, rows in values.items():
         for obj in slot.users:
             _remember(obj, path)
-        points = np.empty((rows.shape[1], 2), dtype=np.float32)
-        points[:, 0] = np.arange(first, first + len(points))
-        for index, row in enumerate(rows):
-            points[:, 1] = row
-            fcurve = curves.get((path, index)) or _new(channelbag, curves, path, index, first, len(points))
-            fcurve.sampled_points.foreach_set("co", points.ravel())
+        points = np.empty((*rows.shape, 2), dtype=np.float32)
+        points[..., 0] = np.arange(first, first + rows.shape[1])
+        points[..., 1] = rows
+        for index, channel in enumerate(points.reshape(len(rows), -1)):
+            fcurve = curves.get((path, index)) or _new(channelbag, curves, path, index, first, rows.shape[1])
+            fcurve.sampled_points.foreach_set("co", channel)
     if gone - set(values):
         group = channelbag.groups.get(GROUP)
         if group is not None and not group.channels:
@@ -124,7 +126,7 @@ def _new(channelbag, curves: Curves, path: str, index: int, first: int, count: i
 
 def adopt(slot: Slot, curves: Curves) -> None:
     """Remember the own delta transforms of objects that move by a slot which is filled in already."""
-    for path in {path for path, _ in curves if path in OWN}:
+    for path in {path for (path, _), fcurve in curves.items() if path in OWN and is_filled_in(fcurve)}:
         for obj in slot.users:
             _remember(obj, path)
 

@@ -18,11 +18,15 @@ import numpy as np
 from ..motion import Poses
 from ..motion import in_betweens as segment_poses
 from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
+from ..motion.piecewise import blocks, combine
 from ..motion.quaternions import conjugate, multiply
 from .fcurves import Keys, evaluate
 from .sources import LOCATION, MODE_IDS, REST, ROTATION, SAME_FRAME, SCALE, Source
 
-AT_ONCE = 16384
+AT_ONCE = 65536
+"""Samples that are prepared for at once."""
+
+BLOCK = 16384
 """Samples worked on at once: few enough for the processor's caches."""
 
 ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
@@ -95,26 +99,32 @@ def deltas(sources: Sequence[Source]) -> list[Deltas]:
     for portion in _portions(sources):
         frames = [np.arange(source.frame_range[0], source.frame_range[1] + 1.0) for source in portion]
         _, delta = _motion(portion, frames)
-        for source, samples in _each(portion, map(len, frames)):
-            own = {name: delta[rows, samples] for name, rows in ROWS.items() if name in source.keyed}
-            if ROTATION in own and source.order is not None:
-                own[ROTATION] = eulers_from_quaternions(own[ROTATION].T, source.order).T
+        samples = _each(portion, map(len, frames))
+        order = portion[0].order
+        rotation = delta[ROWS[ROTATION]]
+        if order is not None:
+            rotation = eulers_from_quaternions(rotation.T, order, [place.start for _, place in samples]).T
+        rows = {LOCATION: delta[ROWS[LOCATION]], ROTATION: rotation, SCALE: delta[ROWS[SCALE]]}
+        for source, place in samples:
+            own = {name: rows[name][:, place] for name in source.keyed}
             scale = own.get(SCALE) if source.uniform_scale else None
             found[id(source)] = Deltas(source.frame_range[0], own.get(LOCATION), own.get(ROTATION), scale)
     return [found[id(source)] for source in sources]
 
 
 def _portions(sources: Sequence[Source]) -> Iterator[list[Source]]:
-    """The sources in lists of about `AT_ONCE` samples, those with uniform scale apart."""
-    for scaled in (False, True):
+    """The sources in lists of about `AT_ONCE` samples, those apart that scale evenly or turn otherwise."""
+    alike: dict[tuple, list[Source]] = {}
+    for source in sources:
+        alike.setdefault((source.order, source.uniform_scale), []).append(source)
+    for kin in alike.values():
         portion, samples = [], 0
-        for source in sources:
-            if source.uniform_scale is scaled:
-                portion.append(source)
-                samples += source.frame_range[1] - source.frame_range[0] + 1
-                if samples >= AT_ONCE:
-                    yield portion
-                    portion, samples = [], 0
+        for source in kin:
+            portion.append(source)
+            samples += source.frame_range[1] - source.frame_range[0] + 1
+            if samples >= AT_ONCE:
+                yield portion
+                portion, samples = [], 0
         if portion:
             yield portion
 
@@ -128,33 +138,63 @@ def _each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source
 def _motion(
     sources: Sequence[Source], frames: Sequence[np.ndarray], mode: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Blender's own in-betweens (10, m), rotations as unit quaternions, and the deltas (10, m) to the wanted ones."""
+    """Blender's own in-betweens (10, m), rotations as unit quaternions, and the deltas (10, m) to the wanted ones.
+
+    The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
+    """
+    order = sources[0].order
     samples = _each(sources, map(len, frames))
     segments = _each(sources, (len(source.key_frames) - 1 for source in sources))
-    native = _sampled(samples, frames)
-    start, end = _ends(segments)
+    native = timing = _sampled(samples, frames)
+    start, end = bounds = _ends(segments)
+    if any(source.is_elastic for source in sources):
+        timing = _sampled(samples, frames, unit_elastic=True)
+        bounds = _ends(segments, unit_elastic=True)
+    weights, before = _weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
-    elastic = any(source.is_elastic for source in sources)
-    timing = _sampled(samples, frames, unit_elastic=True) if elastic else native
-    bounds = _ends(segments, unit_elastic=True) if elastic else (start, end)
-    progress = _progress(timing, *bounds, counts, segments)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
-
-    _turn_into_quaternions(native, samples)
     keys = _key_poses(start, end, segments)
-    times = np.tile((0.0, 1.0), (len(counts), 1))
-    delta = np.empty_like(native)
     own = np.stack([source.own[: len(native)] for source in sources], axis=1)
-    for number, (_, place) in enumerate(samples):
-        delta[:, place] = own[:, number, None]
-    for code in np.unique(modes[(modes > 0) & (counts > 0)]):
-        chosen = modes == code
-        some = slice(None) if chosen.all() else np.repeat(chosen, counts)
-        poses = segment_poses(times, keys, np.where(chosen, counts, 0)[:, None], progress[some], MODE_IDS[code])
-        _differ(poses, native[:, some], delta, some)
+    segment_owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
+
+    delta = np.empty_like(native)
+    for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
+        progress = np.empty((1, place.stop - place.start))
+        combine(weights[None, :, some], timing[:, place], counts[some], progress)
+        progress = progress[0] - before[some].repeat(counts[some])
+        _turn_into_quaternions(native[:, place], order)
+        default = own[:, segment_owners[some]]
+        _fill(delta[:, place], native[:, place], default, modes[some], keys[some], counts[some], progress)
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = own[:, owners]
+    for number, (source, place) in enumerate(samples):
+        before, after = source.used_up
+        outside = (frames[number] < before) | (frames[number] > after)
+        delta[:, place][:, outside] = own[:, number, None]
     return native, delta
+
+
+def _fill(
+    delta: np.ndarray,
+    native: np.ndarray,
+    own: np.ndarray,
+    modes: np.ndarray,
+    keys: Poses,
+    counts: np.ndarray,
+    progress: np.ndarray,
+) -> None:
+    """Fill in the deltas (10, m) of S segments from poses at both ends (S, 2), each with its own deltas (10, S)."""
+    for mode in np.unique(modes[counts > 0]):
+        chosen = modes == mode
+        every = bool(chosen.all())
+        some = slice(None) if every else np.repeat(chosen, counts)
+        if every or mode == 0:
+            delta[:, some] = own[:, chosen].repeat(counts[chosen], axis=1)
+        if mode == 0:
+            continue
+        times = np.broadcast_to((0.0, 1.0), (len(counts), 2))
+        wanted = np.where(chosen, counts, 0)[:, None]
+        _differ(segment_poses(times, keys, wanted, progress[some], MODE_IDS[mode]), native[:, some], delta, some)
 
 
 def _sampled(
@@ -179,26 +219,31 @@ def _sampled(
 
 def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """The channels' own values where each segment starts and where it ends, rows as `_sampled` has them."""
-    start, end = np.empty((2, _height(segments), segments[-1][1].stop))
+    keys = _each([source for source, _ in segments], (len(source.key_frames) for source, _ in segments))
+    rows = np.empty((_height(segments), keys[-1][1].stop))
     places, curves, times = [], [], []
-    for source, place in segments:
-        _rest(start[:, place], source)
-        _rest(end[:, place], source)
-        for row, keys in source.components():
-            if not isinstance(keys, Keys):
-                start[row, place] = end[row, place] = keys
+    for source, place in keys:
+        _rest(rows[:, place], source)
+        for row, channel in source.components():
+            if not isinstance(channel, Keys):
+                rows[row, place] = channel
             elif source.is_together:
-                start[row, place], end[row, place] = keys.values[:-1], keys.values[1:]
+                rows[row, place] = channel.points[:, 1]
             else:
                 places.append((row, place))
-                curves.append(keys)
+                curves.append(channel)
                 times.append(source.key_frames)
-    sampled = evaluate(curves, times, unit_elastic=unit_elastic)
-    for place, keys, at, values in zip(places, curves, times, sampled, strict=True):
-        start[place], end[place] = values[:-1], values[1:]
-        # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its first.
-        jumps = _jumps(keys, at)
-        start[place][jumps[:-1]], end[place][jumps[1:]] = keys.values[0], keys.values[-1]
+    for place, values in zip(places, evaluate(curves, times, unit_elastic=unit_elastic), strict=True):
+        rows[place] = values
+    begins = np.delete(np.arange(rows.shape[1]), [place.stop - 1 for _, place in keys])
+    start, end = rows[:, begins], rows[:, begins + 1]
+    for source, place in segments:
+        for row, channel in source.components():
+            if isinstance(channel, Keys) and channel.cycles is not None:
+                # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its
+                # first.
+                jumps = _jumps(channel, source.key_frames)
+                start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = channel.values[0], channel.values[-1]
     return start, end
 
 
@@ -230,41 +275,38 @@ def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """How many samples each segment has, shape (segments,); which samples of all are on a key; and of which source."""
-    counts, on_keys, owners, before = [], [], [], 0
-    for number, (source, own) in enumerate(zip(sources, frames, strict=True)):
-        keys = source.key_frames
-        at = np.searchsorted(own, keys)
-        counts.append(np.diff(at[1:-1], prepend=0, append=len(own)))
-        hit = own[np.minimum(at, len(own) - 1)] == keys
-        on_keys.append(before + at[hit])
-        owners.append(np.full(len(on_keys[-1]), number))
-        before += len(own)
-    return np.concatenate(counts), np.concatenate(on_keys), np.concatenate(owners)
+    keys = np.concatenate([source.key_frames for source in sources])
+    owners = np.repeat(np.arange(len(sources)), [len(source.key_frames) for source in sources])
+    ends = np.cumsum([len(own) for own in frames])
+    begins = ends - [len(own) for own in frames]
+    at = begins[owners] + np.concatenate(
+        [np.searchsorted(own, source.key_frames) for source, own in zip(sources, frames, strict=True)]
+    )
+    hits = np.flatnonzero(np.concatenate(frames)[np.minimum(at, ends[owners] - 1)] == keys)
+    # A segment begins with the sample on its first key; what is outside of the keys belongs to the outermost ones.
+    bounds = at.copy()
+    last = np.flatnonzero(np.diff(owners, append=len(sources)))
+    bounds[np.concatenate(((0,), last[:-1] + 1))], bounds[last] = begins, ends
+    return np.delete(np.diff(bounds), last[:-1]), at[hits], owners[hits]
 
 
-def _progress(
-    timing: np.ndarray, start: np.ndarray, end: np.ndarray, counts: np.ndarray, segments: list[tuple[Source, slice]]
-) -> np.ndarray:
-    """How far each sample has come in its segment, from the channels (10, m) and their values at both ends."""
+def _weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """What a segment's progress is made of: weights (10, S) for the channels, and what to take off their sum, (S,)."""
     chord = end - start
     weights = chord.copy()
-    for source, place in segments:
-        if source.order is None:
-            # A unit quaternion moves by half of the angle that the object turns.
-            weights[ROWS[ROTATION], place] *= 4.0
+    if order is None:
+        # A unit quaternion moves by half of the angle that the object turns.
+        weights[ROWS[ROTATION]] *= 4.0
     total = np.einsum("rs,rs->s", weights, chord)
     weights /= np.where(total > 0.0, total, np.inf)
-    rows = np.flatnonzero(weights.any(axis=1))
-    progress = np.einsum("rm,rm->m", np.repeat(weights[rows], counts, axis=1), timing[rows])
-    progress -= np.repeat(np.einsum("rs,rs->s", weights, start), counts)
-    return progress
+    return weights, np.einsum("rs,rs->s", weights, start)
 
 
-def _turn_into_quaternions(rows: np.ndarray, places: list[tuple[Source, slice]]) -> None:
-    """Put unit quaternions in place of what the channels turn by."""
-    for source, place in places:
-        if source.order is not None and ROTATION in source.keyed:
-            rows[ROWS[ROTATION], place] = quaternions_from_eulers(rows[3:6, place].T, source.order).T
+def _turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
+    """Put unit quaternions in place of what the channels (10, m) turn by."""
+    if order is not None:
+        rows[ROWS[ROTATION]] = quaternions_from_eulers(rows[3:6].T, order).T
+        return
     quaternions = rows[ROWS[ROTATION]]
     lengths = np.sqrt(np.einsum("rm,rm->m", quaternions, quaternions))
     if not lengths.all():
@@ -281,7 +323,7 @@ def _key_poses(start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, 
         axis=1,
     )[:, :, None]
     for rows in (start, end):
-        _turn_into_quaternions(rows, segments)
+        _turn_into_quaternions(rows, segments[0][0].order)
     ends = np.stack((start, end), axis=2)
     return Poses(
         np.moveaxis(ends[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1),

@@ -151,9 +151,11 @@ def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
             break
     else:
         before = max((key for key in keys if key.co.x < frame), key=lambda key: key.co.x, default=None)
+        # Read first: an insertion moves the other keys elsewhere in memory.
+        eased = None if before is None else (before.interpolation, before.easing)
         key = keys.insert(frame, value)
-        if before is not None:
-            key.interpolation, key.easing = before.interpolation, before.easing
+        if eased is not None:
+            key.interpolation, key.easing = eased
     fcurve.update()
 
 

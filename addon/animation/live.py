@@ -19,7 +19,7 @@ from bpy.app.handlers import persistent
 from . import insertion
 from .filling import clear, fill_in, give_back, is_complete, recorded
 from .inbetweens import deltas
-from .reading import Curves, Slot, curves_in, explain_numbers, is_filled_in, read, slots_in, slots_of
+from .reading import Curves, Refused, Slot, curves_in, is_filled_in, read, slots_in, slots_of
 from .sources import Source
 
 log = logging.getLogger(__package__)
@@ -77,11 +77,12 @@ def problem_of(obj: bpy.types.Object) -> str:
     try:
         for slot in slots_of([obj]):
             source = read(slot, curves_in(slot.channelbag))
-            explain_numbers(obj.name, source)
             if source.is_live:
                 deltas([source])
-    except ValueError as problem:
+    except Refused as problem:
         return str(problem)
+    except ValueError as problem:
+        return f"{obj.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
     return ""
 
 
@@ -167,10 +168,11 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[bpy.
                 insertion.notice_pose(block.original, frame)
                 refresh([block.original])
         elif isinstance(block, bpy.types.Scene):
-            frames = block.frame_start, block.frame_end
-            if _State.ranges.get(block.session_uid, frames) != frames:
-                refresh(block.original.objects)
-            _State.ranges[block.session_uid] = frames
+            # Only the original has an identity: that of the evaluated scene is 0.
+            scene, frames = block.original, (block.frame_start, block.frame_end)
+            if _State.ranges.get(scene.session_uid, frames) != frames:
+                refresh(scene.objects)
+            _State.ranges[scene.session_uid] = frames
 
 
 def _look_through(*_: object) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import bpy
@@ -11,13 +12,14 @@ from . import live
 from .reading import (
     GROUP,
     MODE_PATH,
+    UNKNOWN,
     WIDTHS,
     Curves,
     Refused,
     Slot,
     Transformable,
     curves_in,
-    explain_numbers,
+    mode_of,
     read,
     slots_of,
 )
@@ -52,10 +54,8 @@ def key_frames(obj: bpy.types.Object, *, selected: bool = False) -> np.ndarray:
 def modes_of(obj: bpy.types.Object, frames: np.ndarray) -> list[str]:
     """The modes of an object's segments at these frames."""
     slot = active_slot(obj)
-    if slot is None:
-        return [obj.rigid_motion.mode] * len(frames)
-    modes = _modes_in(slot, curves_in(slot.channelbag), frames)
-    return [MODE_IDS[number] if 0 <= number < len(MODE_IDS) else "BLENDER" for number in modes]
+    curves = curves_in(slot.channelbag if slot else None)
+    return [MODE_IDS[number] for number in _modes_in(obj, curves, frames)]
 
 
 def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
@@ -72,11 +72,14 @@ def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
 
 
-def _modes_in(slot: Slot, curves: Curves, frames: np.ndarray) -> list[int]:
+def _modes_in(obj: bpy.types.Object, curves: Curves, frames: np.ndarray) -> list[int]:
+    """The modes at these frames, as `MODE_IDS` counts them; Blender's own where there is what is no mode."""
     fcurve = curves.get((MODE_PATH, 0))
     if fcurve is None or not fcurve.keyframe_points:
-        return [MODE_IDS.index(slot.users[0].rigid_motion.mode)] * len(frames)
-    return [_value(fcurve, frame) for frame in frames.tolist()]
+        modes = [mode_of(obj)] * len(frames)
+    else:
+        modes = [_value(fcurve, frame) for frame in frames.tolist()]
+    return [mode if 0 <= mode < len(MODE_IDS) else 0 for mode in modes]
 
 
 def set_mode(obj: bpy.types.Object, mode: str, frames: Sequence[float] | None = None) -> None:
@@ -123,7 +126,7 @@ def set_mode_in(slot: Slot, mode: str, frames: Sequence[float]) -> None:
     """Key the mode channel of one slot on these frames, and behind them where another mode goes on."""
     curves = curves_in(slot.channelbag)
     chosen, keyed = np.asarray(frames, dtype=np.float64), _frames_in(curves)
-    before = _modes_in(slot, curves, keyed)
+    before = _modes_in(slot.users[0], curves, keyed)
     fcurve = curves.get((MODE_PATH, 0)) or _new(slot)
     for frame, old in zip(keyed.tolist(), before, strict=True):
         is_chosen = bool(np.abs(chosen - frame).min(initial=np.inf) < SAME_FRAME)
@@ -139,12 +142,13 @@ def check(obj: bpy.types.Object, slots: Sequence[Slot]) -> None:
     if not obj.is_editable:
         raise Refused(f"{obj.name} is linked from another file: make it local first (Object > Relations > Make Local)")
     for slot in slots:
-        explain_numbers(obj.name, read(slot, curves_in(slot.channelbag), mode=1))
+        read(slot, curves_in(slot.channelbag), mode=1)
 
 
 def _value(fcurve: bpy.types.FCurve, frame: float) -> int:
-    """The mode of the segment that begins on this frame."""
-    return round(fcurve.evaluate(frame + 0.5 * SAME_FRAME))
+    """The mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
+    value = fcurve.evaluate(frame + 0.5 * SAME_FRAME)
+    return round(value) if math.isfinite(value) else UNKNOWN
 
 
 def _new(slot: Slot) -> bpy.types.FCurve:

@@ -6,6 +6,7 @@ no delta transforms: `Transformable` is where it will come in, for what is baked
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -32,6 +33,9 @@ COMPONENTS = (
     *(f"Scale {axis}" for axis in "XYZ"),
 )
 """What the rows of a source are called."""
+
+UNKNOWN = -1
+"""The mode of an object from a file that is damaged, or of a later version."""
 
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, SCALE: 3}
 
@@ -179,6 +183,8 @@ def read(slot: Slot, curves: Curves, mode: int | None = None) -> Source:
     source, *others = (_read_for(Transformable.of(obj), slot, curves) for obj in slot.users)
     if mode is not None:
         source, *others = (replace(one, mode=mode) for one in (source, *others))
+    else:
+        _refuse_modes(slot.users[0].name, source.mode)
     for obj, other in zip(slot.users[1:], others, strict=True):
         if other.digest != source.digest:
             raise Refused(
@@ -202,13 +208,19 @@ def _read_for(what: Transformable, slot: Slot, curves: Curves) -> Source:
         order=what.carrier.rotation_mode if what.rotation == "rotation_euler" else None,
         keyed=keyed,
         own=own_deltas(what.carrier),
-        mode=MODE_IDS.index(what.carrier.rigid_motion.mode) if keyed_mode is None else keyed_mode,
+        mode=mode_of(what.carrier) if keyed_mode is None else keyed_mode,
         span=None,
     )
     if any(keys.linear or keys.cycles is not None for keys in source.curves):
         source = replace(source, span=slot.span)
     _refuse_numbers(what, source)
     return source
+
+
+def mode_of(obj: bpy.types.Object) -> int:
+    """The mode of an object as it is now, as `MODE_IDS` counts them; `UNKNOWN` where it is none of them."""
+    mode = obj.rigid_motion.mode
+    return MODE_IDS.index(mode) if mode in MODE_IDS else UNKNOWN
 
 
 def own_deltas(obj: bpy.types.Object) -> np.ndarray:
@@ -224,7 +236,7 @@ def own_deltas(obj: bpy.types.Object) -> np.ndarray:
     else:
         own[3:7] = motion.own_quaternion if quaternion else obj.delta_rotation_quaternion
         length = np.sqrt(own[3:7] @ own[3:7])
-        own[3:7] = own[3:7] / length if length > 0.0 else (1.0, 0.0, 0.0, 0.0)
+        own[3:7] = own[3:7] / length if length != 0.0 else (1.0, 0.0, 0.0, 0.0)
     return own
 
 
@@ -267,6 +279,11 @@ def _refuse_what_is_taken(what: Transformable, slot: Slot, curves: Curves) -> No
         for index in range(WIDTHS[prop]):
             fcurve = curves.get((f"{what.prefix}delta_{prop}", index))
             if fcurve is not None and not is_filled_in(fcurve):
+                if fcurve.group is not None and fcurve.group.name == GROUP:
+                    raise Refused(
+                        f"{what.name}: {_label(fcurve)} has in-betweens that were turned into keys: "
+                        "delete that channel, and they are made anew (Dope Sheet, X)"
+                    )
                 raise Refused(
                     f"{what.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
                     f"{prop.replace('_', ' ')} (Object > Apply > Animated Transforms to Deltas does the reverse)"
@@ -275,26 +292,78 @@ def _refuse_what_is_taken(what: Transformable, slot: Slot, curves: Curves) -> No
 
 def _refuse_numbers(what: Transformable, source: Source) -> None:
     """Raise `Refused` where the keys make no motion, or too long a one."""
-    ends = [time for keys in source.curves for time in keys.points[(0, -1), 0].tolist()]
-    if not all(map(math.isfinite, ends)):
-        explain_numbers(what.name, source)
-    if ends and max(ends) - min(ends) > MOST_FRAMES:
+    curves = source.curves
+    if not curves:
+        return
+    points = np.concatenate([keys.points for keys in curves])
+    shapes = [keys.left for keys in curves] + [keys.right for keys in curves] + [keys.easing_settings for keys in curves]
+    values = [value for _, value in source.components() if not isinstance(value, Keys)]
+    falls = np.flatnonzero(points[1:, 0] < points[:-1, 0]) + 1
+    # From one channel to the next, frames start over.
+    in_order = set(falls.tolist()) <= set(itertools.accumulate(len(keys.points) for keys in curves))
+    numbers = (points, source.own, values, *(shape for shape in shapes if shape is not None))
+    if not (in_order and np.isfinite(np.concatenate([np.ravel(some) for some in numbers])).all()):
+        _explain_numbers(what, source)
+    keyed = float(points[:, 0].max() - points[:, 0].min())
+    first, last = source.frame_range
+    if keyed > MOST_FRAMES:
         raise Refused(
-            f"{what.name} has keys over {max(ends) - min(ends):.0f} frames, at most {MOST_FRAMES} can be filled in: "
+            f"{what.name} has keys over {keyed:.0f} frames, at most {MOST_FRAMES} can be filled in: "
             "delete the keys that are far off"
         )
+    if last - first > MOST_FRAMES:
+        raise Refused(
+            f"{what.name} goes on outside of its keys for all {last - first} frames of its scene, at most {MOST_FRAMES} "
+            "can be filled in: give the scene fewer frames, or the channels constant extrapolation and no cycles"
+        )
+    try:
+        source.key_frames  # noqa: B018 - raises where cycles make too many
+    except ValueError as problem:
+        raise Refused(f"{what.name}: {problem}") from None
 
 
-def explain_numbers(name: str, source: Source) -> None:
-    """Raise `Refused` with the first number among the keys that is not finite."""
+def _explain_numbers(what: Transformable, source: Source) -> None:
+    """Raise `Refused` with the first number of a source that is not finite, or the first channel out of order."""
     for row, keys in source.components():
-        values = keys.points if isinstance(keys, Keys) else np.array([[keys]])
-        if not np.isfinite(values).all():
-            channel = (
-                f"{COMPONENTS[row]}" if source.order is None or row < 3 or row > 5 else f"Rotation {'XYZ'[row - 3]}"
+        label = f"Rotation {'XYZ'[row - 3]}" if source.order is not None and 3 <= row < 6 else COMPONENTS[row]
+        if not isinstance(keys, Keys):
+            if not math.isfinite(keys):
+                raise Refused(f"{what.name}: {label} is not a finite number: set it anew (sidebar, Item)")
+            continue
+        parts = {
+            "": keys.points,
+            "left handle of ": keys.left,
+            "right handle of ": keys.right,
+            "easing of ": None if keys.easing_settings is None else keys.easing_settings.T,
+        }
+        for part, numbers in parts.items():
+            if numbers is not None and not np.isfinite(numbers).all():
+                key = int(np.argwhere(~np.isfinite(numbers))[0, 0]) + 1
+                raise Refused(
+                    f"{what.name}: {part}key {key} of {label} is not a finite number: delete it (Dope Sheet, X)"
+                )
+        if np.any(np.diff(keys.times) < 0.0):
+            raise Refused(
+                f"{what.name}: the keys of {label} are not in the order of their frames: "
+                "move one of them and back (Dope Sheet, G)"
             )
-            key = int(np.argwhere(~np.isfinite(values))[0, 0]) + 1
-            raise Refused(f"{name}: key {key} of {channel} is not a finite number: delete it (Dope Sheet, X)")
+    raise Refused(
+        f"{what.name}: a delta transform is not a finite number: set it anew (Object Properties, Delta Transform)"
+    )
+
+
+def _refuse_modes(name: str, mode: int | Keys) -> None:
+    """Raise `Refused` where an object, or a key of its mode channel, has what is no mode."""
+    if not isinstance(mode, Keys):
+        if mode == UNKNOWN:
+            raise Refused(f"{name} has a mode that this version does not know: choose another")
+        return
+    known = (mode.values > -0.5) & (mode.values < len(MODE_IDS) - 0.5) & np.isfinite(mode.times)
+    if not known.all():
+        raise Refused(
+            f"{name}: key {int(np.argmin(known)) + 1} of the mode channel has no mode that this version knows: "
+            "delete it (Dope Sheet, X), or choose a mode for the whole object"
+        )
 
 
 def _label(fcurve: bpy.types.FCurve) -> str:

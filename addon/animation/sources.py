@@ -105,7 +105,7 @@ class Source:
         if not isinstance(self.mode, Keys):
             return np.full(len(frames), self.mode)
         modes = self.mode.values[np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
-        return np.where((modes >= 0) & (modes < len(MODE_IDS)), modes, 0).astype(int)
+        return np.rint(modes).astype(int)
 
     @property
     def is_live(self) -> bool:
@@ -136,6 +136,14 @@ class Source:
     def is_elastic(self) -> bool:
         """Whether any key eases elastically, which depends on how far a channel goes."""
         return any(keys.easing is not None and np.any(keys.interpolation == ELASTIC) for keys in self.curves)
+
+    @cached_property
+    def used_up(self) -> tuple[float, float]:
+        """Before and after which frame cycles that have a count are through: Blender goes back to the outermost keys."""
+        cycles = [keys.cycles for keys in self.curves if keys.cycles is not None]
+        before = any(one.before != "NONE" and one.before_count > 0 for one in cycles)
+        after = any(one.after != "NONE" and one.after_count > 0 for one in cycles)
+        return float(self.key_frames[0]) if before else -np.inf, float(self.key_frames[-1]) if after else np.inf
 
     @cached_property
     def _cyclic(self) -> Keys | None:

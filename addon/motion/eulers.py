@@ -9,6 +9,9 @@ method", PLoS ONE 17(11), 2022.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
@@ -17,20 +20,22 @@ LOCKED = 1e-7
 """Below this length a half sum or half difference of angles has no direction: the gimbal is locked."""
 
 
-def eulers_from_quaternions(quaternions: np.ndarray, order: str) -> np.ndarray:
+def eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
     """The angles of a motion's rotations, each set of angles the one nearest to the set before it.
 
     Parameters
     ----------
     quaternions : array, shape (n, 4)
-        Unit, w, x, y, z, of any sign.
+        Unit, w, x, y, z, of any sign. Several motions may stand one behind the other.
     order : str
         One of `ORDERS`.
+    starts : sequence of int
+        Where each of the motions begins.
 
     Returns
     -------
     array, shape (n, 3)
-        Radians about x, y and z. The angles may leave the range of a full turn.
+        Radians about x, y and z. The angles may leave the range of a full turn, but for the first of each motion.
 
     Notes
     -----
@@ -42,13 +47,16 @@ def eulers_from_quaternions(quaternions: np.ndarray, order: str) -> np.ndarray:
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
     w, *xyz = quaternions.T
-    half_sum, outer = _direction(w - xyz[j], xyz[i] + sign * xyz[k])
-    half_difference, inner = _direction(w + xyz[j], sign * xyz[k] - xyz[i])
-    angles = np.empty((len(quaternions), 3))
-    angles[:, i] = half_sum - half_difference
-    angles[:, j] = np.unwrap(2.0 * np.arctan2(inner, outer)) - 0.5 * np.pi
-    angles[:, k] = sign * (half_sum + half_difference)
-    return _nearest_to_zero(angles)
+    half_sum, outer = _direction(w - xyz[j], xyz[i] + sign * xyz[k], starts)
+    half_difference, inner = _direction(w + xyz[j], sign * xyz[k] - xyz[i], starts)
+    angles = np.empty((3, len(quaternions)))
+    angles[i] = half_sum - half_difference
+    angles[j] = _unwrapped(2.0 * np.arctan2(inner, outer), 2.0 * np.pi, starts)[0] - 0.5 * np.pi
+    angles[k] = sign * (half_sum + half_difference)
+    # The first angles are within half a turn, as an animator would have keyed them.
+    turns = np.rint(angles[:, list(starts)] / (2.0 * np.pi))
+    angles -= 2.0 * np.pi * turns.repeat(_counts(starts, len(quaternions)), axis=1)
+    return angles.T
 
 
 def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
@@ -65,18 +73,33 @@ def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     return quaternions.T
 
 
-def _direction(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _direction(x: np.ndarray, y: np.ndarray, starts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """The angle of the line through each plane vector, without jumps, and the vector's signed length along it."""
-    length = np.hypot(x, y)
-    free = length < LOCKED
+    length = np.sqrt(x * x + y * y)
     angle = np.arctan2(y, x)
-    if free.all():
-        return np.zeros_like(length), length
-    rows = np.arange(len(angle))
-    line = np.interp(rows, rows[~free], np.unwrap(angle[~free], period=np.pi))
+    free = length < LOCKED
+    if not free.any():
+        line, turns = _unwrapped(angle, np.pi, starts)
+        return line, np.where(turns % 2.0 == 1.0, -length, length)
+    line = np.zeros_like(angle)
+    for first, last in itertools.pairwise((*starts, len(angle))):
+        rows = np.arange(first, last)
+        bound = rows[~free[first:last]]
+        if len(bound):
+            line[first:last] = np.interp(rows, bound, _unwrapped(angle[bound], np.pi, (0,))[0])
     return line, np.where(free, length, length * np.sign(np.cos(line - angle)))
 
 
-def _nearest_to_zero(angles: np.ndarray) -> np.ndarray:
-    """The same motion with its first angles within half a turn, as an animator would have keyed it."""
-    return angles - 2.0 * np.pi * np.round(angles[:1] / (2.0 * np.pi))
+def _unwrapped(angles: np.ndarray, period: float, starts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Angles (n,) that go on by half a period at most within each motion, and how many periods were taken off."""
+    turns = np.rint(np.diff(angles, prepend=angles[:1]) / period)
+    turns[list(starts)] = 0.0
+    np.cumsum(turns, out=turns)
+    if len(starts) > 1:
+        turns -= turns[list(starts)].repeat(_counts(starts, len(angles)))
+    return angles - period * turns, turns
+
+
+def _counts(starts: Sequence[int], count: int) -> np.ndarray:
+    """How long each motion is."""
+    return np.diff((*starts, count))

@@ -15,7 +15,10 @@ BLOCK = 32768
 """Samples worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
 
 DENSE = 128
-"""Samples in a row, equally many in each piece, from which on a matrix product beats repeating coefficients."""
+"""Samples in a row of pieces with equally many each, from which on matrix products beat repeating coefficients."""
+
+ENOUGH = 8
+"""Samples of a piece from which on they do."""
 
 
 def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice]]:
@@ -29,9 +32,9 @@ def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice
 
 
 def is_dense(counts: np.ndarray) -> bool:
-    """Whether equal counts (S,) of samples come in rows so long that `multiply` is the quicker way."""
+    """Whether `multiply` is the quicker way for these counts (S,) of samples."""
     runs = 1 + np.count_nonzero(counts[1:] != counts[:-1])
-    return bool(counts.sum() >= DENSE * runs and counts.min() >= 8)
+    return bool(counts.sum() >= max(DENSE * runs, ENOUGH * len(counts)))
 
 
 def multiply(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:

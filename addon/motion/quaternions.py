@@ -9,14 +9,20 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton's product a b, shapes (..., 4): the rotation b first, then a. A view, components apart in memory."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    components = np.stack(
-        (
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        )
-    )
+    components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape)))
+    w, x, y, z = components
+    np.subtract(aw * bw, ax * bx, out=w)
+    w -= ay * by
+    w -= az * bz
+    np.add(aw * bx, ax * bw, out=x)
+    x += ay * bz
+    x -= az * by
+    np.add(aw * by, ay * bw, out=y)
+    y -= ax * bz
+    y += az * bx
+    np.add(aw * bz, az * bw, out=z)
+    z += ax * by
+    z -= ay * bx
     return np.moveaxis(components, 0, -1)
 
 
