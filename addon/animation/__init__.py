@@ -1,5 +1,6 @@
 """Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
+slots       what moves an object, and by which F-curves refusals    why not, and the way out
 reading     what is keyed, from Blender's data          sources     the same as arrays
 fcurves     F-curves in NumPy                           easings     Blender's easings
 inbetweens  from sources to delta transforms            filling     writing those
@@ -12,7 +13,7 @@ from .bake import bake, bake_poses, is_baked, unbake
 from .channels import channelbag_of, read_poses, write_channel
 from .live import problem_of, refresh, set_enabled
 from .mode_keys import key_frames, modes_of, set_mode
-from .reading import Refused
+from .slots import Refused
 from .sources import MODE_IDS
 
 __all__ = [

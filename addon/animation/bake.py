@@ -15,9 +15,10 @@ from ..motion.quaternions import align_signs, conjugate, multiply
 from . import live
 from .channels import write_channel
 from .filling import adopt
-from .inbetweens import InBetweens, components_at, in_betweens
+from .inbetweens import InBetweens, in_betweens
 from .mode_keys import set_mode_in
-from .reading import Refused, Slot, Transformable, curves_in, read, slots_of
+from .reading import read
+from .slots import Refused, Slot, Transformable, curves_in, slots_of
 from .sources import LOCATION, ROTATION, SAME_FRAME, Source
 
 FIELDS = {
@@ -203,7 +204,7 @@ def _exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Actio
 def _channels(what: Transformable, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
     """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
     own, poses, channels = source.own, motion.wanted, {}
-    first = components_at(source, motion.frames[0])
+    first = source.values_at(motion.frames[:1])[:, 0]
     if LOCATION in source.keyed:
         channels["location"] = poses.positions - own[:3]
     if ROTATION in source.keyed:

@@ -11,10 +11,10 @@ import bpy
 import numpy as np
 
 from ..motion.eulers import quaternions_from_eulers
-from .fcurves import Keys, cycled, evaluate
+from .fcurves import Keys, cycled
 from .filling import recorded
 from .mode_keys import active_slot
-from .sources import MODE_IDS, REST, SAME_FRAME, Source
+from .sources import MODE_IDS, SAME_FRAME, Source
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -96,12 +96,7 @@ def is_up_to_date(obj: bpy.types.Object, source: Source) -> bool:
 
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:
     """What the channels have at both ends of a segment, shape (10, 2), as seen from within it where cycles jump."""
-    rows = np.repeat(REST[:, None], 2, axis=1)
-    at = ends if _cyclic(source) is None else ends + np.array((MOMENT, -MOMENT))
-    values = iter(evaluate(source.curves, [at] * len(source.curves)))
-    for row, keys in source.components():
-        rows[row] = next(values) if isinstance(keys, Keys) else keys
-    return rows
+    return source.values_at(ends if _cyclic(source) is None else ends + np.array((MOMENT, -MOMENT)))
 
 
 def _cyclic(source: Source) -> Keys | None:
@@ -114,5 +109,5 @@ def _deciding_key(source: Source, start: float) -> float:
     if cyclic is None:
         return float(start)
     moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]
-    keys = np.unique(np.concatenate([keys.times for keys in source.curves]))
+    keys = source.keyed_frames
     return float(keys[max(np.searchsorted(keys, moment, side="right") - 1, 0)])

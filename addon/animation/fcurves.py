@@ -60,96 +60,112 @@ class Cycles:
 
 @dataclass(frozen=True, eq=False)
 class Keys:
-    """One F-curve of n keys, and what it does outside of them. What does not bear on its values is None.
+    """c F-curves that are keyed together: n keys each, on the same frames, and alike in what they do outside of them.
 
-    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`.
+    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`. What does not bear on the values
+    of the curves is None.
     """
 
     points: np.ndarray
-    """Frame and value, shape (n, 2)."""
+    """Frame and value, shape (c, n, 2)."""
 
     interpolation: np.ndarray
-    """Codes of the segments that the keys begin, shape (n,)."""
+    """Codes of the segments that the keys begin, shape (c, n)."""
 
     left: np.ndarray | None = None
-    """The handles before the keys, frame and value, shape (n, 2)."""
+    """The handles before the keys, frame and value, shape (c, n, 2)."""
 
     right: np.ndarray | None = None
-    """The handles behind the keys, frame and value, shape (n, 2)."""
+    """The handles behind the keys, frame and value, shape (c, n, 2)."""
 
     easing: np.ndarray | None = None
-    """Codes, shape (n,)."""
+    """Codes, shape (c, n)."""
 
     easing_settings: np.ndarray | None = None
-    """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, n)."""
+    """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, c, n)."""
 
     linear: bool = False
-    """Whether the curve goes on at its slope outside of the keys, instead of holding its value."""
+    """Whether the curves go on at their slope outside of the keys, instead of holding their value."""
 
     cycles: Cycles | None = None
 
     @cached_property
     def times(self) -> np.ndarray:
         """Frames of the keys, shape (n,), double precision."""
-        return self.points[:, 0].astype(np.float64)
+        return self.points[0, :, 0].astype(np.float64)
 
-    @cached_property
+    @property
     def values(self) -> np.ndarray:
-        """Values of the keys, shape (n,), double precision."""
-        return self.points[:, 1].astype(np.float64)
+        """Values of the keys, shape (c, n)."""
+        return self.points[..., 1]
 
     @property
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""
         arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
         read = [array for array in arrays if array is not None]
-        header = f"{len(self.points)} {len(read)} {self.linear} {self.cycles};"
+        header = f"{self.points.shape} {len(read)} {self.linear} {self.cycles};"
         return b"".join((header.encode(), *(array.tobytes() for array in read)))
 
 
-def read_keys(fcurve: bpy.types.FCurve) -> Keys:
-    """The keys of `fcurve`, and the first of its Cycles modifiers that is not muted; none of its other modifiers.
+def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[tuple[list[int], Keys]]:
+    """The keys of F-curves, and the first Cycles modifier of each that is not muted; none of their other modifiers.
 
     Parameters
     ----------
-    fcurve : bpy.types.FCurve
+    fcurves : sequence of bpy.types.FCurve
         With keys: of a sampled curve there are none.
+
+    Returns
+    -------
+    list of (list of int, Keys)
+        Those together that are keyed together: their places in the sequence, and their keys.
     """
-    keys = fcurve.keyframe_points
-    count = len(keys)
-    points, interpolation = np.empty(2 * count, np.float32), np.empty(count, np.int32)
-    keys.foreach_get("co", points)
-    keys.foreach_get("interpolation", interpolation)
+    together: dict[tuple, list[tuple]] = {}
+    for number, fcurve in enumerate(fcurves):
+        keys = fcurve.keyframe_points
+        points = np.empty(2 * len(keys), np.float32)
+        keys.foreach_get("co", points)
+        cycles = _read_cycles(fcurve.modifiers) if fcurve.modifiers else None
+        alike = points[::2].tobytes(), fcurve.extrapolation, cycles
+        together.setdefault(alike, []).append((number, keys, points))
+    return [
+        ([number for number, *_ in curves], _read([keys for _, keys, _ in curves], [co for *_, co in curves], *others))
+        for (_, *others), curves in together.items()
+    ]
+
+
+def _read(channels: Sequence, points: Sequence[np.ndarray], extrapolation: str, cycles: Cycles | None) -> Keys:
+    """The keys of channels that are keyed together, from their `keyframe_points` and these points (2 n,) of each."""
+    shape = len(channels), len(points[0]) // 2
+
+    def read(name: str, out: np.ndarray) -> np.ndarray:
+        for row, keys in zip(out, channels, strict=True):
+            keys.foreach_get(name, row)
+        return out
+
+    interpolation = read("interpolation", np.empty(shape, np.int32))
     kinds = _known(interpolation, INTERPOLATIONS, CONSTANT)
     eased = not kinds <= {CONSTANT, LINEAR, BEZIER}
-    linear = fcurve.extrapolation == "LINEAR"
+    linear = extrapolation == "LINEAR"
     left = right = easing = settings = None
     if BEZIER in kinds or (linear and eased):
-        left, right = np.empty(2 * count, np.float32), np.empty(2 * count, np.float32)
-        keys.foreach_get("handle_left", left)
-        keys.foreach_get("handle_right", right)
-        left, right = left.reshape(count, 2), right.reshape(count, 2)
+        left, right = (
+            read(name, np.empty((shape[0], 2 * shape[1]), np.float32)).reshape(*shape, 2)
+            for name in ("handle_left", "handle_right")
+        )
     if eased:
-        easing, settings = np.empty(count, np.int32), np.empty((3, count), np.float32)
-        keys.foreach_get("easing", easing)
+        easing = read("easing", np.empty(shape, np.int32))
         _known(easing, EASINGS, AUTO)
-        for row, name in zip(settings, ("back", "amplitude", "period"), strict=True):
-            keys.foreach_get(name, row)
-    return Keys(
-        points.reshape(count, 2),
-        interpolation,
-        left,
-        right,
-        easing,
-        settings,
-        linear,
-        _read_cycles(fcurve.modifiers) if fcurve.modifiers else None,
-    )
+        settings = np.empty((3, *shape), np.float32)
+        for rows, name in zip(settings, ("back", "amplitude", "period"), strict=True):
+            read(name, rows)
+    return Keys(np.concatenate(points).reshape(*shape, 2), interpolation, left, right, easing, settings, linear, cycles)
 
 
 def _known(codes: np.ndarray, names: dict[int, str], otherwise: int) -> set[int]:
     """The codes there are, after Blender's own way with those that mean nothing, in a damaged file."""
-    found = set(codes.tolist())
+    found = set(codes.ravel().tolist())
     if not found <= names.keys():
         codes[~np.isin(codes, list(names))] = otherwise
         found = found & names.keys() | {otherwise}
@@ -164,14 +180,14 @@ def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
 
 
 def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elastic: bool = False) -> list[np.ndarray]:
-    """The values of each curve at its times.
+    """The values of curves at their times.
 
     Parameters
     ----------
     curves : sequence of Keys
-        Without keys a curve is 0 everywhere, as in Blender.
+        Without keys curves are 0 everywhere, as in Blender.
     times : sequence of array, shape (m,)
-        Frames for each curve, sub-frames allowed, best in rising order. Curves that have their keys and handles on the
+        Frames for each of them, sub-frames allowed, best in rising order. Curves that have their keys and handles on the
         same frames, and that are asked for the same frames, share the work.
     unit_elastic : bool
         Take the amplitude of ELASTIC relative to the change of value in its segment, instead of in units of value:
@@ -179,13 +195,23 @@ def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elasti
 
     Returns
     -------
-    list of array, shape (m,)
-        NaN where keys or handles are not finite. Several may be views of one array. What Blender does to the channels
+    list of array, shape (c, m)
+        NaN where keys or handles are not finite. What Blender does to the channels
         of whole numbers and enumerations, which it rounds, is left out.
     """
+    results = [np.empty((len(keys.points), len(at))) for keys, at in zip(curves, times, strict=True)]
+    for number, channels, values in evaluated(curves, times, unit_elastic=unit_elastic):
+        results[number][channels] = values
+    return results
+
+
+def evaluated(
+    curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elastic: bool = False
+) -> list[tuple[int, slice, np.ndarray]]:
+    """The same in pieces: of which of the curves, which of their channels, and the values (channels, m)."""
+    pieces: list[tuple[int, slice, np.ndarray]] = []
     if not curves:
-        return []
-    results: list[np.ndarray] = [np.empty(0)] * len(curves)
+        return pieces
     with np.errstate(all="ignore"):
         spans = _Spans.of(curves, unit_elastic)
         for groups in _blocks(_groups(curves, list(times), spans)):
@@ -193,10 +219,14 @@ def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elasti
             rows = _values(groups, spans)
             for group in groups:
                 end = begin + len(group.moments)
-                for number, values in zip(group.curves.tolist(), group.finished(rows[:, begin:end]), strict=True):
-                    results[number] = values
+                values = group.finished(rows[:, begin:end])
+                row = 0
+                for number, channels in group.members:
+                    count = channels.stop - channels.start
+                    pieces.append((number, channels, values[row : row + count]))
+                    row += count
                 begin = end
-    return results
+    return pieces
 
 
 def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -245,8 +275,8 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
     """
     times = np.asarray(times, dtype=np.float64)
     copies = [times]
-    if keys.cycles is not None and len(keys.points):
-        begin, end = keys.times[0].item(), keys.times[-1].item()
+    if keys.cycles is not None and len(keys.times):
+        begin, end = keys.times[[0, -1]].tolist()
         period = end - begin
         inside = times[(times >= begin) & (times <= end)]
         for mode, count, room, side in (
@@ -273,9 +303,10 @@ def _fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     """
     folded = times.astype(np.float32)
     backwards, rounds = np.zeros(times.shape, dtype=bool), np.zeros(times.shape, np.float32)
-    if keys.cycles is None or not len(keys.points) or keys.points[0, 0] == keys.points[-1, 0]:
+    frames = keys.points[0, :, 0]
+    if keys.cycles is None or not len(frames) or frames[0] == frames[-1]:
         return folded.astype(np.float64), backwards, rounds
-    begin, end = keys.points[0, 0], keys.points[-1, 0]
+    begin, end = frames[0], frames[-1]
     period = end - begin
     for mode, count, outside, side in (
         (keys.cycles.before, keys.cycles.before_count, folded < begin, -1),
@@ -302,16 +333,15 @@ def _fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     return folded.astype(np.float64), backwards, rounds
 
 
-_NO_KEYS = Keys(np.zeros((1, 2), np.float32), np.full(1, CONSTANT, np.int32))
-"""Stands for a curve without keys, which is 0 everywhere in Blender."""
-
-
 @dataclass(frozen=True, eq=False)
 class _Group:
     """Curves with the same timing, and which spans their moments fall into."""
 
+    members: list[tuple[int, slice]]
+    """The curves: which of the keys asked for, and which channels of them."""
+
     curves: np.ndarray
-    """Numbers of the curves, shape (c,)."""
+    """Their numbers among all curves, shape (c,)."""
 
     moments: np.ndarray
     """Frames, rising, shape (m,)."""
@@ -341,22 +371,25 @@ class _Group:
 def _groups(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: _Spans) -> Iterator[_Group]:
     """Curves that share their timing and are asked for the same frames, wherever in the list they are."""
     requests, distinct = _requests(times)
-    together: dict[tuple, list[int]] = {}
-    for number, key in enumerate(zip(requests, spans.timings(curves), strict=True)):
-        together.setdefault(key, []).append(number)
+    together: dict[tuple, list[tuple[int, slice]]] = {}
+    for number, (request, timings) in enumerate(zip(requests, spans.timings(curves), strict=True)):
+        for channels, timing in timings:
+            together.setdefault((request, timing), []).append((number, channels))
     rising = [bool(np.all(moments[1:] >= moments[:-1])) for moments in distinct]
-    for (request, _), numbers in together.items():
-        leader, moments = curves[numbers[0]], distinct[request]
+    for (request, _), members in together.items():
+        leader, moments = curves[members[0][0]], distinct[request]
         offsets = order = None
         if leader.cycles is not None:
             moments, _, rounds = _fold(leader, moments)
             if np.any(rounds):
-                rises = [curves[number].points[-1, 1] - curves[number].points[0, 1] for number in numbers]
-                offsets = np.multiply.outer(rises, rounds)
+                ends = [curves[number].values[channels] for number, channels in members]
+                offsets = np.multiply.outer(np.concatenate([values[:, -1] - values[:, 0] for values in ends]), rounds)
         if leader.cycles is not None or not rising[request]:
             order = np.argsort(moments, kind="stable")
             moments = moments[order]
-        yield _Group(np.array(numbers), moments, *spans.place(numbers[0], moments), order, offsets)
+        numbers = [spans.number[number] + np.arange(channels.start, channels.stop) for number, channels in members]
+        own = np.concatenate(numbers)
+        yield _Group(members, own, moments, *spans.place(int(own[0]), moments), order, offsets)
 
 
 def _requests(times: Sequence[np.ndarray]) -> tuple[list[int], list[np.ndarray]]:
@@ -410,6 +443,9 @@ def _values(groups: list[_Group], spans: _Spans) -> np.ndarray:
 class _Spans:
     """The spans of C curves, one curve after the other: N in all."""
 
+    number: list[int]
+    """How many curves there are before those of each `Keys`."""
+
     first: np.ndarray
     """The first span of each curve, and the end, shape (C + 1,)."""
 
@@ -453,17 +489,21 @@ class _Spans:
 
     @classmethod
     def of(cls, curves: Sequence[Keys], unit_elastic: bool) -> _Spans:
-        curves = [curve if len(curve.points) else _NO_KEYS for curve in curves]
-        first = np.cumsum([0, *(len(curve.points) + 1 for curve in curves)])
+        curves = [keys if len(keys.times) else _without_keys(len(keys.points)) for keys in curves]
+        channels = [len(keys.points) for keys in curves]
+        first = np.concatenate(((0,), np.cumsum(np.repeat([len(keys.times) + 1 for keys in curves], channels))))
         before, after = first[:-1], first[1:] - 1
         # The span before the first key is that of a second key in the same place.
-        key = np.arange(first[-1]) - np.repeat(np.arange(1, len(curves) + 1), np.diff(first))
+        key = np.arange(first[-1]) - np.repeat(np.arange(1, len(first)), np.diff(first))
         key[before] += 1
 
-        points = np.concatenate([curve.points for curve in curves])[key]
-        left = np.concatenate([curve.points if curve.left is None else curve.left for curve in curves])[key]
-        right = np.concatenate([curve.points if curve.right is None else curve.right for curve in curves])[key]
-        codes = np.concatenate([curve.interpolation for curve in curves])[key]
+        points = np.concatenate([keys.points.reshape(-1, 2) for keys in curves])[key]
+        left, right = (
+            np.concatenate([(keys.points if of_keys is None else of_keys).reshape(-1, 2) for keys, of_keys in handles])
+            for handles in ([(keys, keys.left) for keys in curves], [(keys, keys.right) for keys in curves])
+        )
+        left, right = left[key], right[key]
+        codes = np.concatenate([keys.interpolation.ravel() for keys in curves])[key]
         following, following_left = np.roll(points, -1, axis=0), np.roll(left, -1, axis=0)
         duration = following[:, 0] - points[:, 0]
         crowded = ~(duration > 2.1 * NEAR)
@@ -480,8 +520,8 @@ class _Spans:
             cubics = _cubics(points[curved], right[curved], following_left[curved], following[curved])
             bezier[:, curved] = cubics[..., 0] / duration[curved]
             polynomials[1:, curved] = cubics[..., 1]
-        linear = [number for number, curve in enumerate(curves) if curve.linear]
-        if linear:
+        linear = np.flatnonzero(np.repeat([keys.linear for keys in curves], channels))
+        if len(linear):
             for outside, inwards, handles in ((before[linear], 2, left), (after[linear], -1, right)):
                 # The neighbour of an only key is that key itself.
                 neighbours = np.clip(outside + inwards, before[linear] + 1, after[linear])
@@ -500,6 +540,7 @@ class _Spans:
         side[before], side[after] = -1.0, 1.0
         timing = np.column_stack((points[:, 0], left[:, 0], right[:, 0], codes.astype(np.float32)))
         return cls(
+            number=list(itertools.accumulate(channels[:-1], initial=0)),
             first=first,
             start=start,
             earliest=earliest,
@@ -512,20 +553,29 @@ class _Spans:
             polynomials=polynomials,
             timing=timing.tobytes(),
             crowded=frozenset((np.searchsorted(first, np.flatnonzero(crowded), side="right") - 1).tolist()),
-            linear=bool(linear),
+            linear=bool(len(linear)),
             unit_elastic=unit_elastic,
         )
 
-    def timings(self, curves: Sequence[Keys]) -> Iterator[tuple]:
-        """For each curve all that its parameters depend on."""
-        ends = (16 * self.first).tolist()
-        for number, curve in enumerate(curves):
-            eased = None
-            if curve.easing is not None:
-                eased = curve.easing.tobytes(), curve.easing_settings.tobytes()
-                if not self.unit_elastic and ELASTIC in curve.interpolation:
-                    eased = number
-            yield self.timing[ends[number] : ends[number + 1]], eased, curve.cycles
+    def timings(self, curves: Sequence[Keys]) -> Iterator[list[tuple[slice, tuple]]]:
+        """For each of the keys which channels have their timing in common, and all that this timing depends on."""
+        for number, keys in zip(self.number, curves, strict=True):
+            channels = len(keys.points)
+            begin, end = 16 * self.first[number], 16 * self.first[number + channels]
+            timing, each = self.timing[begin:end], (end - begin) // channels
+            if keys.easing is None and timing == timing[:each] * channels:
+                yield [(slice(0, channels), (timing[:each], None, keys.cycles))]
+                continue
+            found = []
+            for channel in range(channels):
+                eased = None
+                if keys.easing is not None:
+                    eased = keys.easing[channel].tobytes(), keys.easing_settings[:, channel].tobytes()
+                    if not self.unit_elastic and ELASTIC in keys.interpolation[channel]:
+                        eased = number + channel
+                own = timing[channel * each : (channel + 1) * each]
+                found.append((slice(channel, channel + 1), (own, eased, keys.cycles)))
+            yield found
 
     def place(self, number: int, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The spans of one curve that rising moments fall into one after the other, and how many into each."""
@@ -574,13 +624,19 @@ class _Spans:
                 parameters[here] = ease(INTERPOLATIONS[code], easing, u, back)
 
 
+def _without_keys(channels: int) -> Keys:
+    """Stands for curves without keys, which are 0 everywhere in Blender."""
+    return Keys(np.zeros((channels, 1, 2), np.float32), np.full((channels, 1), CONSTANT, np.int32))
+
+
 def _easings(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray]:
     """Easings and their settings for the keys of all curves, shapes (n,) and (3, n); zeros where none were read."""
-    counts = [len(curve.points) for curve in curves]
+    counts = [keys.interpolation.size for keys in curves]
     easing, settings = np.zeros(sum(counts), dtype=np.int32), np.zeros((3, sum(counts)))
-    for curve, end, count in zip(curves, itertools.accumulate(counts), counts, strict=True):
-        if curve.easing is not None:
-            easing[end - count : end], settings[:, end - count : end] = curve.easing, curve.easing_settings
+    for keys, end, count in zip(curves, itertools.accumulate(counts), counts, strict=True):
+        if keys.easing is not None:
+            easing[end - count : end] = keys.easing.ravel()
+            settings[:, end - count : end] = keys.easing_settings.reshape(3, -1)
     return easing, settings
 
 

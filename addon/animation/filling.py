@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from .inbetweens import Deltas, deltas
-from .reading import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, slots_of
+from .slots import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, slots_of
 from .sources import LOCATION, ROTATION, SCALE, Source
 
 OWN = {

@@ -20,17 +20,14 @@ from ..motion import in_betweens as segment_poses
 from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
 from ..motion.piecewise import blocks, combine
 from ..motion.quaternions import conjugate, multiply
-from .fcurves import Keys, evaluate
-from .sources import LOCATION, MODE_IDS, REST, ROTATION, SAME_FRAME, SCALE, Source
+from .fcurves import Keys, evaluated
+from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
 
 AT_ONCE = 65536
 """Samples that are prepared for at once."""
 
 BLOCK = 16384
 """Samples worked on at once: few enough for the processor's caches."""
-
-ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
-"""Where the components of each property are. Euler angles leave their fourth row alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +82,6 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
         )
 
     return InBetweens(frames, moved_by(source.own[: len(native), None]), moved_by(delta))
-
-
-def components_at(source: Source, frame: float) -> np.ndarray:
-    """What Blender's own in-betweens give the channels on one frame, shape (10,)."""
-    found = _sampled([(source, slice(0, 1))], [np.array([frame])])[:, 0]
-    return np.concatenate((found, REST[len(found) :]))
 
 
 def deltas(sources: Sequence[Source]) -> list[Deltas]:
@@ -188,8 +179,7 @@ def _fill(
         chosen = modes == mode
         every = bool(chosen.all())
         some = slice(None) if every else np.repeat(chosen, counts)
-        if every or mode == 0:
-            delta[:, some] = own[:, chosen].repeat(counts[chosen], axis=1)
+        delta[:, some] = own[:, chosen].repeat(counts[chosen], axis=1)
         if mode == 0:
             continue
         times = np.broadcast_to((0.0, 1.0), (len(counts), 2))
@@ -205,45 +195,34 @@ def _sampled(
     rows = np.empty((_height(samples), samples[-1][1].stop))
     for (source, place), at in zip(samples, frames, strict=True):
         _rest(rows[:, place], source)
-        for row, keys in source.components():
-            if isinstance(keys, Keys):
-                places.append((row, place))
+        for own, keys in source.channels:
+            if at is source.key_frames and source.is_together:
+                rows[own, place] = keys.values
+            else:
+                places.append((own, place))
                 curves.append(keys)
                 times.append(at)
-            else:
-                rows[row, place] = keys
-    for place, values in zip(places, evaluate(curves, times, unit_elastic=unit_elastic), strict=True):
-        rows[place] = values
+    for number, channels, values in evaluated(curves, times, unit_elastic=unit_elastic):
+        own, place = places[number]
+        rows[own[channels], place] = values
     return rows
 
 
 def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """The channels' own values where each segment starts and where it ends, rows as `_sampled` has them."""
-    keys = _each([source for source, _ in segments], (len(source.key_frames) for source, _ in segments))
-    rows = np.empty((_height(segments), keys[-1][1].stop))
-    places, curves, times = [], [], []
-    for source, place in keys:
-        _rest(rows[:, place], source)
-        for row, channel in source.components():
-            if not isinstance(channel, Keys):
-                rows[row, place] = channel
-            elif source.is_together:
-                rows[row, place] = channel.points[:, 1]
-            else:
-                places.append((row, place))
-                curves.append(channel)
-                times.append(source.key_frames)
-    for place, values in zip(places, evaluate(curves, times, unit_elastic=unit_elastic), strict=True):
-        rows[place] = values
+    sources = [source for source, _ in segments]
+    keys = _each(sources, (len(source.key_frames) for source in sources))
+    rows = _sampled(keys, [source.key_frames for source in sources], unit_elastic=unit_elastic)
     begins = np.delete(np.arange(rows.shape[1]), [place.stop - 1 for _, place in keys])
     start, end = rows[:, begins], rows[:, begins + 1]
     for source, place in segments:
-        for row, channel in source.components():
-            if isinstance(channel, Keys) and channel.cycles is not None:
-                # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its
-                # first.
-                jumps = _jumps(channel, source.key_frames)
-                start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = channel.values[0], channel.values[-1]
+        for own, channels in source.channels:
+            if channels.cycles is None:
+                continue
+            # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its first.
+            jumps = _jumps(channels, source.key_frames)
+            for row, values in zip(own, channels.values, strict=True):
+                start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = values[0], values[-1]
     return start, end
 
 
@@ -256,6 +235,8 @@ def _rest(rows: np.ndarray, source: Source) -> None:
     for name, own in ROWS.items():
         if name not in source.keyed:
             rows[own] = REST[own, None][: len(rows[own])]
+    for row, value in source.rest.items():
+        rows[row] = value
     if source.order is not None:
         rows[6] = 0.0
 

@@ -13,9 +13,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from .fcurves import Keys
-from .inbetweens import components_at
-from .reading import WIDTHS, Curves, Slot, Transformable
+from .slots import WIDTHS, Curves, Slot, Transformable
 from .sources import LOCATION, REST, ROTATION, SAME_FRAME, SCALE, Source
 
 REMEMBERED = 4096
@@ -84,7 +82,7 @@ def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: fl
 
 def _is_inserted(old: Source, new: Source, frame: float) -> bool:
     """Whether the only change of key times is one more, on this frame, in a segment that is not Blender's own."""
-    before, after = (np.unique(np.concatenate([keys.times for keys in source.curves])) for source in (old, new))
+    before, after = old.keyed_frames, new.keyed_frames
     if not before[0] < frame < before[-1] or np.abs(before - frame).min() < SAME_FRAME:
         return False
     others = after[np.abs(after - frame) >= SAME_FRAME]
@@ -96,18 +94,17 @@ def _before_the_key(obj: bpy.types.Object, old: Source, frame: float) -> np.ndar
     posed_on, components = _posed.get(obj.session_uid, (None, None))
     if posed_on == frame:
         return components
-    return components_at(old, frame)
+    return old.values_at(np.array([frame]))[:, 0]
 
 
 def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
     """Whether every key on this frame has the value that the property had."""
-    for row, keys in source.components():
-        if isinstance(keys, Keys):
-            place = int(np.argmin(np.abs(keys.times - frame)))
-            if abs(keys.times[place] - frame) < SAME_FRAME:
-                value = keys.values[place]
-                if abs(value - shown[row]) > TOLERANCE * max(1.0, abs(shown[row])):
-                    return False
+    for rows, keys in source.channels:
+        place = int(np.argmin(np.abs(keys.times - frame)))
+        if abs(keys.times[place] - frame) < SAME_FRAME:
+            had = shown[rows]
+            if np.any(np.abs(keys.values[:, place] - had) > TOLERANCE * np.maximum(1.0, np.abs(had))):
+                return False
     return True
 
 

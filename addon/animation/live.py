@@ -19,7 +19,9 @@ from bpy.app.handlers import persistent
 from . import insertion
 from .filling import clear, fill_in, give_back, is_complete, recorded
 from .inbetweens import deltas
-from .reading import Curves, Refused, Slot, curves_in, is_filled_in, read, slots_in, slots_of
+from .reading import keyed_in, read
+from .refusals import refuse_numbers
+from .slots import Curves, Refused, Slot, curves_in, is_filled_in, slots_in, slots_of
 from .sources import Source
 
 log = logging.getLogger(__package__)
@@ -89,9 +91,11 @@ def problem_of(obj: bpy.types.Object) -> str:
 def _refresh(slots: Iterable[Slot]) -> int:
     stale = []
     for slot in slots:
-        curves = curves_in(slot.channelbag)
-        source = _live_source(slot, curves)
-        before = recorded(slot)
+        if not slot.action.is_editable:
+            # What is linked has the in-betweens that its own file was saved with.
+            continue
+        curves, before = curves_in(slot.channelbag), recorded(slot)
+        source = _wanted(slot, curves, before)
         if source is None:
             if before or any(is_filled_in(fcurve) for fcurve in curves.values()):
                 clear(slot, curves)
@@ -100,7 +104,7 @@ def _refresh(slots: Iterable[Slot]) -> int:
         elif source.digest != before or not is_complete(curves, source):
             if insertion.keep_pose(slot, curves, before, source, _State.frame):
                 curves = curves_in(slot.channelbag)
-                source = _live_source(slot, curves)
+                source = _wanted(slot, curves, before)
             stale.append((slot, curves, source))
     try:
         fill_in(stale)
@@ -114,13 +118,18 @@ def _refresh(slots: Iterable[Slot]) -> int:
     return len(stale)
 
 
-def _live_source(slot: Slot, curves: Curves) -> Source | None:
-    """What is keyed in a slot, None where Blender's own in-betweens are all that is wanted or can be had."""
+def _wanted(slot: Slot, curves: Curves, before: str) -> Source | None:
+    """What is keyed in a slot, None where Blender's own in-betweens are all that is wanted or can be had.
+
+    `before` is the digest of what it is filled in from: that needs no second examination.
+    """
     try:
-        source = read(slot, curves)
+        source = keyed_in(slot, curves)
+        if source.digest != before:
+            refuse_numbers(slot.users[0].name, source)
+            if not source.is_live:
+                return None
     except ValueError:
-        return None
-    if not source.is_live:
         return None
     insertion.remember(source)
     return source

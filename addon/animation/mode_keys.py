@@ -9,21 +9,9 @@ import bpy
 import numpy as np
 
 from . import live
-from .reading import (
-    GROUP,
-    MODE_PATH,
-    UNKNOWN,
-    WIDTHS,
-    Curves,
-    Refused,
-    Slot,
-    Transformable,
-    curves_in,
-    mode_of,
-    read,
-    slots_of,
-)
-from .sources import MODE_IDS, SAME_FRAME, Source
+from .reading import mode_of, read
+from .slots import GROUP, MODE_PATH, WIDTHS, Curves, Refused, Slot, Transformable, curves_in, slots_of
+from .sources import MODE_IDS, SAME_FRAME, UNKNOWN, Source
 
 
 def active_slot(obj: bpy.types.Object) -> Slot | None:
@@ -39,7 +27,7 @@ def source_of(obj: bpy.types.Object) -> Source | None:
     """What is keyed in an object's Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
     slot = active_slot(obj)
     source = None if slot is None else read(slot, curves_in(slot.channelbag))
-    return source if source and source.curves else None
+    return source if source and source.channels else None
 
 
 def key_frames(obj: bpy.types.Object, *, selected: bool = False) -> np.ndarray:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,8 +19,11 @@ from .fcurves import ELASTIC, Keys, cycled, cyclic_times, evaluate
 MODE_IDS = ("BLENDER", *MODES)
 """What the values of the mode channel stand for: Blender's own in-betweens, and then the modes in their order."""
 
+UNKNOWN = -1
+"""The mode of an object from a file that is damaged, or of a later version."""
+
 LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
-FIRST_ROW = {LOCATION: 0, ROTATION: 3, SCALE: 7}
+ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
 """Where the components of each are, in arrays with a row for each of the ten. Euler angles leave row 6 alone."""
 
 REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
@@ -38,8 +40,14 @@ class Source:
     order: str | None
     """The order of Euler angles, or None for quaternions."""
 
-    keyed: dict[str, tuple[Keys | float, ...]]
-    """The channels of location, rotation and scale, as far as they are keyed; a value for a component without keys."""
+    keyed: frozenset[str]
+    """Which of location, rotation and scale are keyed, in one of their components at least."""
+
+    channels: tuple[tuple[list[int], Keys], ...]
+    """The channels with keys, those together that are keyed together: their rows among the components, and keys."""
+
+    rest: dict[int, float]
+    """The values of components that have no keys, of what is keyed, by their rows."""
 
     own: np.ndarray
     """The delta transforms that the object has of its own, as components, shape (10,)."""
@@ -54,33 +62,34 @@ class Source:
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
         summary = hashlib.blake2b(digest_size=16)
-        for row, keys in self.components():
-            summary.update(b"%d" % row)
-            summary.update(keys.raw if isinstance(keys, Keys) else repr(keys).encode())
+        for rows, keys in self.channels:
+            summary.update(bytes(rows))
+            summary.update(keys.raw)
+        if self.rest:
+            summary.update(repr(self.rest).encode())
         summary.update(self.own.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
         summary.update(repr((self.order, self.span)).encode())
         return summary.hexdigest()
 
-    def components(self) -> Iterator[tuple[int, Keys | float]]:
-        """Each component of what is keyed: its row, and its keys or the value it rests at."""
-        for name, channels in self.keyed.items():
-            yield from enumerate(channels, FIRST_ROW[name])
-
-    @cached_property
+    @property
     def curves(self) -> list[Keys]:
-        """The channels that have keys."""
-        return [keys for _, keys in self.components() if isinstance(keys, Keys)]
+        """The keys of all channels that have any."""
+        return [keys for _, keys in self.channels]
 
-    @cached_property
+    @property
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
-        together = self.curves[0].times.tobytes()
-        return self._cyclic is None and all(keys.times.tobytes() == together for keys in self.curves[1:])
+        return len(self.channels) == 1 and self._cyclic is None
+
+    @cached_property
+    def keyed_frames(self) -> np.ndarray:
+        """Where any of the channels has a key of the animator's, shape (k,)."""
+        return np.unique(np.concatenate([keys.times for keys in self.curves]))
 
     @cached_property
     def key_frames(self) -> np.ndarray:
-        """Where any of the channels has a key, shape (n,), with the copies that cycles make in the span."""
+        """The same without keys that are one to Blender, and with the copies that cycles make in the span, (n,)."""
         if self.is_together:
             return self.curves[0].times
         times = [keys.times for keys in self.curves]
@@ -104,7 +113,7 @@ class Source:
         """The modes at these frames, as `MODE_IDS` counts them: each key of the mode channel holds until the next."""
         if not isinstance(self.mode, Keys):
             return np.full(len(frames), self.mode)
-        modes = self.mode.values[np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
+        modes = self.mode.values[0, np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
         return np.rint(modes).astype(int)
 
     @property
@@ -125,12 +134,18 @@ class Source:
         """Whether the scale is animated, and at every key the same along all axes and positive. Else Blender scales."""
         if SCALE not in self.keyed:
             return False
-        channels = self.keyed[SCALE]
-        curves = [keys for keys in channels if isinstance(keys, Keys)]
-        keyed = evaluate(curves, [self.key_frames] * len(curves))
-        rows = iter(keyed)
-        x, y, z = (next(rows) if isinstance(keys, Keys) else np.full(len(self.key_frames), keys) for keys in channels)
+        x, y, z = self.values_at(self.key_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)
+
+    def values_at(self, frames: np.ndarray) -> np.ndarray:
+        """What the channels alone have on these frames, shape (10, m)."""
+        rows = np.repeat(REST[:, None], len(frames), axis=1)
+        for row, value in self.rest.items():
+            rows[row] = value
+        evaluated = evaluate(self.curves, [frames] * len(self.channels))
+        for (own, _), values in zip(self.channels, evaluated, strict=True):
+            rows[own] = values
+        return rows
 
     @property
     def is_elastic(self) -> bool:

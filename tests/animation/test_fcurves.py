@@ -39,7 +39,7 @@ def blenders(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
     strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
     fcurve = strip.channelbag(slot, ensure=True).fcurves.new("location", index=0)
     try:
-        points, count = fcurve.keyframe_points, len(keys.points)
+        points, count = fcurve.keyframe_points, len(keys.times)
         points.add(count)
         free = bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items["FREE"].value
         settings = np.zeros((3, count), np.float32) if keys.easing_settings is None else keys.easing_settings
@@ -69,14 +69,39 @@ def blenders(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
         bpy.data.actions.remove(action)
 
 
+def read_one(fcurve: bpy.types.FCurve) -> Keys:
+    ((places, keys),) = read_keys([fcurve])
+    assert places == [0]
+    return keys
+
+
+def evaluate_one(keys: Keys, frames: np.ndarray, **options: bool) -> np.ndarray:
+    """The values of the only curve of these keys, shape (m,)."""
+    ((values,),) = evaluate([keys], [frames], **options)
+    return values
+
+
+def joined(curves: Sequence[Keys]) -> Keys:
+    """Curves that are keyed together, as one."""
+    rows = {
+        field.name: None
+        if getattr(curves[0], field.name) is None
+        else np.concatenate(
+            [getattr(keys, field.name) for keys in curves], axis=1 if field.name == "easing_settings" else 0
+        )
+        for field in dataclasses.fields(Keys)[:6]
+    }
+    return dataclasses.replace(curves[0], **rows)
+
+
 def assert_as_blender(keys: Keys, frames: np.ndarray, *, update: bool = True, tolerance: float = 1e-5) -> None:
     """The values are Blender's, within `tolerance` of the size of the curve and its handles."""
     with blenders(keys, update=update) as fcurve:
-        read = read_keys(fcurve)
-        (found,) = evaluate([read], [frames])
+        read = read_one(fcurve)
+        found = evaluate_one(read, frames)
         expected = np.array([fcurve.evaluate(frame) for frame in frames.tolist()])
     handles = [rows for rows in (read.left, read.right) if rows is not None]
-    size = max(1e-30, np.abs(expected).max(), *(np.abs(rows[:, 1]).max() for rows in (read.points, *handles)))
+    size = max(1e-30, np.abs(expected).max(), *(np.abs(rows[..., 1]).max() for rows in (read.points, *handles)))
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=tolerance * size)
 
 
@@ -85,11 +110,14 @@ def keys_of(
 ) -> Keys:
     names = [interpolation] * len(times) if isinstance(interpolation, str) else interpolation
     codes = np.array([CODES[name] for name in names], dtype=np.int32)
-    others = {
-        name: np.asarray(rows, np.float32) if name in ("left", "right", "easing_settings") else rows
-        for name, rows in others.items()
-    }
-    return Keys(np.column_stack((times, values)).astype(np.float32), codes, **others)
+    for name, rows in others.items():
+        if name in ("left", "right"):
+            others[name] = np.asarray(rows, np.float32)[None]
+        elif name == "easing":
+            others[name] = rows[None]
+        elif name == "easing_settings":
+            others[name] = np.asarray(rows, np.float32)[:, None]
+    return Keys(np.column_stack((times, values)).astype(np.float32)[None], codes[None], **others)
 
 
 def frames_about(keys: Keys) -> np.ndarray:
@@ -169,7 +197,7 @@ def test_cycles_have_blenders_values(keys, cycles):
 @settings(deadline=None, max_examples=200)
 @given(curves(kinds=("CONSTANT", "LINEAR", "QUAD"), gaps=(0.0, 2.0**-14, 2.0**-13, 2.0**-12, 1.0)), st.data())
 def test_keys_on_the_same_frame_or_close_to_it_have_blenders_values(keys, data):
-    keys = dataclasses.replace(keys, points=keys.points - (keys.points[0, 0], 0.0))
+    keys = dataclasses.replace(keys, points=keys.points - (keys.points[0, 0, 0], 0.0))
     near = data.draw(st.sampled_from((0.0, 2.0**-15, 2.0**-14, 2.0**-13, 0.25)))
     frames = np.unique(np.concatenate([keys.times + offset for offset in (-near, 0.0, near)]))
     assert_as_blender(dataclasses.replace(keys, left=None, right=None), frames, update=False)
@@ -214,7 +242,7 @@ def test_a_curve_without_keys_is_0_as_in_blender():
     keys = keys_of((), ())
     with blenders(keys) as fcurve:
         assert fcurve.evaluate(7.0) == 0.0
-        assert evaluate([read_keys(fcurve)], [np.array([-1.0, 7.0])])[0].tolist() == [0.0, 0.0]
+        assert evaluate_one(read_one(fcurve), np.array([-1.0, 7.0])).tolist() == [0.0, 0.0]
 
 
 def test_automatic_handles_have_blenders_values_on_a_thousand_frames():
@@ -224,7 +252,7 @@ def test_automatic_handles_have_blenders_values_on_a_thousand_frames():
             key.handle_left_type = key.handle_right_type = "AUTO_CLAMPED"
         fcurve.update()
         frames = np.arange(1.0, 1001.0)
-        (found,) = evaluate([read_keys(fcurve)], [frames])
+        found = evaluate_one(read_one(fcurve), frames)
         expected = [fcurve.evaluate(frame) for frame in frames.tolist()]
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=3e-6)
 
@@ -237,10 +265,40 @@ def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic
     frames = frames_about(together[0])
     times = [frames, frames.copy(), frames[::3]] * len(together)
     found = evaluate(together, times[: len(together)], unit_elastic=unit_elastic)
-    for keys, own_times, own in zip(together, times, found, strict=False):
-        (alone,) = evaluate([keys], [own_times], unit_elastic=unit_elastic)
-        size = max(np.abs(alone).max(), *(np.abs(rows[:, 1]).max() for rows in (keys.points, keys.left, keys.right)))
+    for keys, own_times, (own,) in zip(together, times, found, strict=False):
+        alone = evaluate_one(keys, own_times, unit_elastic=unit_elastic)
+        size = max(np.abs(alone).max(), *(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right)))
         np.testing.assert_allclose(own, alone, rtol=0.0, atol=1e-6 * size)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(curves(), min_size=2, max_size=5), st.none() | all_cycles, st.booleans())
+def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles, unit_elastic):
+    count = min(len(keys.times) for keys in drawn)
+    fewer = {name: lambda rows: rows[:, :count] for name in ("points", "interpolation", "left", "right", "easing")}
+    fewer["easing_settings"] = lambda rows: rows[..., :count]
+    alone = []
+    for keys in drawn:
+        parts = {name: few(getattr(keys, name)) for name, few in fewer.items()}
+        shift = drawn[0].points[:, :count, :1] - parts["points"][..., :1]
+        # On the frames of the first; handles stay where they are, and keep timings apart.
+        parts["points"] = parts["points"] + np.concatenate((shift, np.zeros_like(shift)), axis=2)
+        alone.append(dataclasses.replace(keys, **parts, linear=drawn[0].linear, cycles=cycles))
+    frames = frames_about(alone[0])
+    (found,) = evaluate([joined(alone)], [frames], unit_elastic=unit_elastic)
+    for keys, own in zip(alone, found, strict=True):
+        expected = evaluate_one(keys, frames, unit_elastic=unit_elastic)
+        size = max(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right))
+        np.testing.assert_allclose(own, expected, rtol=1e-9, atol=1e-6 * size)
+
+
+def test_channels_are_read_together_that_are_keyed_together():
+    same, later = keys_of((1, 5, 9), (2, 3, 4), "BEZIER"), keys_of((1, 6, 9), (2, 3, 4), "BEZIER")
+    endless = keys_of((1, 5, 9), (2, 3, 4), "BEZIER", linear=True)
+    with blenders(same) as a, blenders(later) as b, blenders(same) as c, blenders(endless) as d:
+        read = read_keys([a, b, c, d])
+        assert [places for places, _ in read] == [[0, 2], [1], [3]]
+        assert [keys.points.shape for _, keys in read] == [(2, 3, 2), (1, 3, 2), (1, 3, 2)]
 
 
 def test_many_curves_on_many_frames_have_the_values_that_each_has_alone():
@@ -258,8 +316,8 @@ def test_many_curves_on_many_frames_have_the_values_that_each_has_alone():
         for i, row in enumerate(points)
     ]
     frames = np.linspace(-5.0, 110.0, 6000)
-    for keys, own in zip(together, evaluate(together, [frames] * 40), strict=True):
-        np.testing.assert_allclose(own, evaluate([keys], [frames])[0], rtol=0.0, atol=1e-9)
+    for keys, (own,) in zip(together, evaluate(together, [frames] * 40), strict=True):
+        np.testing.assert_allclose(own, evaluate_one(keys, frames), rtol=0.0, atol=1e-9)
 
 
 @settings(deadline=None, max_examples=50)
@@ -268,13 +326,13 @@ def test_the_order_of_frames_does_not_matter(keys, cycles):
     keys = dataclasses.replace(keys, cycles=cycles)
     frames = frames_about(keys)
     order = np.random.default_rng(1).permutation(len(frames))
-    (rising,), (mixed,) = evaluate([keys], [frames]), evaluate([keys], [frames[order]])
+    rising, mixed = evaluate_one(keys, frames), evaluate_one(keys, frames[order])
     np.testing.assert_array_equal(mixed, rising[order])
 
 
 def test_nothing_to_evaluate_gives_nothing():
     assert evaluate([], []) == []
-    assert evaluate([keys_of((1, 2), (3, 4))], [np.empty(0)])[0].shape == (0,)
+    assert evaluate([keys_of((1, 2), (3, 4))], [np.empty(0)])[0].shape == (1, 0)
 
 
 @pytest.mark.parametrize("easing", EASINGS)
@@ -283,9 +341,10 @@ def test_the_elastic_timing_of_channels_is_their_own_or_that_of_a_curve_from_0_t
     settings = {"easing": np.full(2, easing, np.int32), "easing_settings": ((0, 0), (1.5, 1.5), (7, 7))}
     together = [keys_of((1, 21), (0, way), "ELASTIC", **settings) for way in ways]
     frames = np.arange(1.0, 21.5, 0.25)
-    alone = [evaluate([keys], [frames])[0] for keys in together]
-    np.testing.assert_array_equal(evaluate(together, [frames] * 3), alone)
-    unit = evaluate(together, [frames] * 3, unit_elastic=True)
+    alone = [evaluate_one(keys, frames) for keys in together]
+    np.testing.assert_array_equal(np.concatenate(evaluate(together, [frames] * 3)), alone)
+    np.testing.assert_array_equal(evaluate([joined(together)], [frames])[0], alone)
+    unit = np.concatenate(evaluate(together, [frames] * 3, unit_elastic=True))
     np.testing.assert_allclose(unit, np.multiply.outer(ways, alone[2]), rtol=0.0, atol=1e-12)
     assert not np.allclose(unit[:2], alone[:2])
 
@@ -302,18 +361,18 @@ def test_keys_that_are_no_numbers_do_not_break_the_evaluation(count, data, linea
 
     codes = st.lists(st.sampled_from(tuple(INTERPOLATIONS)), min_size=count, max_size=count)
     keys = Keys(
-        rows(count, 2),
-        np.array(data.draw(codes), np.int32),
-        rows(count, 2),
-        rows(count, 2),
-        np.zeros(count, np.int32),
-        rows(3, count),
+        rows(1, count, 2),
+        np.array(data.draw(codes), np.int32)[None],
+        rows(1, count, 2),
+        rows(1, count, 2),
+        np.zeros((1, count), np.int32),
+        rows(3, 1, count),
         linear,
         cycles,
     )
     frames = rows(20)
     for values in evaluate([keys, keys], [frames, frames]):
-        assert values.shape == (20,)
+        assert values.shape == (1, 20)
     cycled(keys, frames)
     # Cycles of next to no length are refused, and have a test of their own.
     with suppress(ValueError):
@@ -325,18 +384,18 @@ def test_only_what_bears_on_the_values_is_read():
     read = {}
     for name, linear in (("LINEAR", True), ("BEZIER", False), ("BACK", False), ("BACK", True)):
         with blenders(keys_of((1, 5), (2, 3), name, linear=linear)) as fcurve:
-            keys = read_keys(fcurve)
+            keys = read_one(fcurve)
             read[name, linear] = [getattr(keys, name) is not None for name in names]
             assert keys.times.tolist() == [1.0, 5.0]
-            assert keys.values.tolist() == [2.0, 3.0]
+            assert keys.values.tolist() == [[2.0, 3.0]]
     assert list(read.values()) == [[False, False], [True, False], [False, True], [True, True]]
 
 
 def test_a_muted_cycles_modifier_is_left_out():
     with blenders(keys_of((1, 5), (2, 3), cycles=Cycles("REPEAT", "MIRROR", 0, 2))) as fcurve:
-        assert read_keys(fcurve).cycles == Cycles("REPEAT", "MIRROR", 0, 2)
+        assert read_one(fcurve).cycles == Cycles("REPEAT", "MIRROR", 0, 2)
         fcurve.modifiers[0].mute = True
-        assert read_keys(fcurve).cycles is None
+        assert read_one(fcurve).cycles is None
 
 
 EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {
@@ -357,19 +416,19 @@ EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {
 def test_every_edit_shows_in_the_raw_bytes(edit):
     keys = keys_of((1, 5, 9), (2, 3, 4), ("BEZIER", "LINEAR", "ELASTIC"))
     with blenders(keys) as fcurve:
-        before = read_keys(fcurve).raw
+        before = read_one(fcurve).raw
         fcurve.keyframe_points[0].select_control_point = True
         fcurve.select = True
-        assert read_keys(fcurve).raw == before
+        assert read_one(fcurve).raw == before
         EDITS[edit](fcurve)
-        assert read_keys(fcurve).raw != before
+        assert read_one(fcurve).raw != before
 
 
 def test_an_edit_of_a_cycles_modifier_shows_in_the_raw_bytes():
     with blenders(keys_of((1, 5), (2, 3), cycles=Cycles("REPEAT", "REPEAT", 0, 0))) as fcurve:
-        before = read_keys(fcurve).raw
+        before = read_one(fcurve).raw
         fcurve.modifiers[0].cycles_after = 3
-        assert read_keys(fcurve).raw != before
+        assert read_one(fcurve).raw != before
 
 
 @settings(deadline=None, max_examples=100)
@@ -380,7 +439,7 @@ def test_folded_times_have_the_values_of_the_cycles(keys, cycles):
     )
     frames = frames_about(keys)
     folded, backwards = cycled(repeated, frames)
-    (expected,), (found,) = evaluate([repeated], [frames]), evaluate([keys], [folded])
+    expected, found = evaluate_one(repeated, frames), evaluate_one(keys, folded)
     np.testing.assert_allclose(found, expected, rtol=1e-7, atol=1e-7)
     assert not np.any(backwards & (frames >= keys.times[0]) & (frames <= keys.times[-1]))
 

@@ -104,7 +104,7 @@ def trace(
     if len(source.key_frames) < 2:
         return None
     first, last = source.frame_range
-    keys = np.unique(np.concatenate([keys.times for keys in source.curves]))
+    keys = source.keyed_frames
     ticks = tick_frames(first, last, tick_step)
     samples = np.unique(np.concatenate((sample_frames(first, last), keys)))
     frames = np.union1d(samples, ticks)

@@ -11,6 +11,7 @@ import pytest
 from addon.animation import MODE_IDS, set_mode
 from addon.animation.mode_keys import source_of
 from addon.motion import MODES, Poses, interpolate
+from addon.animation.sources import ROWS
 from addon.ui.overlay.cache import path_of
 from addon.ui.overlay.points import (
     AXES,
@@ -106,8 +107,8 @@ def test_between_linear_keys_a_path_is_that_of_interpolate(scene, mode):
     obj = key(new_object(), interpolation="LINEAR")
     scene.rigid_motion_overlay.mode = mode
     path = path_of(obj, scene)
-    keyed = source_of(obj).keyed
-    keys = Poses(*(np.stack([keys.values for keys in keyed[name]], axis=1) for name in ("location", "rotation")))
+    keyed = source_of(obj).values_at(np.array(FRAMES))
+    keys = Poses(keyed[ROWS["location"]].T, keyed[ROWS["rotation"]].T)
     assert path.wanted == pytest.approx(interpolate(FRAMES, keys, path.frames, mode).positions, abs=1e-5)
 
 
@@ -167,7 +168,7 @@ def test_keys_off_whole_frames_are_on_the_path(scene):
     obj = key(new_object(), frames=(1.25, 10.5, 20.0))
     set_mode(obj, "dq_sclerp")
     path = path_of(obj, scene)
-    keyed = np.stack([keys.values for keys in source_of(obj).keyed["location"]], axis=1)
+    keyed = source_of(obj).values_at(np.array((1.25, 10.5, 20.0)))[ROWS["location"]].T
     assert path.keys == pytest.approx(keyed, abs=1e-6)
     for frame, place in zip((1.25, 10.5, 20.0), keyed, strict=True):
         native, wanted = path.at(frame)

@@ -1,0 +1,161 @@
+"""Why rigid motion cannot act on something: every reason, and the way out of each."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import bpy
+import numpy as np
+
+from .fcurves import Keys
+from .slots import GROUP, WIDTHS, Curves, Refused, Slot, Transformable, is_filled_in
+from .sources import MODE_IDS, UNKNOWN, Source
+
+MOST_FRAMES = 250_000
+"""The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
+
+COMPONENTS = (
+    *(f"Location {axis}" for axis in "XYZ"),
+    *(f"Rotation {axis}" for axis in "WXYZ"),
+    *(f"Scale {axis}" for axis in "XYZ"),
+)
+"""What the rows of a source are called."""
+
+
+def refuse_what_is_taken(what: Transformable, slot: Slot, curves: Curves) -> None:
+    """Raise `Refused` where the delta transforms are not to be had."""
+    for block in (what.animated, slot.action):
+        if not block.is_editable:
+            raise Refused(
+                f"{block.name} is linked from another file: make it local first (Object > Relations > Make Local)"
+            )
+    transforms, deltas = _paths(what.prefix, what.rotation)
+    for driver in what.animated.animation_data.drivers:
+        if driver.data_path in transforms or any(driver.data_path == path for path, _ in deltas):
+            raise Refused(f"{what.name}: {_label(driver)} is driven: remove the driver, or bake it to keys")
+    for key in deltas:
+        fcurve = curves.get(key)
+        if fcurve is not None and not is_filled_in(fcurve):
+            if fcurve.group is not None and fcurve.group.name == GROUP:
+                raise Refused(
+                    f"{what.name}: {_label(fcurve)} has in-betweens that were turned into keys: "
+                    "delete that channel, and they are made anew (Dope Sheet, X)"
+                )
+            prop = key[0].rpartition("delta_")[2]
+            raise Refused(
+                f"{what.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
+                f"{prop.replace('_', ' ')} (Object > Apply > Animated Transforms to Deltas does the reverse)"
+            )
+
+
+@cache
+def _paths(prefix: str, rotation: str) -> tuple[frozenset[str], tuple[tuple[str, int], ...]]:
+    """The data paths of transforms, and those of delta transforms with each index."""
+    names = ("location", rotation, "scale")
+    deltas = ((f"{prefix}delta_{name}", index) for name in names for index in range(WIDTHS[name]))
+    return frozenset(prefix + name for name in names), tuple(deltas)
+
+
+def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
+    """Raise `Refused` where a channel has modifiers, or values without keys, that rigid in-betweens cannot follow."""
+    for modifier in fcurve.modifiers:
+        plain = modifier.type == "CYCLES" and not modifier.use_restricted_range and not modifier.use_influence
+        if not plain and not modifier.mute:
+            raise Refused(
+                f"{name}: {_label(fcurve)} has a modifier of type {modifier.type.title()}"
+                f"{' with a restricted range or influence' if modifier.type == 'CYCLES' else ''}, which rigid "
+                "in-betweens cannot follow: mute or remove it, or bake the channel (Graph Editor, Channel)"
+            )
+    if not fcurve.keyframe_points and fcurve.sampled_points:
+        raise Refused(
+            f"{name}: {_label(fcurve)} is sampled and has no keys: turn its samples into keys "
+            "(Graph Editor, Channel > Samples to Keys)"
+        )
+
+
+def refuse_numbers(name: str, source: Source) -> None:
+    """Raise `Refused` where the numbers of a source make no motion, or too long a one."""
+    _refuse_modes(name, source.mode)
+    if not source.channels:
+        return
+    for keys in source.curves:
+        in_order = bool(np.all(keys.times[1:] >= keys.times[:-1]))
+        if not (in_order and all(np.isfinite(part).all() for part in _numbers(keys).values())):
+            _explain_numbers(name, source)
+    if not (np.isfinite(source.own).all() and all(map(math.isfinite, source.rest.values()))):
+        _explain_numbers(name, source)
+    keyed = max(keys.times[-1] for keys in source.curves) - min(keys.times[0] for keys in source.curves)
+    first, last = source.frame_range
+    if keyed > MOST_FRAMES:
+        raise Refused(
+            f"{name} has keys over {keyed:.0f} frames, at most {MOST_FRAMES} can be filled in: "
+            "delete the keys that are far off"
+        )
+    if last - first > MOST_FRAMES:
+        raise Refused(
+            f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most "
+            f"{MOST_FRAMES} can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+        )
+    try:
+        source.key_frames  # noqa: B018 - raises where cycles make too many
+    except ValueError as problem:
+        raise Refused(f"{name}: {problem}") from None
+
+
+def _numbers(keys: Keys) -> dict[str, np.ndarray]:
+    """All that keys are made of, channels and keys first, by what it is to a key."""
+    settings = None if keys.easing_settings is None else np.moveaxis(keys.easing_settings, 0, -1)
+    parts = {
+        "": keys.points,
+        "left handle of ": keys.left,
+        "right handle of ": keys.right,
+        "easing of ": settings,
+    }
+    return {part: numbers for part, numbers in parts.items() if numbers is not None}
+
+
+def _explain_numbers(name: str, source: Source) -> None:
+    """Raise `Refused` with the first number of a source that is not finite, or the first channel out of order."""
+
+    def label(row: int) -> str:
+        return f"Rotation {'XYZ'[row - 3]}" if source.order is not None and 3 <= row < 6 else COMPONENTS[row]
+
+    for row, value in source.rest.items():
+        if not math.isfinite(value):
+            raise Refused(f"{name}: {label(row)} is not a finite number: set it anew (sidebar, Item)")
+    for rows, keys in source.channels:
+        for part, numbers in _numbers(keys).items():
+            if not np.isfinite(numbers).all():
+                channel, key = np.argwhere(~np.isfinite(numbers))[0, :2].tolist()
+                raise Refused(
+                    f"{name}: {part}key {key + 1} of {label(rows[channel])} is not a finite number: "
+                    "delete it (Dope Sheet, X)"
+                )
+        if np.any(np.diff(keys.times) < 0.0):
+            raise Refused(
+                f"{name}: the keys of {label(rows[0])} are not in the order of their frames: "
+                "move one of them and back (Dope Sheet, G)"
+            )
+    raise Refused(f"{name}: a delta transform is not a finite number: set it anew (Object Properties, Delta Transform)")
+
+
+def _refuse_modes(name: str, mode: int | Keys) -> None:
+    """Raise `Refused` where an object, or a key of its mode channel, has what is no mode."""
+    if not isinstance(mode, Keys):
+        if mode == UNKNOWN:
+            raise Refused(f"{name} has a mode that this version does not know: choose another")
+        return
+    known = (mode.values[0] > -0.5) & (mode.values[0] < len(MODE_IDS) - 0.5) & np.isfinite(mode.times)
+    if not known.all():
+        raise Refused(
+            f"{name}: key {int(np.argmin(known)) + 1} of the mode channel has no mode that this version knows: "
+            "delete it (Dope Sheet, X), or choose a mode for the whole object"
+        )
+
+
+def _label(fcurve: bpy.types.FCurve) -> str:
+    """A channel as the Dope Sheet names it."""
+    name = fcurve.data_path.rpartition(".")[2]
+    axes = "WXYZ" if name.endswith("quaternion") else "XYZ"
+    return f"{name.replace('_', ' ').title()} {axes[fcurve.array_index]}" if fcurve.array_index < len(axes) else name

@@ -1,0 +1,151 @@
+"""Which Action slots move an object, and the F-curves in them.
+
+Objects are what can be filled in. A pose bone has its channels in its armature's Action, under a prefix of its own, and
+no delta transforms: `Transformable` is where it will come in, for what is baked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+from ..motion.eulers import ORDERS
+from .sources import LOCATION, ROTATION, SCALE
+
+MODE_PATH = "rigid_motion.mode"
+
+GROUP = "Rigid Motion"
+"""The group of F-curves that the mode channel and the delta transforms are in."""
+
+WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, SCALE: 3}
+
+Curves = dict[tuple[str, int], bpy.types.FCurve]
+
+
+class Refused(ValueError):
+    """Why rigid motion cannot act on something: names it, and the way out."""
+
+
+@dataclass(frozen=True)
+class Transformable:
+    """What has location, rotation and scale, told apart from the object whose Action holds the channels."""
+
+    animated: bpy.types.Object
+    carrier: bpy.types.Object | bpy.types.PoseBone
+    prefix: str = ""
+    """From the object to the carrier, in data paths."""
+
+    @classmethod
+    def of(cls, obj: bpy.types.Object) -> Transformable:
+        return cls(obj, obj)
+
+    @property
+    def name(self) -> str:
+        return self.carrier.name
+
+    @property
+    def rotation(self) -> str:
+        """The property that turns it. `Refused` where that is an axis and an angle."""
+        mode = self.carrier.rotation_mode
+        if mode == "QUATERNION":
+            return "rotation_quaternion"
+        if mode in ORDERS:
+            return "rotation_euler"
+        raise Refused(
+            f"{self.name} turns by axis and angle, which has no rigid in-betweens: "
+            "set its rotation mode to Quaternion first (sidebar, Item)"
+        )
+
+    @property
+    def properties(self) -> dict[str, str]:
+        """Location, rotation and scale, and which property each of them is."""
+        return {LOCATION: "location", ROTATION: self.rotation, SCALE: "scale"}
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One of the slots that move an object, with everything else that it moves."""
+
+    action: bpy.types.Action
+    handle: int
+    users: tuple[bpy.types.Object, ...]
+    strips: frozenset[tuple[int, int] | None]
+    """The frames of the Action that strips show; None where it plays by itself."""
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """The frames that are seen: those of the strips, and of all scenes where it plays by itself."""
+        spans = [strip for strip in self.strips if strip is not None]
+        if None in self.strips:
+            scenes = {scene for obj in self.users for scene in obj.users_scene} or set(bpy.data.scenes)
+            spans += [(scene.frame_start, scene.frame_end) for scene in scenes]
+        return min(first for first, _ in spans), max(last for _, last in spans)
+
+    @property
+    def channelbag(self) -> bpy.types.ActionChannelbag | None:
+        slot = next((slot for slot in self.action.slots if slot.handle == self.handle), None)
+        return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
+
+
+def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
+    """The slots that move these objects, in Actions of their own and in NLA strips; each once."""
+    wanted = {key for obj in objects for key in _uses(obj)}
+    return _slots(lambda key: key in wanted) if wanted else []
+
+
+def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
+    """The slots of these Actions that move an object."""
+    wanted = {action.as_pointer() for action in actions}
+    return _slots(lambda key: key[0] in wanted)
+
+
+def _slots(is_wanted: Callable[[tuple[int, int]], bool]) -> list[Slot]:
+    users: dict[tuple[int, int], list[bpy.types.Object]] = {}
+    places = {}
+    for obj in bpy.data.objects:
+        for key, (action, handle, strips) in _uses(obj).items():
+            if is_wanted(key):
+                users.setdefault(key, []).append(obj)
+                places.setdefault(key, (action, handle, set()))[2].update(strips)
+    return [
+        Slot(action, handle, tuple(users[key]), frozenset(strips)) for key, (action, handle, strips) in places.items()
+    ]
+
+
+def _uses(obj: bpy.types.Object) -> dict[tuple[int, int], tuple[bpy.types.Action, int, set[tuple[int, int] | None]]]:
+    """The slots that move an object: Action, handle, and the frames that strips show, None outside of the NLA."""
+    data = obj.animation_data
+    if data is None:
+        return {}
+    found = {}
+    action = data.action
+    if action is not None and (handle := data.action_slot_handle):
+        found[action.as_pointer(), handle] = (action, handle, {None})
+    if len(data.nla_tracks):
+        for strip in _strips(strip for track in data.nla_tracks for strip in track.strips):
+            if (action := strip.action) is not None and (handle := strip.action_slot_handle):
+                span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
+                found.setdefault((action.as_pointer(), handle), (action, handle, set()))[2].add(span)
+    return found
+
+
+def _strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+    for strip in strips:
+        yield strip
+        yield from _strips(strip.strips)
+
+
+def curves_in(channelbag: bpy.types.ActionChannelbag | None) -> Curves:
+    """The F-curves of a slot, by data path and index."""
+    if channelbag is None:
+        return {}
+    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in channelbag.fcurves}
+
+
+def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
+    """Whether an F-curve is one that in-betweens are in: sampled, and in the group of them."""
+    return fcurve.group is not None and fcurve.group.name == GROUP and not fcurve.keyframe_points
