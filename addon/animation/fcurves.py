@@ -62,8 +62,8 @@ class Cycles:
 class Keys:
     """c F-curves that are keyed together: n keys each, on the same frames, and alike in what they do outside of them.
 
-    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`. What does not bear on the values
-    of the curves is None.
+    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`. What does not bear on the
+    values of the curves is None.
     """
 
     points: np.ndarray
@@ -187,8 +187,8 @@ def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elasti
     curves : sequence of Keys
         Without keys curves are 0 everywhere, as in Blender.
     times : sequence of array, shape (m,)
-        Frames for each of them, sub-frames allowed, best in rising order. Curves that have their keys and handles on the
-        same frames, and that are asked for the same frames, share the work.
+        Frames for each of them, sub-frames allowed, best in rising order. Curves that have their keys and handles on
+        the same frames, and that are asked for the same frames, share the work.
     unit_elastic : bool
         Take the amplitude of ELASTIC relative to the change of value in its segment, instead of in units of value:
         then curves keyed together have the same timing there too.

@@ -219,7 +219,7 @@ def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -
         for own, channels in source.channels:
             if channels.cycles is None:
                 continue
-            # A cycle whose ends differ jumps: what is before ends on its last value, what is behind starts on its first.
+            # A cycle whose ends differ jumps: one round ends on its last value, the next starts on its first.
             jumps = _jumps(channels, source.key_frames)
             for row, values in zip(own, channels.values, strict=True):
                 start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = values[0], values[-1]

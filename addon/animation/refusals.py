@@ -94,8 +94,8 @@ def refuse_numbers(name: str, source: Source) -> None:
         )
     if last - first > MOST_FRAMES:
         raise Refused(
-            f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most "
-            f"{MOST_FRAMES} can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+            f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most {MOST_FRAMES} "
+            "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
         )
     try:
         source.key_frames  # noqa: B018 - raises where cycles make too many

@@ -154,7 +154,7 @@ class Source:
 
     @cached_property
     def used_up(self) -> tuple[float, float]:
-        """Before and after which frame cycles that have a count are through: Blender goes back to the outermost keys."""
+        """Before and after which frame cycles with a count are through: Blender goes back to the outermost keys."""
         cycles = [keys.cycles for keys in self.curves if keys.cycles is not None]
         before = any(one.before != "NONE" and one.before_count > 0 for one in cycles)
         after = any(one.after != "NONE" and one.after_count > 0 for one in cycles)
