@@ -8,6 +8,7 @@ than the object had at that moment was meant to have it (pasted, typed, written 
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterable
 
 import bpy
 import numpy as np
@@ -39,6 +40,15 @@ def remember(source: Source) -> None:
 def notice_pose(obj: bpy.types.Object, frame: float) -> None:
     """Keep how an object was posed by hand, without a key yet, on the frame that is shown."""
     _posed[obj.session_uid] = frame, _components(obj)
+
+
+def forget_poses(objects: Iterable[bpy.types.Object] | None = None) -> None:
+    """Forget how these objects were posed by hand, or all of them: their Actions have moved them again."""
+    if objects is None:
+        _posed.clear()
+    else:
+        for obj in objects:
+            _posed.pop(obj.session_uid, None)
 
 
 def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: float) -> bool:

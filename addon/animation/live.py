@@ -210,6 +210,7 @@ def _careful(handler: Callable) -> Callable:
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
     seen = _follow(depsgraph, edited=depsgraph.id_type_updated("ACTION"))
+    insertion.forget_poses(seen)
     if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
         _follow_objects(depsgraph, _State.frame, seen)
 
@@ -226,6 +227,7 @@ def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     # Edits that nobody has seen yet were made on the frame before this one.
     _follow(depsgraph, edited=_State.edited)
+    insertion.forget_poses()
     _State.frame = scene.frame_current_final
 
 

@@ -10,7 +10,7 @@ def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape)))
-    w, x, y, z = components
+    w, x, y, z = (components[row, ...] for row in range(4))
     np.subtract(aw * bw, ax * bx, out=w)
     w -= ay * by
     w -= az * bz

@@ -93,15 +93,20 @@ def mode_at(obj: bpy.types.Object, frame: float) -> str:
     return MODE_IDS[round(fcurve.evaluate(frame + 0.002))]
 
 
-def expected_bases(obj: bpy.types.Object, frames: Sequence[float], own: Own | None = None) -> np.ndarray:
-    """What moves the object in its parent's space. `FCurve.evaluate` is asked on each frame, extrapolation included."""
+def expected_bases(
+    obj: bpy.types.Object, frames: Sequence[float], own: Own | None = None, keys: np.ndarray | None = None
+) -> np.ndarray:
+    """What moves the object in its parent's space. `FCurve.evaluate` is asked on each frame, extrapolation included.
+
+    Segments run between `keys`, by default the object's own: cycles have more.
+    """
     own = own or Own()
     frames = np.asarray(frames, dtype=np.float64)
     location, quaternion, scale = _native(obj, frames)
     location = location + own.location
     quaternion = multiply(np.array(own.quaternion), quaternion)
     scale = scale * own.scale
-    keys = key_frames(obj)
+    keys = key_frames(obj) if keys is None else keys
     scaled = _scales_evenly(obj, keys)
     for first, last in itertools.pairwise(keys):
         mode = mode_at(obj, first)

@@ -111,14 +111,6 @@ def test_own_delta_transforms_are_kept_and_given_back(scene, rotation_mode):
     assert not [fcurve for fcurve in animation.channelbag_of(obj).fcurves if fcurve.data_path.startswith("delta")]
 
 
-@pytest.mark.parametrize("kind", ["cameras", "lights"])
-def test_cameras_and_lights_move_too(scene, kind):
-    data = bpy.data.cameras.new("C") if kind == "cameras" else bpy.data.lights.new("L", "POINT")
-    obj = keyed(data=data)
-    set_mode(obj, "dq_sclerp")
-    assert_fresh(obj, "dq_sclerp")
-
-
 def edited(obj) -> dict:
     fcurve = curves(obj)[0]
     key = fcurve.keyframe_points[2]
@@ -277,98 +269,6 @@ def test_uniform_scale_follows_the_mode_and_other_scale_stays_blenders(scene):
             assert np.abs(read_poses(obj, FRAMES).scales - wanted.scales).max() < 1e-5
         else:
             assert np.abs(read_poses(obj, FRAMES).scales - native).max() < 1e-6
-
-
-def refusals(obj) -> dict:
-    fcurve = curves(obj)[0]
-
-    def driven():
-        obj.driver_add("location", 0)
-
-    def moved_by_delta():
-        obj.keyframe_insert("delta_location", frame=1)
-
-    return {
-        "axis and angle": lambda: setattr(obj, "rotation_mode", "AXIS_ANGLE"),
-        "modifier": lambda: fcurve.modifiers.new("NOISE"),
-        "driven": driven,
-        "animated already": moved_by_delta,
-    }
-
-
-@pytest.mark.parametrize("reason", ["axis and angle", "modifier", "driven", "animated already"])
-def test_a_mode_that_cannot_work_is_refused_by_name_and_nothing_changes(scene, reason):
-    obj = keyed()
-    refusals(obj)[reason]()
-    before = keys_of(obj), obj.rigid_motion.mode
-    with pytest.raises(Refused, match=f"Tool.*{reason}"):
-        set_mode(obj, "dq_sclerp")
-    assert (keys_of(obj), obj.rigid_motion.mode) == before
-    assert not any(obj.rigid_motion.filled)
-
-
-@pytest.mark.parametrize("reason", ["axis and angle", "modifier", "driven"])
-def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(scene, reason):
-    obj = keyed()
-    set_mode(obj, "dq_sclerp")
-    refusals(obj)[reason]()
-    animation.refresh()
-    assert reason in problem_of(obj)
-    assert not [fcurve for fcurve in animation.channelbag_of(obj).fcurves if fcurve.sampled_points]
-
-
-@pytest.mark.parametrize("mode_after", ["REPEAT", "REPEAT_OFFSET", "MIRROR"])
-def test_cycles_repeat_the_rigid_motion(scene, mode_after):
-    obj = keyed()
-    for fcurve in curves(obj):
-        fcurve.keyframe_points[-1].co.y = fcurve.keyframe_points[0].co.y
-        fcurve.modifiers.new("CYCLES").mode_after = mode_after
-        fcurve.update()
-    scene.frame_start, scene.frame_end = 1, 100
-    set_mode(obj, "dq_sclerp")
-    first, second = read_poses(obj, FRAMES), read_poses(obj, FRAMES + 40.0)
-    back = slice(None, None, -1 if mode_after == "MIRROR" else 1)
-    assert_fresh(obj, "dq_sclerp")
-    assert_same(second, first[back])
-
-
-def test_slots_of_one_action_are_filled_in_apart(scene):
-    one, other = keyed("One"), keyed("Other", seed=8)
-    action = one.animation_data.action
-    for fcurve in curves(other):
-        for key in fcurve.keyframe_points:
-            one_slot = action.slots.get("OBOther") or action.slots.new("OBJECT", "Other")
-            channelbag = action.layers[0].strips[0].channelbag(one_slot, ensure=True)
-            same = channelbag.fcurves.find(fcurve.data_path, index=fcurve.array_index)
-            same = same or channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
-            same.keyframe_points.insert(*key.co).interpolation = "LINEAR"
-    other.animation_data.action = action
-    other.animation_data.action_slot = action.slots["OBOther"]
-    set_mode(one, "dq_sclerp")
-    set_mode(other, "pga_lerp")
-    assert_fresh(one, "dq_sclerp")
-    assert_fresh(other, "pga_lerp")
-
-
-def test_objects_that_share_a_slot_and_differ_are_refused(scene):
-    one, other = keyed("One"), bpy.data.objects.new("Twin", None)
-    bpy.context.collection.objects.link(other)
-    other.rotation_mode = "XYZ"
-    other.animation_data_create().action = one.animation_data.action
-    other.animation_data.action_slot = one.animation_data.action_slot
-    with pytest.raises(Refused, match="same Action slot"):
-        set_mode(one, "dq_sclerp")
-
-
-def test_an_action_in_a_strip_is_filled_in(scene):
-    obj = keyed()
-    data = obj.animation_data
-    strip = data.nla_tracks.new().strips.new("Move", 1, data.action)
-    strip.action_slot = data.action_slot
-    data.action = None
-    poses = read_poses(obj, KEYS)
-    obj.rigid_motion.mode = "dq_sclerp"
-    assert_same(read_poses(obj, FRAMES), interpolate(KEYS, poses, FRAMES, "dq_sclerp"))
 
 
 @pytest.mark.parametrize("options", [{}, {"step": 0.25}, {"step": 7.0}, {"first": 13, "last": 20}], ids=str)

@@ -1,0 +1,138 @@
+"""Cycles: each round is filled in as if its keys were real ones, and what is used up is Blender's own again."""
+
+from __future__ import annotations
+
+import itertools
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import set_mode, write_channel
+from addon.motion import MODES
+from tests.animation.oracle import curves_of, expected_bases, key_frames, mode_at, shown_worlds, snapshot
+from tests.animation.scenes import key, new_object, random_values
+
+CYCLES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
+
+AROUND = np.arange(76.0)
+"""The frames of the scene: more than two rounds on both sides."""
+
+
+def cyclic(order: str, interpolation: str = "LINEAR", **settings: object) -> bpy.types.Object:
+    """An object with three keys, on frames 31 to 42, that all of its channels repeat."""
+    obj = key(new_object("Tool", order), (31.0, 35.0, 42.0), interpolation=interpolation)
+    for fcurve in curves_of(obj).values():
+        cycles = fcurve.modifiers.new("CYCLES")
+        for name, value in settings.items():
+            setattr(cycles, name, value)
+        fcurve.update()
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 75
+    return obj
+
+
+def unrolled(obj: bpy.types.Object, before: str, after: str, before_count: int, after_count: int) -> np.ndarray:
+    """Where a cyclic object has to be on the frames around: in each round as if the round's keys were real ones.
+
+    On the seams, and where the rounds are used up, there is nothing but Blender's own.
+    """
+    first, last = key_frames(obj)[[0, -1]]
+    found = native(obj)
+    for number in range(-4, 5):
+        kind, count = (after, after_count) if number > 0 else (before, before_count)
+        if number and (kind == "NONE" or (count and abs(number) > count)):
+            continue
+        since = AROUND - first - number * (last - first)
+        inside = (since > 0.0) & (since < last - first)
+        spare = one_round(obj, kind if number else "NONE", number)
+        found[inside] = expected_bases(spare, AROUND[inside])
+        discard(spare)
+    return found
+
+
+def native(obj: bpy.types.Object) -> np.ndarray:
+    """Blender's own in-betweens on the frames around, modifiers and all."""
+    return expected_bases(obj, AROUND, keys=np.empty(0))
+
+
+def discard(spare: bpy.types.Object) -> None:
+    bpy.data.actions.remove(spare.animation_data.action)
+    bpy.data.objects.remove(spare)
+
+
+def one_round(obj: bpy.types.Object, kind: str, number: int) -> bpy.types.Object:
+    """A copy out of the scene, with the keys of one round. Mirrored ones need straight lines between keys."""
+    first, last = key_frames(obj)[[0, -1]]
+    spare = obj.copy()
+    spare.animation_data.action = obj.animation_data.action.copy()
+    for (path, _), fcurve in curves_of(spare).items():
+        for modifier in list(fcurve.modifiers):
+            fcurve.modifiers.remove(modifier)
+        if path.startswith(("delta_", "rigid_motion")):
+            continue
+        points = fcurve.keyframe_points
+        rise = number * (points[-1].co.y - points[0].co.y) if kind == "REPEAT_OFFSET" else 0.0
+        values = [point.co.y for point in points]
+        times = [point.co.x for point in points]
+        if kind == "MIRROR" and number % 2:
+            values.reverse()
+            times = [first + last - time for time in reversed(times)]
+        for point, time, value in zip(points, times, values, strict=True):
+            shift = time + number * (last - first) - point.co.x, value + rise - point.co.y
+            for part in ("co", "handle_left", "handle_right"):
+                setattr(point, part, [a + b for a, b in zip(getattr(point, part), shift, strict=True)])
+    return spare
+
+
+def assert_unrolled(obj: bpy.types.Object, *cycles: object) -> None:
+    shown, wanted = shown_worlds([obj], AROUND)[0], unrolled(obj, *cycles)
+    error = np.abs(shown - wanted).max(axis=(1, 2)) / np.abs(wanted).max()
+    assert error.max() < 1e-5, f"off by {error.max():.3g} on frame {AROUND[error.argmax()]}"
+
+
+@pytest.mark.parametrize("count", [0, 1, 2], ids=["without end", "once", "twice"])
+@pytest.mark.parametrize(("before", "after"), list(itertools.product(CYCLES, repeat=2)))
+def test_cycles_repeat_the_rigid_motion_on_both_sides(live_file, before, after, count):
+    obj = cyclic("QUATERNION", mode_before=before, mode_after=after, cycles_before=count, cycles_after=count)
+    keys = snapshot(obj)
+    set_mode(obj, "dq_sclerp")
+    assert snapshot(obj) == keys
+    assert_unrolled(obj, before, after, count, count)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("kind", CYCLES[1:3])
+@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+def test_cycles_repeat_every_mode_with_the_easing_of_its_keys(live_file, mode, kind, order):
+    obj = cyclic(order, "BEZIER", mode_before=kind, mode_after=kind)
+    set_mode(obj, mode)
+    assert_unrolled(obj, kind, kind, 0, 0)
+
+
+@pytest.mark.parametrize("kind", CYCLES[1:])
+def test_each_copy_of_a_segment_has_its_mode(live_file, kind):
+    obj = cyclic("QUATERNION", mode_before=kind, mode_after=kind)
+    set_mode(obj, "dq_sclerp", [35.0])
+    assert [mode_at(obj, frame) for frame in (31.0, 35.0)] == ["BLENDER", "dq_sclerp"]
+    shown, own = shown_worlds([obj], AROUND)[0], native(obj)
+    rounds, place = np.divmod(AROUND - 31.0, 11.0)
+    if kind == "MIRROR":
+        place = np.where(rounds % 2, 11.0 - place, place)
+    filled = (place > 4.0) & (place < 11.0)
+    assert np.abs(shown - own)[~filled].max() < 1e-5
+    assert np.abs(shown - own)[filled].max(axis=(1, 2)).min() > 1e-2
+
+
+def test_channels_with_cycles_of_different_lengths_share_the_copies_of_all_keys(live_file):
+    obj = new_object("Tool", "XYZ")
+    for path, frames in (("location", (31.0, 35.0, 39.0)), ("rotation_euler", (32.0, 37.0, 44.0))):
+        write_channel(obj, path, np.array(frames), random_values(obj, path, 3))
+    for fcurve in curves_of(obj).values():
+        cycles = fcurve.modifiers.new("CYCLES")
+        cycles.mode_before = cycles.mode_after = "REPEAT_OFFSET"
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 75
+    set_mode(obj, "dq_sclerp")
+    copies = {time + 8 * number for time in (31.0, 35.0) for number in range(-9, 10)}
+    copies |= {time + 12 * number for time in (32.0, 37.0) for number in range(-6, 7)}
+    shown, wanted = shown_worlds([obj], AROUND)[0], expected_bases(obj, AROUND, keys=np.array(sorted(copies)))
+    assert np.abs(shown - wanted).max() < 1e-5 * np.abs(wanted).max()

@@ -1,0 +1,293 @@
+"""Where a mode cannot work it is refused: the message names object, hindrance and way out, and nothing changes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import Refused, bake, problem_of, refresh, set_mode
+from tests.animation.oracle import assert_shown, curves_of, expected_bases, shown_worlds, snapshot
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
+
+PLAYED = np.arange(-2.0, 44.0)
+DELTAS = ("delta_location", "delta_rotation_quaternion", "delta_rotation_euler", "delta_scale")
+
+
+def state_of(obj: bpy.types.Object) -> tuple:
+    """All that choosing a mode may ever touch, and what is to be seen."""
+    action = obj.animation_data.action
+    return (
+        repr(snapshot(obj)),
+        [(fcurve.data_path, fcurve.array_index) for fcurve in curves_of(obj).values()],
+        obj.rigid_motion.mode,
+        tuple(obj.rigid_motion.filled),
+        [tuple(getattr(obj, path)) for path in DELTAS],
+        [(slot.handle, slot.digest) for slot in action.rigid_motion.slots],
+        [group.name for bag in action.layers[0].strips[0].channelbags for group in bag.groups],
+        sorted(block.name for block in bpy.data.actions),
+        shown_worlds([obj], PLAYED)[0].tobytes(),
+    )
+
+
+def modifier(kind: str, path: str = "location", **settings: object) -> Callable[[bpy.types.Object], None]:
+    def add(obj: bpy.types.Object) -> None:
+        added = curves_of(obj)[path, 1].modifiers.new(kind)
+        for name, value in settings.items():
+            setattr(added, name, value)
+
+    return add
+
+
+def driver(path: str, index: int = 0) -> Callable[[bpy.types.Object], None]:
+    def add(obj: bpy.types.Object) -> None:
+        obj.driver_add(path, index).driver.expression = "0.1 * frame"
+
+    return add
+
+
+def sampled(obj: bpy.types.Object) -> None:
+    curves_of(obj)["location", 2].convert_to_samples(1, 41)
+
+
+def keyed_delta(path: str) -> Callable[[bpy.types.Object], None]:
+    return lambda obj: obj.keyframe_insert(path, index=1, frame=5)
+
+
+def turned_by_axis_and_angle(obj: bpy.types.Object) -> None:
+    obj.rotation_mode = "AXIS_ANGLE"
+
+
+def value(number: float) -> Callable[[bpy.types.Object], None]:
+    def put(obj: bpy.types.Object) -> None:
+        keys = curves_of(obj)["location", 1].keyframe_points
+        points = np.empty(2 * len(keys), np.float32)
+        keys.foreach_get("co", points)
+        points[5] = number
+        keys.foreach_set("co", points)
+
+    return put
+
+
+def far_off(obj: bpy.types.Object) -> None:
+    curves_of(obj)["location", 0].keyframe_points.insert(900_000.0, 1.0)
+
+
+HINDRANCES = {
+    "axis and angle": (turned_by_axis_and_angle, "turns by axis and angle.*set its rotation mode to Quaternion"),
+    "noise": (modifier("NOISE"), "Location Y has a modifier of type Noise.*mute or remove it, or bake"),
+    "generator": (modifier("GENERATOR"), "Location Y has a modifier of type Generator.*mute or remove"),
+    "limits": (modifier("LIMITS", "rotation_quaternion"), "Rotation Quaternion X has a modifier of type Limits"),
+    "stepped": (modifier("STEPPED"), "Location Y has a modifier of type Stepped"),
+    "envelope": (modifier("ENVELOPE"), "Location Y has a modifier of type Envelope"),
+    "built-in function": (modifier("FNGENERATOR"), "Location Y has a modifier of type Fngenerator"),
+    "cycles in a range": (modifier("CYCLES", use_restricted_range=True), "type Cycles with a restricted range"),
+    "cycles in part": (modifier("CYCLES", use_influence=True, influence=0.5), "with a restricted range or influence"),
+    "driven location": (driver("location", 2), "Location Z is driven: remove the driver, or bake it"),
+    "driven rotation": (driver("rotation_quaternion", 0), "Rotation Quaternion W is driven"),
+    "driven scale": (driver("scale", 1), "Scale Y is driven"),
+    "driven delta": (driver("delta_location", 0), "Delta Location X is driven"),
+    "animated delta location": (keyed_delta("delta_location"), "Delta Location Y is animated already: move"),
+    "animated delta rotation": (keyed_delta("delta_rotation_quaternion"), "Delta Rotation Quaternion X is animated"),
+    "animated delta scale": (keyed_delta("delta_scale"), "Delta Scale Y is animated already"),
+    "sampled keys": (sampled, "Location Z is sampled and has no keys.*Samples to Keys"),
+    "not a number": (value(float("nan")), "key 3 of Location Y is not a finite number: delete it"),
+    "infinite": (value(float("inf")), "key 3 of Location Y is not a finite number: delete it"),
+    "far too long": (far_off, "has keys over 8999.. frames, at most 250000.*delete the keys that are far off"),
+}
+"""What to do to an object, and what it is told."""
+
+
+@pytest.mark.parametrize("frames", [None, FRAMES[:2]], ids=["whole object", "keys"])
+@pytest.mark.parametrize("hindrance", HINDRANCES)
+def test_a_mode_that_cannot_work_is_refused_by_name_and_nothing_changes(live_file, hindrance, frames):
+    obj = new_object()
+    give_own_deltas(obj)
+    key(obj, scale="even")
+    hinder, message = HINDRANCES[hindrance]
+    hinder(obj)
+    bpy.context.view_layer.update()
+    before = state_of(obj)
+    with pytest.raises(Refused, match=f"^Tool.*{message}"):
+        set_mode(obj, "dq_sclerp", frames)
+    assert state_of(obj) == before
+    set_mode(obj, "BLENDER")
+    assert state_of(obj) == before, "Blender's own mode is always to be had"
+    with pytest.raises(Refused):
+        bake(obj)
+    assert state_of(obj) == before
+
+
+@pytest.mark.parametrize("hindrance", [name for name in HINDRANCES if "animated delta" not in name])
+def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live_file, hindrance):
+    other, obj = key(new_object("Other"), scale="even"), new_object()
+    own = give_own_deltas(obj)
+    key(obj, scale="even")
+    set_mode(obj, "dq_sclerp")
+    HINDRANCES[hindrance][0](obj)
+    keys = repr(snapshot(obj))
+    bpy.context.view_layer.update()
+    refresh()
+    assert not any(path.startswith("delta") for path, _ in curves_of(obj))
+    assert re.match(f"Tool.*{HINDRANCES[hindrance][1]}", problem_of(obj))
+    assert repr(snapshot(obj)) == keys
+    assert tuple(obj.delta_scale) == own.scale
+    if hindrance != "driven delta":
+        assert tuple(obj.delta_location) == own.location
+    set_mode(other, "dq_sclerp")
+    assert_shown([other], PLAYED)
+
+
+def test_nothing_can_be_keyed_where_in_betweens_are(live_file):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    assert not obj.keyframe_insert("delta_location", frame=5)
+    bpy.context.view_layer.update()
+    assert problem_of(obj) == ""
+    assert_shown([obj], PLAYED)
+
+
+@pytest.mark.parametrize("hindrance", ["noise", "driven location", "axis and angle", "cycles in a range"])
+def test_in_betweens_are_back_as_soon_as_nothing_is_in_the_way_any_more(live_file, hindrance):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    HINDRANCES[hindrance][0](obj)
+    bpy.context.view_layer.update()
+    assert problem_of(obj) != ""
+    for fcurve in curves_of(obj).values():
+        for added in list(fcurve.modifiers):
+            fcurve.modifiers.remove(added)
+    for driven in list(obj.animation_data.drivers):
+        obj.driver_remove(driven.data_path, driven.array_index)
+    obj.rotation_mode = "QUATERNION"
+    bpy.context.view_layer.update()
+    assert problem_of(obj) == ""
+    assert_shown([obj], PLAYED)
+
+
+@pytest.mark.parametrize("kind", ["NOISE", "LIMITS", "STEPPED"])
+def test_a_muted_modifier_is_no_hindrance(live_file, kind):
+    obj = key(new_object())
+    modifier(kind, mute=True)(obj)
+    set_mode(obj, "dq_sclerp")
+    assert problem_of(obj) == ""
+    assert_shown([obj], PLAYED)
+
+
+DIFFERENCES = {
+    "mode": lambda obj: setattr(obj.rigid_motion, "mode", "pga_lerp"),
+    "rotation mode": lambda obj: setattr(obj, "rotation_mode", "XYZ"),
+    "delta transform": lambda obj: setattr(obj, "delta_location", (1.0, 2.0, 3.0)),
+}
+
+
+@pytest.mark.parametrize("difference", ["rotation mode", "delta transform"])
+def test_objects_that_share_a_slot_and_differ_are_refused(live_file, difference):
+    obj, twin = key(new_object("One")), new_object("Twin")
+    twin.animation_data_create().action = obj.animation_data.action
+    twin.animation_data.action_slot = obj.animation_data.action_slot
+    DIFFERENCES[difference](twin)
+    before = state_of(obj), state_of(twin)
+    for one in (obj, twin):
+        with pytest.raises(Refused, match=r"Twin moves by the same Action slot as One.*an Action of its own"):
+            set_mode(one, "dq_sclerp")
+        assert (state_of(obj), state_of(twin)) == before
+
+
+@pytest.mark.parametrize("difference", DIFFERENCES)
+def test_objects_that_share_a_slot_and_come_to_differ_move_as_blender_has_it(live_file, difference):
+    obj, twin = key(new_object("One")), new_object("Twin")
+    twin.animation_data_create().action = obj.animation_data.action
+    twin.animation_data.action_slot = obj.animation_data.action_slot
+    set_mode(obj, "dq_sclerp")
+    native = expected_bases(obj, PLAYED, keys=np.empty(0))
+    if difference == "delta transform":
+        twin.rigid_motion.own_location = (1.0, 2.0, 3.0)
+    else:
+        DIFFERENCES[difference](twin)
+    bpy.context.view_layer.update()
+    refresh()
+    assert "same Action slot" in problem_of(obj)
+    assert np.abs(shown_worlds([obj], PLAYED)[0] - native).max() < 1e-5 * np.abs(native).max()
+
+
+@pytest.fixture
+def library(live_file, tmp_path) -> Path:
+    """A file with an object that has the screw mode, one that has none, and where the first is on the frames played."""
+    for name, mode in (("Door", "dq_sclerp"), ("Lid", "BLENDER")):
+        set_mode(key(new_object(name)), mode)
+    np.save(tmp_path / "door.npy", expected_bases(bpy.data.objects["Door"], PLAYED))
+    path = tmp_path / "library.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+def linked(library: Path, name: str) -> bpy.types.Object:
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.objects = [name]
+    obj = bpy.data.objects[name]
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+    return obj
+
+
+def assert_refused_unchanged(obj: bpy.types.Object, message: str) -> None:
+    before = state_of(obj)
+    for frames in (None, FRAMES[:2]):
+        with pytest.raises(Refused, match=message):
+            set_mode(obj, "pga_lerp", frames)
+        assert state_of(obj) == before
+
+
+def assert_as_in_the_library(obj: bpy.types.Object, library: Path) -> None:
+    wanted = np.load(library.with_name("door.npy"))
+    assert np.abs(shown_worlds([obj], PLAYED)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+
+
+def test_a_linked_object_is_refused_and_keeps_the_in_betweens_of_its_library(library):
+    obj = linked(library, "Door")
+    assert_as_in_the_library(obj, library)
+    assert_refused_unchanged(obj, r"^Door is linked from another file: make it local first \(Object > Relations")
+    refresh()
+    assert_as_in_the_library(obj, library)
+
+
+def test_a_linked_object_without_a_mode_is_refused(library):
+    assert_refused_unchanged(linked(library, "Lid"), "^Lid is linked from another file")
+
+
+def test_an_object_whose_action_is_linked_is_refused(library):
+    obj = linked(library, "Door").make_local()
+    assert obj.library is None
+    assert obj.animation_data.action.library is not None
+    assert_refused_unchanged(obj, "^DoorAction is linked from another file: make it local first")
+    refresh()
+    assert_as_in_the_library(obj, library)
+
+
+def test_a_library_override_is_refused_by_the_name_of_its_linked_action(library):
+    obj = linked(library, "Door").override_create(remap_local_usages=True)
+    assert_refused_unchanged(obj, "^DoorAction is linked from another file")
+    refresh()
+    assert_as_in_the_library(obj, library)
+
+
+def test_a_shot_with_linked_objects_shows_their_in_betweens_when_it_is_opened_again(library, tmp_path):
+    linked(library, "Door")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    assert_as_in_the_library(bpy.data.objects["Door"], library)
+
+
+@pytest.mark.parametrize("name", ["Door", "Lid"])
+def test_what_is_made_local_can_have_any_mode(library, name):
+    obj = linked(library, name).make_local()
+    obj.animation_data.action.make_local()
+    set_mode(obj, "pga_slerp")
+    assert problem_of(obj) == ""
+    assert_shown([obj], PLAYED)

@@ -1,0 +1,207 @@
+"""Files that leave the session: a Blender without the extension plays them alike, and loses nothing in saving them.
+
+That Blender is another process at factory settings, in which nothing of this program is imported.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import is_baked, modes_of, refresh, set_enabled, set_mode
+from addon.motion import MODES
+from tests.animation.oracle import Own, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+
+PLAYED = np.arange(-2.0, 44.0)
+"""From before the first key until after the last."""
+
+ORDERS = ("QUATERNION", "XYZ", "ZYX", "YXZ")
+
+FARM = """
+import sys
+import bpy
+import numpy as np
+path, found, *names = sys.argv[1:]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.wm.open_mainfile(filepath=path)
+assert not hasattr(bpy.types.Object, "rigid_motion") and "addon" not in sys.modules
+graph, scene = bpy.context.evaluated_depsgraph_get(), bpy.context.scene
+worlds = lambda: [bpy.data.objects[name].evaluated_get(graph).matrix_world for name in names]
+opened = np.array(worlds())
+"""
+
+PLAY = """
+played = []
+for frame in np.load(found):
+    scene.frame_set(int(frame))
+    played.append(np.array(worlds()))
+np.savez(found.replace(".npy", ".npz"), opened=opened, played=np.array(played))
+"""
+
+
+def on_a_farm(program: str, *arguments: object) -> None:
+    """Run a program in a Blender that has never heard of the extension."""
+    done = subprocess.run(
+        [sys.executable, "-c", FARM + program, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=Path(str(arguments[0])).parent,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def played_on_a_farm(path: Path, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """World matrices as the file is opened (objects, 4, 4), and on all frames played (objects, frames, 4, 4)."""
+    frames = path.with_suffix(".npy")
+    np.save(frames, PLAYED)
+    on_a_farm(PLAY, path, frames, *names)
+    with np.load(frames.with_suffix(".npz")) as found:
+        return found["opened"], found["played"].swapaxes(0, 1)
+
+
+def save(path: Path) -> Path:
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def assert_same(worlds: Sequence[np.ndarray], wanted: Sequence[np.ndarray], tolerance: float = 1e-6) -> None:
+    """To this share of the size."""
+    for one, other in zip(worlds, wanted, strict=True):
+        assert np.abs(one - other).max() <= tolerance * max(1.0, np.abs(other).max())
+
+
+def every_mode_and_kind() -> tuple[list[bpy.types.Object], dict[str, Own]]:
+    """An object for each mode, rotation order and kind of trouble, and the delta transforms of their own."""
+    objects, owns = [], {}
+    parent = key(new_object("Arm", "XYZ"), (1.0, 30.0), seed=99)
+    for seed, (mode, order) in enumerate((mode, order) for mode in MODES for order in ORDERS):
+        obj = new_object(f"{mode} {order}", order)
+        scale = (None, "even", "uneven")[seed % 3]
+        if seed % 2:
+            owns[obj.name] = give_own_deltas(obj, seed)
+        if seed % 5 in (1, 2):
+            obj.parent, obj.matrix_parent_inverse = parent, np.eye(4) + 0.1 * np.eye(4, k=3)
+        key(obj, seed=seed, scale=scale, interpolation=("BEZIER", "LINEAR", "BOUNCE", "CONSTANT")[seed % 4])
+        set_mode(obj, mode, None if seed % 4 < 2 else FRAMES[:2])
+        objects.append(obj)
+    set_mode(parent, "dq_sclerp")
+    return [*objects, parent], owns
+
+
+def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tmp_path):
+    objects, owns = every_mode_and_kind()
+    assert_shown(objects, PLAYED, owns)
+    shown = shown_worlds(objects, PLAYED)
+    _, played = played_on_a_farm(save(tmp_path / "shot.blend"), [obj.name for obj in objects])
+    assert_same(played, shown)
+    for obj in objects:
+        set_mode(obj, "BLENDER")
+    native = shown_worlds(objects, PLAYED)
+    differing = [np.abs(one - other).max() > 1e-2 for one, other in zip(native, shown, strict=True)]
+    assert np.mean(differing) > 0.7, "in most of these the modes are to be seen, or this test says nothing"
+
+
+@pytest.mark.parametrize("frame", [7.0, 17.25, 400.0])
+def test_a_file_opens_as_it_was_to_be_seen_on_the_frame_it_was_saved_on(live_file, tmp_path, frame):
+    obj = key(new_object())
+    own = give_own_deltas(obj)
+    set_mode(obj, "pga_slerp")
+    live_file.scene.frame_set(int(frame), subframe=frame % 1.0)
+    shown = np.array(obj.evaluated_get(live_file.evaluated_depsgraph_get()).matrix_world)
+    opened, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"])
+    assert_same(opened, [shown])
+    assert_same(played, [expected_worlds(obj, PLAYED, {"Tool": own})], 1e-5)
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["plain", "own deltas"])
+@pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
+def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path, order, own):
+    obj = new_object("Tool", order)
+    owns = {"Tool": give_own_deltas(obj)} if own else {}
+    key(obj, scale="even")
+    set_mode(obj, "cga_slerp")
+    set_mode(obj, "dq_sclerp", [11.0])
+    keys = snapshot(obj)
+    on_a_farm("bpy.ops.wm.save_as_mainfile(filepath=found)", save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
+    obj = bpy.data.objects["Tool"]
+    assert snapshot(obj) == keys
+    assert modes_of(obj, np.array(FRAMES[:3])) == ["cga_slerp", "dq_sclerp", "cga_slerp"]
+    assert refresh() == 0, "the in-betweens that are there are those of these keys"
+    assert_shown([obj], PLAYED, owns)
+    set_mode(obj, "BLENDER")
+    assert not any(path.startswith("delta") for path, _ in curves_of(obj))
+    assert own_deltas(obj) == owns.get("Tool", Own())
+
+
+def test_keys_that_a_farm_edits_are_followed_when_the_extension_is_there_again(live_file, tmp_path):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    edit = """
+for fcurve in bpy.data.actions[0].layers[0].strips[0].channelbags[0].fcurves:
+    if fcurve.data_path == "location":
+        fcurve.keyframe_points[1].co_ui.y += 2.0
+bpy.ops.wm.save_as_mainfile(filepath=found)
+"""
+    before = shown_worlds([obj], PLAYED)[0]
+    on_a_farm(edit, save(tmp_path / "shot.blend"), tmp_path / "farm.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
+    obj = bpy.data.objects["Tool"]
+    assert_shown([obj], PLAYED)
+    assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 1.0
+
+
+def test_what_was_not_followed_before_saving_is_caught_up_with_after_loading(live_file, tmp_path):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    set_enabled(False)
+    try:
+        key(obj, seed=5)
+        before = shown_worlds([obj], PLAYED)[0]
+        path = save(tmp_path / "shot.blend")
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED), [before])
+    finally:
+        set_enabled(True)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    obj = bpy.data.objects["Tool"]
+    assert_shown([obj], PLAYED)
+    assert np.abs(shown_worlds([obj], PLAYED)[0] - before).max() > 0.1
+
+
+def test_what_was_not_followed_is_caught_up_with_by_refresh_before_a_farm_gets_it(live_file, tmp_path):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    set_enabled(False)
+    try:
+        key(obj, seed=5)
+        assert refresh() == 1
+        _, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"])
+    finally:
+        set_enabled(True)
+    assert_same(played, [expected_worlds(obj, PLAYED)], 1e-5)
+
+
+def test_a_baked_object_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved_the_file(live_file, tmp_path):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    keys, wanted = snapshot(obj), expected_worlds(obj, PLAYED)
+    animation.bake(obj)
+    path = save(tmp_path / "shot.blend")
+    assert_same(played_on_a_farm(path, ["Tool"])[1], [wanted], 1e-5)
+    on_a_farm("bpy.ops.wm.save_as_mainfile(filepath=found)", path, tmp_path / "farm.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
+    obj = bpy.data.objects["Tool"]
+    assert is_baked(obj)
+    animation.unbake(obj)
+    assert snapshot(obj) == keys
+    assert_shown([obj], PLAYED)

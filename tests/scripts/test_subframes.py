@@ -1,0 +1,60 @@
+"""The error between whole frames is bounded, falls as the motion gets slower, and goes where one bakes more finely."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation.inbetweens import in_betweens
+from addon.animation.mode_keys import source_of
+from addon.motion import MODES
+from scripts import subframes
+from scripts.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
+
+BRISK = Motion("Brisk", turn=90.0, distance=1.0, frames=24)
+
+
+@pytest.fixture
+def live_file(empty_file):
+    """A new file without objects, with the extension's data."""
+    animation.register()
+    yield empty_file
+    animation.unregister()
+
+
+def live(motion, mode="dq_sclerp", rotation_mode="QUATERNION", fractions=QUARTERS):
+    obj = keyed_object(motion, rotation_mode)
+    animation.set_mode(obj, mode)
+    frames = between(motion, np.asarray(fractions))
+    return deviation(obj, frames, in_betweens(source_of(obj), frames).wanted, radius=0.1)
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
+@pytest.mark.parametrize("mode", MODES)
+def test_a_brisk_motion_is_within_two_millimetres_between_frames_and_exact_on_them(live_file, mode, rotation_mode):
+    found = live(BRISK, mode, rotation_mode)
+    assert 1e-4 < found.largest < 2e-3
+    assert found.rotation < np.radians(0.2)
+    assert live(BRISK, mode, rotation_mode, fractions=[0.0]).largest < 1e-5
+
+
+def test_half_the_speed_has_a_quarter_of_the_error(live_file):
+    slower = Motion("Slower", BRISK.turn, BRISK.distance, 2 * BRISK.frames)
+    assert live(slower).rms == pytest.approx(live(BRISK).rms / 4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
+def test_baking_every_quarter_of_a_frame_leaves_a_tenth_of_the_error(live_file, rotation_mode):
+    found, finely, whole = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
+    assert finely.largest < 0.1 * found.largest
+    assert whole.largest > 0.5 * found.largest, "baking whole frames does not help"
+
+
+def test_the_page_has_a_row_for_every_mode_and_motion(empty_file, tmp_path, monkeypatch):
+    monkeypatch.setattr(subframes, "SEGMENTS", 2)
+    page = tmp_path / "subframes.md"
+    assert subframes.main(["--output", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("# Between whole frames")
+    assert [text.count(f"| `{mode}` |") for mode in MODES] == [2 * len(subframes.MOTIONS)] * len(MODES)
