@@ -7,6 +7,7 @@ from .decimation import decimate
 from .measures import Errors, measure, rms, shell_error
 from .modes import MODES, Mode, in_betweens, interpolate
 from .poses import Poses
+from .reduction import reduce_keys
 from .repair import Repair, repair
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "in_betweens",
     "interpolate",
     "measure",
+    "reduce_keys",
     "repair",
     "rms",
     "shell_error",

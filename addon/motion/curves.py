@@ -14,6 +14,8 @@ its advance along the axis.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .segments import SMALLEST_ANGLE, Curves, Segments
@@ -65,6 +67,31 @@ def motor_lerp(segments: Segments) -> Curves:
         (tangent,),
         basis,
     )
+
+
+def motor_spline(segments: Segments) -> Curves:
+    """A screw from key to key, bent so that its twist goes on through every key.
+
+    Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
+
+        M exp(u r) exp(u (1 - u)^2 (w - r) - u^2 (1 - u) (w' - r))
+
+    Each factor is a function of twists in the body's own axes, so that neither the axes of the world nor those of the
+    body matter; run backwards, it is the same motion. A key has the twist of the parabola through it and its
+    neighbours, the outermost ones that of their segment, and none where the body rests before or after.
+    """
+    count = segments.keys.shape[-1] - 1
+    screws = segments.screws.reshape(7, -1, count)
+    duration = (2.0 / segments.rate).reshape(-1, count)
+    rests = segments.is_still.reshape(-1, count)
+    twists = screws / duration
+    at_keys = np.empty((*screws.shape[:2], count + 1))
+    at_keys[..., 0], at_keys[..., -1] = twists[..., 0], twists[..., -1]
+    before, after = duration[:, :-1], duration[:, 1:]
+    at_keys[..., 1:-1] = (after * twists[..., :-1] + before * twists[..., 1:]) / (before + after)
+    at_keys[..., 1:-1][:, rests[:, :-1] | rests[:, 1:]] = 0.0
+    bends = np.stack((at_keys[..., :-1] * duration - screws, at_keys[..., 1:] * duration - screws), axis=1)
+    return replace(screw(segments), bends=bends.reshape(7, 2, -1))
 
 
 def similarity_slerp(segments: Segments) -> Curves:

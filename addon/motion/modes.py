@@ -30,6 +30,12 @@ class Mode:
     reference: Callable[[Poses, Poses, np.ndarray], Poses]
     """The same motion in the algebra it is named after, for single pairs of poses."""
 
+    behind: int = 0
+    """How many keys before a segment have a say in it."""
+
+    ahead: int = 0
+    """How many keys after a segment have a say in it: a stream has to wait for them."""
+
 
 MODES: dict[str, Mode] = {
     "lerp_slerp": Mode(
@@ -67,6 +73,14 @@ MODES: dict[str, Mode] = {
         "Turns, slides and grows at even rates: a screw that widens as the object grows",
         curves.similarity_slerp,
         cga.cga_slerp,
+    ),
+    "motor_spline": Mode(
+        "Smooth Screw (Motor Spline)",
+        "Screws that flow into one another: no corner at a key, neither in the path nor in the turning",
+        curves.motor_spline,
+        pga.pga_slerp,
+        behind=1,
+        ahead=1,
     ),
 }
 

@@ -21,9 +21,14 @@ from functools import cached_property
 
 import numpy as np
 
-from .piecewise import BLOCK, blocks, is_dense, multiply
+from . import twists
+from .piecewise import BLOCK, blocks, combine, is_dense, multiply
 from .poses import Poses
-from .quaternions import align_signs
+from .quaternions import align_signs, rotate
+from .quaternions import multiply as product
+
+STILL = 1e-12
+"""Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -57,6 +62,9 @@ class Segments:
     scales: np.ndarray | None
     """The scales at both ends, shape (2, S), or None."""
 
+    keys: Poses
+    """All keys of each object, shape (..., n)."""
+
     @classmethod
     def between(cls, key_times: np.ndarray, keys: Poses) -> Segments:
         """The n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
@@ -77,7 +85,30 @@ class Segments:
             scales=None
             if keys.scales is None
             else np.stack((keys.scales[..., :-1].ravel(), keys.scales[..., 1:].ravel())),
+            keys=keys,
         )
+
+    @property
+    def is_still(self) -> np.ndarray:
+        """Whether nothing moves from one key to the next, but for rounding, shape (S,)."""
+        size = np.abs(self.centre).max(axis=0) + SMALLEST_ANGLE
+        still = (self.quarter_angle < STILL) & (np.abs(self.chord).max(axis=0) < STILL * size)
+        return still if self.scales is None else still & (np.abs(np.log(self.scales[1] / self.scales[0])) < STILL)
+
+    @cached_property
+    def screws(self) -> np.ndarray:
+        """The twists that lead from one key to the next in one unit of time, and the growth of log scale: (7, S)."""
+        rows = np.zeros((7, self.start.size))
+        first, second = self.keys[..., :-1], self.keys[..., 1:]
+        rows[:6] = twists.between(
+            first.positions.reshape(-1, 3),
+            first.quaternions.reshape(-1, 4),
+            second.positions.reshape(-1, 3),
+            second.quaternions.reshape(-1, 4),
+        )
+        if self.scales is not None:
+            rows[6] = np.log(self.scales[1] / self.scales[0])
+        return rows
 
     def decompose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The chord's part along the axis n, its part across, and n x D, each of shape (3, S).
@@ -108,6 +139,9 @@ class Curves:
 
     basis: Basis
     """From s (n,), parameters of (n,) each and whether all |s| <= 1 to b above c, (., n), and scales (n,) or None."""
+
+    bends: np.ndarray | None = None
+    """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
 
     @cached_property
     def matrices(self) -> np.ndarray:
@@ -216,10 +250,13 @@ def _evaluate(
     for segment, sample in blocks(bounds):
         counts = all_counts[segment]
         repeated = np.repeat(numbers[:, segment], counts, axis=1)
-        basis, scales = mode.basis(position(sample, *repeated[:own]), [*repeated[own:]], within)
+        s = position(sample, *repeated[:own])
+        basis, scales = mode.basis(s, [*repeated[own:]], within)
         _combine(mode, segment, basis, counts, out[:7, sample])
         if scales is not None:
             out[7, sample] = scales
+        if mode.bends is not None:
+            _bend(mode.bends[..., segment], s, within, counts, out[:, sample])
 
 
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
@@ -246,6 +283,24 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
         np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:])
         return
     multiply(mode.matrices[segment], basis, counts, out)
+
+
+def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
+    """Bend poses (7 or 8, n) that run from key to key so that they leave and arrive with these twists (7, 2, S) added.
+
+    Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there.
+    """
+    u, left = 0.5 + 0.5 * s, 0.5 - 0.5 * s
+    functions = np.stack((u * left * left, -u * u * left))
+    if not within:
+        functions = np.where(u < 0.0, ((1.0,), (0.0,)) * u, np.where(left < 0.0, ((0.0,), (-1.0,)) * left, functions))
+    added = np.empty((len(bends) if len(out) > 7 else 6, s.size))
+    combine(bends[: len(added)], functions, counts, added)
+    turns, advances = twists.exponential(added[:6])
+    out[:3] += rotate(out[3:7].T, advances.T).T
+    out[3:7] = product(out[3:7].T, turns.T).T
+    if len(out) > 7:
+        out[7] *= np.exp(added[6])
 
 
 def _components(vectors: np.ndarray) -> np.ndarray:

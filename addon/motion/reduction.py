@@ -1,0 +1,330 @@
+"""Key reduction: the few samples of a recording that, as keys of a mode, still tell its motion.
+
+A key is a pose: all channels together. Keys are taken out as long as the motion stays near enough to the recording,
+those first that matter least, many at a time where they do not touch one another; then the rest are moved along the
+recording to where they serve best, which lets more of them go, and so on. What one key does is seen in the segments
+around it alone, so that all keys can be tried at once, and the work grows with the length of the recording and not
+with its square.
+
+Source: keys are taken out as knots are from splines in Lyche and Mørken, "Knot removal for parametric B-spline curves
+and surfaces", 1987; the measure is that of the Animation Compression Library, see `addon.motion.measures`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import twists
+from .measures import shell_error
+from .modes import MODES, in_betweens
+from .poses import Poses
+from .quaternions import align_signs, multiply, rotate
+
+PEAK = 8
+"""The power of errors whose sum stands for the largest of them."""
+
+STEPS = (1, -1, 2, -2, 4, -4, 8, -8)
+"""By how many samples keys are moved, on trial."""
+
+ROUNDS = 12
+"""Of moving keys and taking out more of them, at most."""
+
+BATCH = 2**18
+"""Samples looked at in one go."""
+
+
+def reduce_keys(
+    times: np.ndarray,
+    poses: Poses,
+    mode: str = "motor_spline",
+    tolerance: float | None = None,
+    radius: float = 0.1,
+    *,
+    budget: int | None = None,
+    rms: bool = False,
+) -> np.ndarray:
+    """The fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Seconds, strictly rising.
+    poses : Poses, shape (n,)
+        The recording, with unit quaternions.
+    mode : str
+        One of `MODES`.
+    tolerance : float, optional
+        The largest shell error anywhere, in the unit of the positions; with `rms` the root mean square over all
+        samples.
+    radius : float
+        Of the shell, in the unit of the positions.
+    budget : int, optional
+        The most keys, at least 2, instead of a tolerance: the error is then as small as can be found.
+    rms : bool
+        Go by the root mean square of the shell error instead of the largest.
+
+    Returns
+    -------
+    array of int, shape (k,)
+        Rising, the first and the last sample among them.
+
+    Raises
+    ------
+    ValueError
+        Where it is not one of tolerance and budget that is given, or either is no sensible number, or a sample is not
+        finite.
+    """
+    if (tolerance is None) == (budget is None):
+        raise ValueError("key reduction needs either a tolerance or a budget of keys")
+    if mode not in MODES:
+        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f"a tolerance of {tolerance} is not a positive number")
+    if budget is not None and budget < 2:
+        raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")
+    times = np.asarray(times, dtype=np.float64)
+    if times.shape != poses.shape:
+        raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}")
+    numbers = np.column_stack((times, poses.positions, poses.quaternions))
+    finite = np.isfinite(numbers).all(axis=1)
+    if not finite.all():
+        raise ValueError(f"sample {int(np.argmin(finite))} is not finite")
+    if np.any(np.diff(times) <= 0.0):
+        raise ValueError(f"sample {int(np.argmax(np.diff(times) <= 0.0)) + 1} is not later than the one before it")
+    if len(times) <= 2:
+        return np.arange(len(times))
+    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
+    reduction = _Reduction(times, poses, mode, radius, 2 if rms else PEAK)
+    if tolerance is not None:
+        return reduction.within(tolerance)
+    return reduction.within_budget(budget)
+
+
+@dataclass(eq=False)
+class _Keys:
+    """Keys among the samples, and what lies between them."""
+
+    places: np.ndarray
+    """Samples, shape (k,)."""
+
+    cost: np.ndarray
+    """The sum of powers of the errors in each segment, shape (k - 1,)."""
+
+    peak: np.ndarray
+    """The largest error in each segment, shape (k - 1,)."""
+
+
+class _Reduction:
+    """The search for keys of one recording under one mode."""
+
+    def __init__(self, times: np.ndarray, poses: Poses, mode: str, radius: float, power: int) -> None:
+        self.times, self.poses, self.mode, self.radius, self.power = times, poses, mode, radius, power
+        self.reach = max(MODES[mode].behind, MODES[mode].ahead)
+        """How many segments beyond its own two a key has a say in, on either side."""
+        self.apart = 2 + 2 * self.reach
+        """Keys this far from one another, or further, can be tried without regard to each other."""
+
+    def within(self, tolerance: float) -> np.ndarray:
+        """The places of few keys that keep to a tolerance."""
+        keys = self._measured(np.arange(len(self.times)))
+        keys = self._thinned(keys, tolerance, 2)
+        for _ in range(ROUNDS):
+            before = len(keys.places)
+            keys = self._thinned(self._moved(keys, tolerance), tolerance, 2)
+            if len(keys.places) == before:
+                break
+        return keys.places
+
+    def within_budget(self, budget: int) -> np.ndarray:
+        """The places of so many keys, with as small an error as can be found."""
+        keys = self._thinned(self._measured(np.arange(len(self.times))), math.inf, budget)
+        for _ in range(ROUNDS):
+            before = keys.cost.sum()
+            keys = self._moved(keys, math.inf)
+            if not keys.cost.sum() < 0.99 * before:
+                break
+        return keys.places
+
+    def _measured(self, places: np.ndarray) -> _Keys:
+        """Keys in these places, everything between them measured."""
+        reach = self.reach
+        columns = np.arange(-reach, 2 + reach)
+        segments = np.arange(len(places) - 1)
+        windows = self._windows(places, segments, columns)
+        cost, peak = self._look(windows, slice(reach, reach + 1))
+        return _Keys(places, cost[:, 0], peak[:, 0])
+
+    def _thinned(self, keys: _Keys, tolerance: float, fewest: int) -> _Keys:
+        """Keys without all those that can be spared, down to the fewest that are wanted."""
+        reach = self.reach
+        columns = np.concatenate((np.arange(-1 - 2 * reach, 0), np.arange(1, 2 + 2 * reach)))
+        seen = np.zeros(len(keys.places), dtype=bool)
+        cost, peak = np.zeros((2, len(keys.places), 1 + 2 * reach))
+        while len(keys.places) > fewest:
+            unseen = np.flatnonzero(~seen[1:-1]) + 1
+            if len(unseen):
+                found = self._look(self._windows(keys.places, unseen, columns), slice(reach, 1 + 3 * reach))
+                cost[unseen], peak[unseen] = found
+                seen[unseen] = True
+            inner = np.arange(1, len(keys.places) - 1)
+            rise = cost[inner].sum(axis=1) - self._around(keys.cost, inner)
+            picked = inner[self._sparable(rise, peak[inner].max(axis=1), keys, tolerance, len(inner) + 2 - fewest)]
+            if not len(picked):
+                break
+            self._settle(keys, picked, cost, peak)
+            left = np.ones(len(seen), dtype=bool)
+            left[picked] = False
+            near = (picked[:, None] + np.arange(-2 - 3 * reach, 3 + 3 * reach)).ravel()
+            seen[near[(near >= 0) & (near < len(seen))]] = False
+            seen, cost, peak = seen[left], cost[left], peak[left]
+        return keys
+
+    def _sparable(self, rise: np.ndarray, peak: np.ndarray, keys: _Keys, tolerance: float, most: int) -> np.ndarray:
+        """Which of the inner keys go next: those whose loss raises the cost least, far enough from one another."""
+        order = np.argsort(rise, kind="stable")
+        order = order[: max(1, len(order) // 4)] if self.power == 2 or not math.isfinite(tolerance) else order
+        if self.power != 2:
+            order = order[peak[order] <= tolerance]
+            order = order[: max(1, len(rise) // 4)]
+        picked = _apart(order, self.apart, len(rise))[:most]
+        if self.power == 2 and math.isfinite(tolerance):
+            picked = picked[keys.cost.sum() + np.cumsum(rise[picked]) <= tolerance**2 * len(self.times)]
+        return picked
+
+    def _settle(self, keys: _Keys, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
+        """Take these keys out, and put what was found for the segments around them in place of what was there."""
+        reach = self.reach
+        places = picked[:, None] + np.concatenate((np.arange(-1 - reach, 0), np.arange(1, 1 + reach)))
+        there = (places >= 0) & (places < len(keys.cost))
+        keys.cost[places[there]], keys.peak[places[there]] = cost[picked][there], peak[picked][there]
+        keys.places = np.delete(keys.places, picked)
+        keys.cost, keys.peak = np.delete(keys.cost, picked), np.delete(keys.peak, picked)
+
+    def _moved(self, keys: _Keys, tolerance: float) -> _Keys:
+        """As many keys, moved along the recording as long as that lowers the cost by much."""
+        reach = self.reach
+        columns = np.arange(-1 - 2 * reach, 2 + 2 * reach)
+        offsets = np.arange(-1 - reach, 1 + reach)
+        for step in STEPS:
+            places = keys.places
+            inner = np.arange(1, len(places) - 1)
+            moved = places[inner] + step
+            inner = inner[(moved > places[inner - 1]) & (moved < places[inner + 1])]
+            if not len(inner):
+                continue
+            windows = self._windows(places, inner, columns)
+            windows[:, 1 + 2 * reach] += step
+            cost, peak = self._look(windows, slice(reach, 2 + 3 * reach))
+            rise = cost.sum(axis=1) - self._around(keys.cost, inner)
+            good = np.flatnonzero((rise < -1e-4 * keys.cost.mean()) & (peak.max(axis=1) <= max(tolerance, 0.0)))
+            if self.power == 2:
+                good = np.flatnonzero(rise < -1e-4 * keys.cost.mean())
+            chosen = good[np.argsort(rise[good], kind="stable")]
+            picked = _apart(inner[chosen], self.apart, len(places))
+            rows = np.searchsorted(inner, picked)
+            segments = picked[:, None] + offsets
+            there = (segments >= 0) & (segments < len(keys.cost))
+            keys.cost[segments[there]], keys.peak[segments[there]] = cost[rows][there], peak[rows][there]
+            keys.places = places.copy()
+            keys.places[picked] += step
+        return keys
+
+    def _around(self, of_segments: np.ndarray, inner: np.ndarray) -> np.ndarray:
+        """The sum over the segments that each key has a say in."""
+        sums = np.concatenate(((0.0,), np.cumsum(of_segments)))
+        last = len(of_segments)
+        return sums[np.minimum(inner + 1 + self.reach, last)] - sums[np.maximum(inner - 1 - self.reach, 0)]
+
+    def _windows(self, places: np.ndarray, centres: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """The samples of the keys in these columns from each centre, -1 where there are none, shape (c, m)."""
+        numbers = centres[:, None] + columns
+        inside = (numbers >= 0) & (numbers < len(places))
+        return np.where(inside, places[np.clip(numbers, 0, len(places) - 1)], -1)
+
+    def _look(self, windows: np.ndarray, segments: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Costs and peaks, each (c, s), of some of the segments between the keys of windows (c, m)."""
+        wanted = windows[:, segments], windows[:, segments.start + 1 : segments.stop + 1]
+        counts = np.where((wanted[0] >= 0) & (wanted[1] >= 0), wanted[1] - wanted[0] - 1, 0)
+        cost, peak = np.zeros((2, *counts.shape))
+        ends = np.cumsum(counts.sum(axis=1))
+        cuts = np.unique(np.append(np.searchsorted(ends, np.arange(0, ends[-1], BATCH)), len(windows)))
+        for first, last in itertools.pairwise(cuts.tolist()):
+            few = slice(first, last)
+            self._look_at_once(windows[few], segments.start, counts[few], cost[few], peak[few])
+        return cost, peak
+
+    def _look_at_once(
+        self, windows: np.ndarray, start: int, counts: np.ndarray, cost: np.ndarray, peak: np.ndarray
+    ) -> None:
+        some = np.flatnonzero(counts.sum(axis=1))
+        if not len(some):
+            return
+        every = np.zeros((len(some), windows.shape[1] - 1), dtype=np.int64)
+        every[:, start : start + counts.shape[1]] = counts[some]
+        segment = np.repeat(np.arange(every.size), every.ravel())
+        begins = windows[some, :-1].ravel()
+        first = np.cumsum(every.ravel()) - every.ravel()
+        samples = begins[segment] + 1 + np.arange(len(segment)) - first[segment]
+        key_times, keys = _with_ends(self.times, self.poses, windows[some])
+        start_times, durations = key_times[:, :-1].ravel(), np.diff(key_times).ravel()
+        progress = (self.times[samples] - start_times[segment]) / durations[segment]
+        shown = in_betweens(key_times, keys, every, progress, self.mode)
+        error = shell_error(shown, self.poses[samples], self.radius)
+        filled = np.flatnonzero(every.ravel())
+        sums, largest = np.zeros((2, every.size))
+        sums[filled] = np.add.reduceat(error**self.power, first[filled])
+        largest[filled] = np.maximum.reduceat(error, first[filled])
+        wanted = slice(start, start + counts.shape[1])
+        cost[some] = sums.reshape(every.shape)[:, wanted]
+        peak[some] = largest.reshape(every.shape)[:, wanted]
+
+
+def _apart(order: np.ndarray, distance: int, count: int) -> np.ndarray:
+    """Of the numbers below `count`, in the order of their worth, those that are `distance` from any better one."""
+    rank = np.full(count + 2 * distance, len(order))
+    rank[order + distance] = np.arange(len(order))
+    picked: list[np.ndarray] = []
+    # All at once that are the best in their neighbourhood, and again with what is left.
+    while True:
+        windows = np.lib.stride_tricks.sliding_window_view(rank, 2 * distance - 1)
+        best = windows.min(axis=1)
+        own = rank[distance - 1 : distance - 1 + len(best)]
+        chosen = np.flatnonzero((own == best) & (own < len(order)))
+        if not len(chosen):
+            break
+        picked.append(chosen - 1)
+        near = chosen[:, None] + distance - 1 + np.arange(1 - distance, distance)
+        rank[near.ravel()] = len(order)
+    found = np.concatenate(picked) if picked else np.empty(0, dtype=np.int64)
+    ranks = np.empty(count, dtype=np.int64)
+    ranks[order] = np.arange(len(order))
+    return found[np.argsort(ranks[found])]
+
+
+def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray) -> tuple[np.ndarray, Poses]:
+    """Times and poses (c, m) of these samples; where there are none, the motion goes on as in the outermost segment."""
+    place = np.maximum(windows, 0)
+    key_times = times[place]
+    positions, quaternions = poses.positions[place], poses.quaternions[place]
+    scales = None if poses.scales is None else poses.scales[place]
+    inside = windows >= 0
+    first = inside.argmax(axis=1)
+    last = windows.shape[1] - 1 - inside[:, ::-1].argmax(axis=1)
+    for row, column in np.argwhere(~inside).tolist():
+        end, inner = (first[row], first[row] + 1) if column < first[row] else (last[row], last[row] - 1)
+        steps = abs(column - end)
+        a, b = windows[row, end], windows[row, inner]
+        key_times[row, column] = times[a] + steps * (times[a] - times[b])
+        twist = twists.between(
+            poses.positions[[a]], poses.quaternions[[a]], poses.positions[[b]], poses.quaternions[[b]]
+        )
+        turn, advance = twists.exponential(-steps * twist)
+        positions[row, column] = poses.positions[a] + rotate(poses.quaternions[[a]], advance.T)[0]
+        quaternions[row, column] = multiply(poses.quaternions[[a]], turn.T)[0]
+        if scales is not None:
+            scales[row, column] = poses.scales[a] * (poses.scales[a] / poses.scales[b]) ** steps
+    return key_times, Poses(positions, quaternions, scales)

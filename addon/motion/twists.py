@@ -1,0 +1,75 @@
+"""Twists: the velocities of rigid bodies, and the screws that they add up to.
+
+A twist is six numbers, the angular velocity and then the velocity of the body's origin, both along the body's own axes.
+Its exponential is the motion of a body that keeps this velocity for one unit of time; the logarithm of a motion is the
+twist that leads there by the shorter turn. Components come first, as in `addon.motion.segments`.
+
+Source: Murray, Li and Sastry, "A Mathematical Introduction to Robotic Manipulation", 1994, chapter 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .quaternions import conjugate, multiply, rotate
+
+SERIES_BELOW = 0.03
+"""Below this angle power series serve, whose next terms are below 1e-16."""
+
+
+def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The motions (n) of twists (6, n): unit quaternions (4, n) and translations (3, n)."""
+    turn, advance = twists[:3], twists[3:]
+    squared = np.einsum("kn,kn->n", turn, turn)
+    angle = np.sqrt(squared)
+    half = 0.5 * angle
+    sine, cosine = np.sin(half), np.cos(half)
+    small = angle < SERIES_BELOW
+    if small.all():
+        half_sinc = 0.5 - squared * (1.0 / 48.0 - squared / 3840.0)
+        first = 0.5 - squared * (1.0 / 24.0 - squared / 720.0)
+        second = 1.0 / 6.0 - squared * (1.0 / 120.0 - squared / 5040.0)
+    else:
+        far, far2 = np.where(small, 1.0, angle), np.where(small, 1.0, squared)
+        half_sinc = np.where(small, 0.5 - squared * (1.0 / 48.0 - squared / 3840.0), sine / far)
+        first = np.where(small, 0.5 - squared * (1.0 / 24.0 - squared / 720.0), 2.0 * sine * sine / far2)
+        second = np.where(
+            small, 1.0 / 6.0 - squared * (1.0 / 120.0 - squared / 5040.0), (far - 2.0 * sine * cosine) / (far * far2)
+        )
+    quaternions = np.empty((4, twists.shape[1]))
+    quaternions[0] = cosine
+    np.multiply(half_sinc, turn, out=quaternions[1:])
+    across = _cross(turn, advance)
+    return quaternions, advance + first * across + second * _cross(turn, across)
+
+
+def logarithm(quaternions: np.ndarray, translations: np.ndarray) -> np.ndarray:
+    """The twists (6, n) of motions: unit quaternions (4, n) of either sign and translations (3, n)."""
+    sine = np.sqrt(np.einsum("kn,kn->n", quaternions[1:], quaternions[1:]))
+    angle = 2.0 * np.arctan2(sine, np.abs(quaternions[0]))
+    sign = np.where(quaternions[0] < 0.0, -1.0, 1.0)
+    small = angle < SERIES_BELOW
+    squared = angle * angle
+    ratio = np.where(small, 2.0 + squared * (1.0 / 12.0 + squared * 7.0 / 2880.0), angle / np.where(small, 1.0, sine))
+    far = np.where(small, 1.0, angle)
+    # (1 - (a / 2) cot(a / 2)) / a^2
+    bend = np.where(
+        small,
+        1.0 / 12.0 + squared * (1.0 / 720.0 + squared / 30240.0),
+        (1.0 - 0.5 * far / np.tan(0.5 * far)) / (far * far),
+    )
+    turn = sign * ratio * quaternions[1:]
+    across = _cross(turn, translations)
+    return np.concatenate((turn, translations - 0.5 * across + bend * _cross(turn, across)))
+
+
+def between(
+    first_positions: np.ndarray, first: np.ndarray, second_positions: np.ndarray, second: np.ndarray
+) -> np.ndarray:
+    """The twists (6, n) from poses to others in a unit of time: positions (n, 3), quaternions (n, 4)."""
+    back = conjugate(first)
+    return logarithm(multiply(back, second).T, rotate(back, second_positions - first_positions).T)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
