@@ -19,7 +19,7 @@ from .inbetweens import InBetweens, in_betweens
 from .mode_keys import set_mode_in
 from .reading import read
 from .slots import Refused, Slot, Transformable, curves_in, slots_of
-from .sources import LOCATION, ROTATION, SAME_FRAME, Source
+from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, Source
 
 FIELDS = {
     "co": (2, np.float32),
@@ -208,16 +208,40 @@ def _channels(what: Transformable, source: Source, motion: InBetweens) -> dict[s
     if LOCATION in source.keyed:
         channels["location"] = poses.positions - own[:3]
     if ROTATION in source.keyed:
-        # In the sign and the turn that the animator's first key has, for what lies before goes up to there.
+        # In the sign and the turn that the animator's first key has.
         quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))
         if source.order is None:
             channels[what.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
         else:
             angles = eulers_from_quaternions(quaternions, source.order)
-            channels[what.rotation] = angles + 2.0 * np.pi * np.rint((first[3:6] - angles[0]) / (2.0 * np.pi))
+            channels[what.rotation] = _beginning_near(first[3:6], angles, source.order)
     if poses.scales is not None:
-        channels["scale"] = np.repeat(poses.scales[:, None] / own[7:].mean(), 3, axis=1)
+        # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
+        segments = np.searchsorted(source.key_frames, motion.frames, side="right") - 1
+        is_even = source.modes[np.clip(segments, 0, len(source.modes) - 1)] > 0
+        native = source.values_at(motion.frames)[7:].T
+        channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / own[7:].mean(), native)
+    # What is left alone before and behind goes on from the animator's values, whatever sign or turn they are in.
+    keys, ends = source.keyed_frames, source.values_at(motion.frames[[0, -1]]).T
+    for place, goes_on in (
+        (0, keys[0] < motion.frames[0] - SAME_FRAME),
+        (-1, keys[-1] > motion.frames[-1] + SAME_FRAME),
+    ):
+        if goes_on:
+            for name, prop in what.properties.items():
+                if prop in channels:
+                    channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
     return {what.prefix + prop: values for prop, values in channels.items()}
+
+
+def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:
+    """The same turns as these Euler angles (m, 3), of which the first are as near to `first` (3,) as may be."""
+    # Half a turn more about the outer axes, and the middle one from the other side, turn alike.
+    middle = "XYZ".index(order[1])
+    others = angles + np.pi
+    others[:, middle] = np.pi - angles[:, middle]
+    near = [some + 2.0 * np.pi * np.rint((first - some[0]) / (2.0 * np.pi)) for some in (angles, others)]
+    return min(near, key=lambda some: float(np.abs(some[0] - first).sum()))
 
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
@@ -236,13 +260,9 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
         numbers[places] = old[name][own]
     _set_code(new, "interpolation", "LINEAR")
     points = np.stack((frames, values), axis=1).astype(np.float32)
-    for outside, place in ((before, 0), (behind, -1)):
-        # What is left alone goes on from the value that the animator gave, whatever sign or turn the baked keys are in.
-        at_place = own[places == place % len(frames)]
-        if outside.any() and len(at_place):
-            points[place, 1] = old["co"][at_place[0], 1]
-            if place:
-                new["interpolation"][place] = old["interpolation"][at_place[0]]
+    at_end = own[places == len(frames) - 1]
+    if behind.any() and len(at_end):
+        new["interpolation"][-1] = old["interpolation"][at_end[0]]
     # Handles keep their distance from the key, where there were any; the outer ones shape what is left alone.
     for side in ("handle_left", "handle_right"):
         handles = points.copy()

@@ -4,7 +4,8 @@ Arrays alone, many sources at once: the ten components of location, rotation and
 segments, or keys) of all sources stand one behind the other along the last axis. A segment runs from one frame that has
 a key in any channel to the next. How far the object has come in it is what Blender's own in-betweens say: their share
 of the chord over all channels, a radian counting as much as a unit of length. So a segment follows the easing, the
-handles and the overshoot of its keys, whatever its mode.
+handles and the overshoot of its keys, whatever its mode. A smooth mode has a timing of its own, even from key to key,
+and that is kept where keys are not eased: handles shape single channels, and it is in their place.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion import Poses
+from ..motion import MODES, Poses
 from ..motion import in_betweens as segment_poses
 from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
 from ..motion.piecewise import blocks, combine
+from ..motion.poses import beyond
 from ..motion.quaternions import conjugate, multiply
 from .fcurves import Keys, evaluated
 from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
@@ -28,6 +30,10 @@ AT_ONCE = 65536
 
 BLOCK = 16384
 """Samples worked on at once: few enough for the processor's caches."""
+
+
+SMOOTH = [number for number, mode in enumerate(MODE_IDS) if number and MODES[mode].is_smooth]
+"""The codes of modes for which the keys around a segment count."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,21 +147,22 @@ def _motion(
     if any(source.is_elastic for source in sources):
         timing = _sampled(samples, frames, unit_elastic=True)
         bounds = _ends(segments, unit_elastic=True)
-    weights, before = _weights(*bounds, order)
+    weights, offsets = _weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
-    keys = _key_poses(start, end, segments)
     own = np.stack([source.own[: len(native)] for source in sources], axis=1)
-    segment_owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
+    ends = _Ends.of(start, end, segments, smooth=np.isin(modes, SMOOTH))
 
     delta = np.empty_like(native)
+    every_frame = np.concatenate(frames)
     for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
         progress = np.empty((1, place.stop - place.start))
         combine(weights[None, :, some], timing[:, place], counts[some], progress)
-        progress = progress[0] - before[some].repeat(counts[some])
+        progress = progress[0] - offsets[some].repeat(counts[some])
         _turn_into_quaternions(native[:, place], order)
-        default = own[:, segment_owners[some]]
-        _fill(delta[:, place], native[:, place], default, modes[some], keys[some], counts[some], progress)
+        default = own[:, ends.owners[some]]
+        ends.keep_even(some, counts[some], every_frame[place], progress)
+        _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = own[:, owners]
     for number, (source, place) in enumerate(samples):
@@ -170,21 +177,101 @@ def _fill(
     native: np.ndarray,
     own: np.ndarray,
     modes: np.ndarray,
-    keys: Poses,
+    ends: _Ends,
+    segment: slice,
     counts: np.ndarray,
     progress: np.ndarray,
 ) -> None:
-    """Fill in the deltas (10, m) of S segments from poses at both ends (S, 2), each with its own deltas (10, S)."""
+    """Fill in the deltas (10, m) of some segments, each with its own modes and deltas, (s,) and (10, s)."""
     for mode in np.unique(modes[counts > 0]):
         chosen = modes == mode
         every = bool(chosen.all())
         some = slice(None) if every else np.repeat(chosen, counts)
         delta[:, some] = own[:, chosen].repeat(counts[chosen], axis=1)
-        if mode == 0:
-            continue
+        if mode:
+            wanted = ends.poses(segment, np.where(chosen, counts, 0), progress[some], MODE_IDS[mode])
+            _differ(wanted, native[:, some], delta, some)
+
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """What S segments of several sources run between, with the objects' own delta transforms."""
+
+    owners: np.ndarray
+    """The number of the source of each, shape (S,)."""
+
+    times: np.ndarray
+    """The frames of both keys, shape (S, 2)."""
+
+    keys: Poses
+    """The poses at both, shape (S, 2)."""
+
+    even: np.ndarray
+    """Whether a smooth mode has its own timing, even from key to key, shape (S,)."""
+
+    around: tuple[np.ndarray, Poses] | None
+    """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
+
+    @classmethod
+    def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> _Ends:
+        """From the channels (10, S) at both ends, and which of the segments have a smooth mode."""
+        sources = [source for source, _ in segments]
+        owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
+        times = np.stack(
+            [
+                np.concatenate([source.key_frames[:-1] for source in sources]),
+                np.concatenate([source.key_frames[1:] for source in sources]),
+            ],
+            axis=1,
+        )
+        keys = _key_poses(start, end, np.stack([source.own for source in sources], axis=1)[:, owners], sources[0])
+        if not smooth.any():
+            return cls(owners, times, keys, smooth, None)
+        holds = np.concatenate([source.holds for source in sources])
+        plain = np.concatenate([source.is_plain for source in sources])
+        return cls(owners, times, keys, smooth & plain, _with_neighbours(owners, times, keys, holds))
+
+    def keep_even(self, some: slice, counts: np.ndarray, frames: np.ndarray, progress: np.ndarray) -> None:
+        """Let progress (m,) be even in time where a smooth mode has it so."""
+        if self.even[some].any():
+            first, last = (rows.repeat(counts) for rows in self.times[some].T)
+            inside = self.even[some].repeat(counts) & (frames > first) & (frames < last)
+            np.divide(frames - first, last - first, out=progress, where=inside)
+
+    def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
+        """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,)."""
+        if MODES[mode].is_smooth:
+            times, keys = self.around[0][some], self.around[1][some]
+            nothing = np.zeros_like(counts)
+            return segment_poses(times, keys, np.stack((nothing, counts, nothing), axis=1), progress, mode)
         times = np.broadcast_to((0.0, 1.0), (len(counts), 2))
-        wanted = np.where(chosen, counts, 0)[:, None]
-        _differ(segment_poses(times, keys, wanted, progress[some], MODE_IDS[mode]), native[:, some], delta, some)
+        return segment_poses(times, self.keys[some], counts[:, None], progress, mode)
+
+
+def _with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: np.ndarray) -> tuple[np.ndarray, Poses]:
+    """Frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
+
+    Where there is none, or a cycle jumps, the motion goes on as in the segment; where a segment holds, it rests.
+    """
+    rows = _packed(keys)
+    duration = times[:, 1] - times[:, 0]
+    follows = np.flatnonzero((owners[1:] == owners[:-1]) & np.all(rows[1:, 0] == rows[:-1, 1], axis=1))
+    previous, following = _packed(beyond(keys[:, 0], keys[:, 1])), _packed(beyond(keys[:, 1], keys[:, 0]))
+    previous[follows + 1] = np.where(holds[follows, None], rows[follows + 1, 0], rows[follows, 0])
+    following[follows] = np.where(holds[follows + 1, None], rows[follows, 1], rows[follows + 1, 1])
+    before, behind = duration.copy(), duration.copy()
+    before[follows + 1], behind[follows] = duration[follows], duration[follows + 1]
+    four = np.stack((previous, rows[:, 0], rows[:, 1], following), axis=1)
+    return (
+        np.stack((times[:, 0] - before, times[:, 0], times[:, 1], times[:, 1] + behind), axis=1),
+        Poses(four[..., :3], four[..., 3:7], None if keys.scales is None else four[..., 7]),
+    )
+
+
+def _packed(poses: Poses) -> np.ndarray:
+    """Positions, quaternions and scales in one array (..., 7 or 8)."""
+    scales = () if poses.scales is None else (poses.scales[..., None],)
+    return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)
 
 
 def _sampled(
@@ -296,20 +383,16 @@ def _turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
     quaternions /= lengths
 
 
-def _key_poses(start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]]) -> Poses:
-    """The poses that each segment runs between, shape (segments, 2), with the object's own delta transforms."""
-    own = np.repeat(
-        np.stack([source.own for source, _ in segments], axis=1),
-        [place.stop - place.start for _, place in segments],
-        axis=1,
-    )[:, :, None]
+def _key_poses(start: np.ndarray, end: np.ndarray, own: np.ndarray, source: Source) -> Poses:
+    """The poses that segments run between, shape (S, 2), with the objects' own delta transforms (10, S)."""
+    own = own[:, :, None]
     for rows in (start, end):
-        _turn_into_quaternions(rows, segments[0][0].order)
+        _turn_into_quaternions(rows, source.order)
     ends = np.stack((start, end), axis=2)
     return Poses(
         np.moveaxis(ends[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1),
         multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(ends[ROWS[ROTATION]], 0, -1)),
-        ends[7] if segments[0][0].uniform_scale else None,
+        ends[7] if source.uniform_scale else None,
     )
 
 

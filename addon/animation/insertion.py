@@ -51,7 +51,7 @@ def forget_poses(objects: Iterable[bpy.types.Object] | None = None) -> None:
             _posed.pop(obj.session_uid, None)
 
 
-def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: float) -> bool:
+def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: float, *, again: bool) -> bool:
     """Give a key that was inserted in between the pose on the screen.
 
     Parameters
@@ -62,6 +62,8 @@ def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: fl
         The digest of the source that the slot is filled in from.
     frame : float
         The frame that is shown.
+    again : bool
+        Whether undo or redo brought the key back, and not an edit.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: fl
         frame = obj.animation_data.nla_tweak_strip_time_to_scene(frame, invert=True)
     if not _is_inserted(old, source, frame):
         return False
-    shown = _inserted.get((before, source.digest))
+    shown = _inserted.get((before, source.digest)) if again else None
     if shown is None:
         shown = _before_the_key(obj, old, frame)
         if not _has_values(source, frame, shown):

@@ -39,6 +39,9 @@ class _State:
     unseen = True
     """Whether the file has yet to be looked through since the extension was switched on."""
 
+    again = False
+    """Whether what is there was brought back by undo or redo."""
+
     frame = 0.0
     """The frame that was last shown."""
 
@@ -102,7 +105,7 @@ def _refresh(slots: Iterable[Slot]) -> int:
             for obj in slot.users:
                 give_back(obj)
         elif source.digest != before or not is_complete(curves, source):
-            if insertion.keep_pose(slot, curves, before, source, _State.frame):
+            if insertion.keep_pose(slot, curves, before, source, _State.frame, again=_State.again):
                 curves = curves_in(slot.channelbag)
                 source = _wanted(slot, curves, before)
             stale.append((slot, curves, source))
@@ -237,12 +240,21 @@ def _on_file(*_: object) -> None:
     _look_through()
 
 
+@_careful
+def _on_undo(*arguments: object) -> None:
+    _State.again = True
+    try:
+        _on_file(*arguments)
+    finally:
+        _State.again = False
+
+
 HANDLERS = {
     "depsgraph_update_post": _on_update,
     "frame_change_pre": _before_frame,
     "frame_change_post": _on_frame,
-    "undo_post": _on_file,
-    "redo_post": _on_file,
+    "undo_post": _on_undo,
+    "redo_post": _on_undo,
     "load_post": _on_file,
     "save_pre": _on_file,
     "render_init": _on_file,

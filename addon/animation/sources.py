@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..motion import MODES
-from .fcurves import ELASTIC, Keys, cycled, cyclic_times, evaluate
+from .fcurves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
 
 MODE_IDS = ("BLENDER", *MODES)
 """What the values of the mode channel stand for: Blender's own in-betweens, and then the modes in their order."""
@@ -146,6 +146,25 @@ class Source:
         for (own, _), values in zip(self.channels, evaluated, strict=True):
             rows[own] = values
         return rows
+
+    @cached_property
+    def holds(self) -> np.ndarray:
+        """Whether all channels hold their value throughout a segment, shape (n - 1,)."""
+        return np.all(self._interpolations == CONSTANT, axis=0)
+
+    @cached_property
+    def is_plain(self) -> np.ndarray:
+        """Whether no channel is eased in a segment, nor holds, shape (n - 1,)."""
+        return np.all((self._interpolations == LINEAR) | (self._interpolations == BEZIER), axis=0)
+
+    @cached_property
+    def _interpolations(self) -> np.ndarray:
+        """The codes of each channel's keys that segments run on from, shape (channels, n - 1)."""
+        starts, codes = self.key_frames[:-1] + SAME_FRAME, []
+        for keys in self.curves:
+            at = starts if keys.cycles is None else cycled(keys, starts)[0]
+            codes.append(keys.interpolation[:, np.clip(np.searchsorted(keys.times, at, side="right") - 1, 0, None)])
+        return np.concatenate(codes)
 
     @property
     def is_elastic(self) -> bool:

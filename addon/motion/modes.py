@@ -36,6 +36,11 @@ class Mode:
     ahead: int = 0
     """How many keys after a segment have a say in it: a stream has to wait for them."""
 
+    @property
+    def is_smooth(self) -> bool:
+        """Whether it leaves a segment as it arrived from the one before, and needs the keys around for it."""
+        return self.behind > 0 or self.ahead > 0
+
 
 MODES: dict[str, Mode] = {
     "lerp_slerp": Mode(

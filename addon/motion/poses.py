@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .quaternions import conjugate, multiply, rotate
+
 
 @dataclass(frozen=True, eq=False)
 class Poses:
@@ -65,3 +67,13 @@ class Poses:
         return Poses(
             self.positions[whole], self.quaternions[whole], None if self.scales is None else self.scales[index]
         )
+
+
+def beyond(last: Poses, before: Poses) -> Poses:
+    """Where a motion gets that goes on from `last` (...) as it went there from `before` (...): last before^-1 last."""
+    turn = multiply(last.quaternions, conjugate(before.quaternions))
+    return Poses(
+        last.positions + rotate(turn, last.positions - before.positions),
+        multiply(turn, last.quaternions),
+        None if last.scales is None else last.scales * last.scales / before.scales,
+    )

@@ -18,11 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import twists
 from .measures import shell_error
 from .modes import MODES, in_betweens
-from .poses import Poses
-from .quaternions import align_signs, multiply, rotate
+from .poses import Poses, beyond
+from .quaternions import align_signs
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them."""
@@ -307,24 +306,20 @@ def _apart(order: np.ndarray, distance: int, count: int) -> np.ndarray:
 
 def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray) -> tuple[np.ndarray, Poses]:
     """Times and poses (c, m) of these samples; where there are none, the motion goes on as in the outermost segment."""
-    place = np.maximum(windows, 0)
-    key_times = times[place]
-    positions, quaternions = poses.positions[place], poses.quaternions[place]
-    scales = None if poses.scales is None else poses.scales[place]
-    inside = windows >= 0
-    first = inside.argmax(axis=1)
-    last = windows.shape[1] - 1 - inside[:, ::-1].argmax(axis=1)
-    for row, column in np.argwhere(~inside).tolist():
-        end, inner = (first[row], first[row] + 1) if column < first[row] else (last[row], last[row] - 1)
-        steps = abs(column - end)
-        a, b = windows[row, end], windows[row, inner]
-        key_times[row, column] = times[a] + steps * (times[a] - times[b])
-        twist = twists.between(
-            poses.positions[[a]], poses.quaternions[[a]], poses.positions[[b]], poses.quaternions[[b]]
-        )
-        turn, advance = twists.exponential(-steps * twist)
-        positions[row, column] = poses.positions[a] + rotate(poses.quaternions[[a]], advance.T)[0]
-        quaternions[row, column] = multiply(poses.quaternions[[a]], turn.T)[0]
-        if scales is not None:
-            scales[row, column] = poses.scales[a] * (poses.scales[a] / poses.scales[b]) ** steps
-    return key_times, Poses(positions, quaternions, scales)
+    outside = windows < 0
+    places = np.maximum(windows, 0)
+    key_times, keys = times[places], poses[places]
+    last = windows.shape[1] - 1
+    columns = [(column, 1) for column in range(last - 2, -1, -1)] + [(column, -1) for column in range(2, last + 1)]
+    for column, inwards in columns:
+        # Outside on this side, where the key next to it is one or has been made one.
+        side = slice(None, column + 1) if inwards > 0 else slice(column, None)
+        rows = np.flatnonzero(outside[:, side].all(axis=1))
+        if len(rows):
+            end, before = column + inwards, column + 2 * inwards
+            key_times[rows, column] = 2.0 * key_times[rows, end] - key_times[rows, before]
+            made = beyond(keys[rows, end], keys[rows, before])
+            keys.positions[rows, column], keys.quaternions[rows, column] = made.positions, made.quaternions
+            if keys.scales is not None:
+                keys.scales[rows, column] = made.scales
+    return key_times, keys

@@ -16,10 +16,11 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Euler, Quaternion
 
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import MODES, Poses, in_betweens, interpolate
 from addon.motion.quaternions import multiply, normalise
 
 MODE_IDS = ("BLENDER", *MODES)
+SMOOTH = {name for name, mode in MODES.items() if mode.behind or mode.ahead}
 WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 KEY_FIELDS = (
     *("interpolation", "easing", "back", "amplitude", "period", "type"),
@@ -114,17 +115,56 @@ def expected_bases(
         inside &= frames != last
         if mode == "BLENDER" or not inside.any():
             continue
-        positions, quaternions, scales = _native(obj, np.array((first, last)))
-        ends = Poses(
-            positions + own.location,
-            multiply(np.array(own.quaternion), quaternions),
-            scales[:, 0] if scaled else None,
-        )
-        poses = interpolate((0.0, 1.0), ends, progress(obj, first, last, frames[inside]), mode, extrapolate=True)
+        share = progress(obj, first, last, frames[inside])
+        if mode in SMOOTH:
+            within = (frames[inside] > first) & (frames[inside] < last)
+            if _codes(obj, first) <= {"LINEAR", "BEZIER"}:
+                share = np.where(within, (frames[inside] - first) / (last - first), share)
+            poses = _smooth(obj, keys, first, share, mode, own, scaled)
+        else:
+            ends = _key_poses(obj, np.array((first, last)), own, scaled)
+            poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
         location[inside], quaternion[inside] = poses.positions, poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
     return matrices(location, quaternion, scale)
+
+
+def _key_poses(obj: bpy.types.Object, frames: np.ndarray, own: Own, scaled: bool) -> Poses:
+    positions, quaternions, scales = _native(obj, frames)
+    return Poses(
+        positions + own.location, multiply(np.array(own.quaternion), quaternions), scales[:, 0] if scaled else None
+    )
+
+
+def _smooth(
+    obj: bpy.types.Object, keys: np.ndarray, first: float, share: np.ndarray, mode: str, own: Own, scaled: bool
+) -> Poses:
+    """A segment of a smooth mode with the keys next to it; beside a segment that holds, the object rests."""
+    place = int(np.flatnonzero(keys == first)[0])
+    around = keys[max(place - 1, 0) : place + 3]
+    shown = around.copy()
+    before = int(place > 0)
+    if before and _codes(obj, around[0]) == {"CONSTANT"}:
+        shown[0] = shown[1]
+    if len(around) > before + 2 and _codes(obj, around[before + 1]) == {"CONSTANT"}:
+        shown[before + 2] = shown[before + 1]
+    counts = np.zeros(len(around) - 1, dtype=int)
+    counts[before] = len(share)
+    return in_betweens(around, _key_poses(obj, shown, own, scaled), counts, share, mode)
+
+
+def _codes(obj: bpy.types.Object, frame: float) -> set[str]:
+    """The interpolations of all channels in the segment that begins on this frame."""
+    found = set()
+    for path in transform_paths(obj):
+        for index in range(WIDTHS[path]):
+            fcurve = curves_of(obj).get((path, index))
+            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
+                points = fcurve.keyframe_points
+                earlier = [point for point in points if point.co[0] < frame + 0.005]
+                found.add((earlier[-1] if earlier else points[0]).interpolation)
+    return found
 
 
 def expected_worlds(

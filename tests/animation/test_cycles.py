@@ -9,8 +9,16 @@ import numpy as np
 import pytest
 
 from addon.animation import set_mode, write_channel
-from addon.motion import MODES
-from tests.animation.oracle import curves_of, expected_bases, key_frames, mode_at, shown_worlds, snapshot
+from addon.motion import MODES, Poses, interpolate
+from tests.animation.oracle import (
+    curves_of,
+    expected_bases,
+    key_frames,
+    matrices,
+    mode_at,
+    shown_worlds,
+    snapshot,
+)
 from tests.animation.scenes import key, new_object, random_values
 
 CYCLES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
@@ -100,13 +108,35 @@ def test_cycles_repeat_the_rigid_motion_on_both_sides(live_file, before, after, 
     assert_unrolled(obj, before, after, count, count)
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("kind", CYCLES[1:3])
+@pytest.mark.parametrize(
+    ("mode", "kind"),
+    [(mode, kind) for mode in MODES for kind in CYCLES[1:3] if kind == "REPEAT" or not MODES[mode].is_smooth],
+)
 @pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
 def test_cycles_repeat_every_mode_with_the_easing_of_its_keys(live_file, mode, kind, order):
     obj = cyclic(order, "BEZIER", mode_before=kind, mode_after=kind)
     set_mode(obj, mode)
     assert_unrolled(obj, kind, kind, 0, 0)
+
+
+@pytest.mark.parametrize("kind", ["REPEAT_OFFSET", "MIRROR"])
+def test_a_smooth_mode_flows_on_from_round_to_round(live_file, kind):
+    obj = cyclic("QUATERNION", mode_before=kind, mode_after=kind)
+    set_mode(obj, "motor_spline")
+    shown = shown_worlds([obj], AROUND)[0]
+    times, values = [], []
+    for number in range(-4, 6):
+        spare = one_round(obj, kind, number)
+        curves = curves_of(spare)
+        channels = [curves["location", index] for index in range(3)]
+        channels += [curves["rotation_quaternion", index] for index in range(4)]
+        times += key_frames(spare)[:-1].tolist()
+        values += [[fcurve.evaluate(frame) for fcurve in channels] for frame in key_frames(spare)[:-1]]
+        discard(spare)
+    positions, quaternions = np.split(np.array(values), (3,), axis=1)
+    wanted = interpolate(times, Poses(positions, quaternions), AROUND, "motor_spline")
+    placed = matrices(wanted.positions, wanted.quaternions, np.ones((len(AROUND), 3)))
+    assert np.abs(shown - placed).max() < 1e-5 * np.abs(placed).max()
 
 
 @pytest.mark.parametrize("kind", CYCLES[1:])

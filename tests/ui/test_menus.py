@@ -46,7 +46,9 @@ MODE_MENUS = [menu for menu in menus.CLASSES if menu.__name__.startswith("RIGID_
 @pytest.mark.parametrize("menu", MODE_MENUS, ids=lambda menu: menu.__name__)
 def test_every_menu_offers_every_mode(tool, menu):
     offered = [properties.mode for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"]
-    assert sorted(offered) == sorted(MODE_IDS)
+    # A pie has eight slices, and this is the motion of the screw.
+    left_out = {"pga_slerp"} if "_pie_" in menu.__name__ else set()
+    assert sorted(offered) == sorted(set(MODE_IDS) - left_out)
 
 
 @pytest.mark.parametrize("menu", [menus.RIGID_MOTION_MT_pie_object, menus.RIGID_MOTION_MT_pie_keys])
