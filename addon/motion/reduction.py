@@ -32,6 +32,9 @@ STEPS = (1, -1, 2, -2, 4, -4, 8, -8)
 ROUNDS = 12
 """Of moving keys and taking out more of them, at most."""
 
+SHAKEN = 0.3
+"""The share of keys that are thrown in."""
+
 BATCH = 2**18
 """Samples looked at in one go."""
 
@@ -45,6 +48,7 @@ def reduce_keys(
     *,
     budget: int | None = None,
     rms: bool = False,
+    shakes: int = 2,
 ) -> np.ndarray:
     """The fewest samples that keep the shell error of a mode within a tolerance, or the best ones within a budget.
 
@@ -65,6 +69,9 @@ def reduce_keys(
         The most keys, at least 2, instead of a tolerance: the error is then as small as can be found.
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
+    shakes : int
+        How many times, once no key can be spared, others are thrown in at random to find a better choice. Each takes
+        about as long as all that went before. The same recording always gets the same keys.
 
     Returns
     -------
@@ -99,7 +106,7 @@ def reduce_keys(
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     reduction = _Reduction(times, poses, mode, radius, 2 if rms else PEAK)
     if tolerance is not None:
-        return reduction.within(tolerance)
+        return reduction.within(tolerance, shakes)
     return reduction.within_budget(budget)
 
 
@@ -127,16 +134,35 @@ class _Reduction:
         self.apart = 2 + 2 * self.reach
         """Keys this far from one another, or further, can be tried without regard to each other."""
 
-    def within(self, tolerance: float) -> np.ndarray:
+    def within(self, tolerance: float, shakes: int) -> np.ndarray:
         """The places of few keys that keep to a tolerance."""
-        keys = self._measured(np.arange(len(self.times)))
-        keys = self._thinned(keys, tolerance, 2)
+        thinned = self._thinned(self._measured(np.arange(len(self.times))), tolerance, 2)
+        best = self._settled(thinned, tolerance).places
+        random = np.random.default_rng(0)
+        for _ in range(shakes):
+            gaps = np.diff(best)
+            wide = np.flatnonzero(gaps > 1)
+            shaken = random.permutation(wide)[: math.ceil(SHAKEN * len(best))]
+            thrown = best[shaken] + 1 + (random.random(len(shaken)) * (gaps[shaken] - 1)).astype(np.int64)
+            found = self._settled(self._measured(np.union1d(best, thrown)), tolerance)
+            # A key more can make things worse elsewhere: what comes of it need not keep to the tolerance.
+            if len(found.places) <= len(best) and self._keeps_to(found, tolerance):
+                best = found.places
+        return best
+
+    def _keeps_to(self, keys: _Keys, tolerance: float) -> bool:
+        if self.power == 2:
+            return bool(keys.cost.sum() <= tolerance**2 * len(self.times))
+        return bool(keys.peak.max() <= tolerance)
+
+    def _settled(self, keys: _Keys, tolerance: float) -> _Keys:
+        """Keys moved and thinned until none can be spared."""
         for _ in range(ROUNDS):
             before = len(keys.places)
             keys = self._thinned(self._moved(keys, tolerance), tolerance, 2)
             if len(keys.places) == before:
                 break
-        return keys.places
+        return keys
 
     def within_budget(self, budget: int) -> np.ndarray:
         """The places of so many keys, with as small an error as can be found."""

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from addon.animation import bake_poses, read_poses, write_channel
+from addon.animation import bake, bake_poses, read_poses, set_mode, write_channel
 from addon.motion import MODES, Poses, interpolate
 from addon.motion.eulers import ORDERS
 from addon.motion.quaternions import angle_between, multiply, rotate
+from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds
+from tests.animation.scenes import FRAMES, key, new_object
 
 
 @pytest.fixture
@@ -154,3 +156,28 @@ def test_reading_leaves_the_scene_on_its_frame(empty):
     bpy.context.scene.frame_set(17, subframe=0.5)
     read_poses(empty, np.arange(1.0, 5.0))
     assert bpy.context.scene.frame_current_final == 17.5
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_part_is_baked_where_its_angles_are_not_all_keyed_outside_of_it(live_file, order):
+    for seed in range(10):
+        obj = key(new_object(f"Tool {seed}", order), seed=seed)
+        for frame, index in ((-5.0, 1), (50.0, 2)):
+            curves_of(obj)["rotation_euler", index].keyframe_points.insert(frame, 3.0)
+        set_mode(obj, "dq_sclerp")
+        frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+        assert_shown([obj], frames)
+        wanted = expected_worlds(obj, frames)
+        assert bake(obj, first=frames[0], last=frames[-1]) == (frames[0], frames[-1])
+        assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+
+
+def test_each_axis_of_a_scale_that_is_left_to_blender_is_baked_by_itself(live_file):
+    obj = key(new_object(), scale="even")
+    curves_of(obj)["scale", 1].keyframe_points[1].interpolation = "CONSTANT"
+    set_mode(obj, "dq_sclerp", FRAMES[:1])
+    frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+    wanted = expected_worlds(obj, frames)
+    assert_shown([obj], frames)
+    bake(obj)
+    assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()

@@ -1,0 +1,540 @@
+"""Damaged and hostile files: nothing is raised out of a handler, what cannot move rigidly keeps Blender's own motion.
+
+Files are damaged while edits are not followed, saved, and opened with the extension switched on. Beside the damaged
+object there is always a whole one, which gets its in-betweens whatever is wrong with the other.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
+from tests.animation.oracle import WIDTHS, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.scenes import FRAMES, key, new_object
+
+SEEN = range(-2, 46)
+
+SECONDS = 10.0
+"""Far more than any file here needs, and far less than an animator would wait for."""
+
+NAN, INF = float("nan"), float("inf")
+LARGEST = float(np.finfo(np.float32).max)
+
+TRANSFORMS = ("location", "rotation_quaternion", "scale")
+LOCATION_Y, TURN_W, MODE = ("location", 1), ("rotation_quaternion", 0), ("rigid_motion.mode", 0)
+
+Damage = Callable[[bpy.types.Object], None]
+
+
+@pytest.fixture(autouse=True)
+def following(live_file: bpy.types.Context) -> Iterator[None]:
+    """Errors that handlers log make the test fail, see `live_file`."""
+    yield
+    animation.set_enabled(True)
+
+
+# Files and what happens to them
+
+
+def make(damage: Damage, mode: str = "dq_sclerp", name: str = "Broken") -> None:
+    """A new file with an object that gets damaged, and one that does not."""
+    animation.set_enabled(True)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
+    broken, whole = key(new_object(name), seed=1, scale="even"), key(new_object("Whole"), seed=2)
+    set_mode(broken, mode)
+    set_mode(whole, mode, FRAMES)
+    animation.set_enabled(False)
+    damage(broken)
+
+
+def reopened(folder: Path, *, followed: bool = True) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """The damaged and the whole object of the file, saved and opened again; followed by the extension or not."""
+    path = str(folder / "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    animation.set_enabled(followed)
+    with soon():
+        bpy.ops.wm.open_mainfile(filepath=path)
+        bpy.context.view_layer.update()
+    whole = bpy.data.objects["Whole"]
+    return next(obj for obj in bpy.data.objects if obj != whole), whole
+
+
+@contextmanager
+def soon() -> Iterator[None]:
+    began = time.perf_counter()
+    yield
+    assert time.perf_counter() - began < SECONDS
+
+
+def use(obj: bpy.types.Object) -> None:
+    """What an animator does next, and what the panel asks for."""
+    with soon():
+        for (path, _), fcurve in curves_of(obj).items():
+            if path in ("location", "rigid_motion.mode") and len(fcurve.keyframe_points):
+                fcurve.keyframe_points[-1].select_control_point = True
+                fcurve.keyframe_points[-1].co_ui.y += 1.0
+                fcurve.update()
+        bpy.context.view_layer.update()
+        obj.location.x += 1.0
+        bpy.context.view_layer.update()
+        for frame in (5, 30, 12):
+            bpy.context.scene.frame_set(frame)
+        assert set(modes_of(obj, np.array(FRAMES))) <= set(MODE_IDS)
+        problem_of(obj)
+        animation.refresh()
+
+
+def own_properties(block: bpy.types.ID) -> object:
+    """What properties of extensions are kept in, open to any value."""
+    return block.bl_system_properties_get() if bpy.app.version >= (5, 0) else block
+
+
+# Damage
+
+
+def numbers(channel: tuple[str, int], field: str, value: float, *at: int) -> Damage:
+    """One number of these keys of a channel is another, of all without any; nothing else follows."""
+    name, _, axis = field.partition(".")
+
+    def damage(obj: bpy.types.Object) -> None:
+        points = curves_of(obj)[channel].keyframe_points
+        width, dtype = (2, np.float32) if axis else (1, np.int32 if name in ("interpolation", "easing") else np.float32)
+        found = np.empty(width * len(points), dtype)
+        points.foreach_get(name, found)
+        found.reshape(-1, width)[list(at) or slice(None), int(axis == "y")] = value
+        points.foreach_set(name, found)
+
+    return damage
+
+
+def everywhere(field: str, value: float) -> Damage:
+    return each(*(numbers((path, index), field, value) for path in TRANSFORMS for index in range(WIDTHS[path])))
+
+
+def each(*damages: Damage) -> Damage:
+    def damage(obj: bpy.types.Object) -> None:
+        for one in damages:
+            one(obj)
+
+    return damage
+
+
+def mode_key(value: float) -> Damage:
+    """A mode channel whose second key has this value."""
+
+    def damage(obj: bpy.types.Object) -> None:
+        fcurve = channelbag_of(obj).fcurves.new("rigid_motion.mode")
+        for frame in FRAMES[:-1]:
+            fcurve.keyframe_points.insert(frame, 1.0).interpolation = "CONSTANT"
+        numbers(MODE, "co.y", value, 1)(obj)
+
+    return damage
+
+
+def easing_setting(name: str, interpolation: str, value: float) -> Damage:
+    code = bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items[interpolation].value
+    return each(numbers(LOCATION_Y, "interpolation", code), numbers(LOCATION_Y, name, value, 1))
+
+
+REFUSED: dict[str, tuple[Damage, str]] = {
+    f"{value} in {field} of {path} {index}, key {at}": (numbers((path, index), field, value, at), "not a finite number")
+    for value in (NAN, INF)
+    for field in ("co.x", "co.y")
+    for path, index in (LOCATION_Y, TURN_W, ("scale", 2))
+    for at in (0, 2, 3)
+}
+REFUSED |= {
+    f"{value} in {field}, key {at}": (numbers(LOCATION_Y, field, value, at), "handle of key .* not a finite number")
+    for value in (NAN, -INF)
+    for field in ("handle_left.x", "handle_left.y", "handle_right.x", "handle_right.y")
+    for at in (0, 1)
+}
+REFUSED |= {
+    "no frame is a number": (everywhere("co.x", NAN), "not a finite number"),
+    "no value is a number": (everywhere("co.y", NAN), "not a finite number"),
+    "an overshoot that is no number": (easing_setting("back", "BACK", NAN), "easing of key 2 .* not a finite number"),
+    "a period that is no number": (easing_setting("period", "ELASTIC", INF), "easing of key 2 .* not a finite number"),
+    "a last key far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 3), "delete the keys that are far off"),
+    "a first key far back": (numbers(LOCATION_Y, "co.x", -1e9, 0), "delete the keys that are far off"),
+    "a last key at the end of numbers": (numbers(LOCATION_Y, "co.x", LARGEST, 3), "delete the keys that are far off"),
+    "a key in the middle far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 1), "Location Y are not in the order"),
+    "keys out of order": (numbers(LOCATION_Y, "co.x", 30.0, 1), "Location Y are not in the order"),
+    "keys out of order everywhere": (
+        each(*(numbers((path, i), "co.x", 30.0, 1) for path in TRANSFORMS for i in range(WIDTHS[path]))),
+        "not in the order",
+    ),
+    "values at the end of numbers": (
+        each(numbers(LOCATION_Y, "co.y", LARGEST, 0, 2), numbers(LOCATION_Y, "co.y", -LARGEST, 1, 3)),
+        "too large",
+    ),
+}
+REFUSED |= {
+    f"mode {value} on a key": (mode_key(value), "key 2 of the mode channel has no mode")
+    for value in (-1.0, float(len(MODE_IDS)), 1e30, NAN, INF, -INF)
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_cannot_move_rigidly_keeps_blenders_motion_and_says_why(tmp_path, what):
+    damage, reason = REFUSED[what]
+    make(damage, "BLENDER")
+    broken, _ = reopened(tmp_path, followed=False)
+    native = shown_worlds([broken], SEEN)[0]
+    make(damage)
+    keys = repr(snapshot(bpy.data.objects["Broken"]))
+    broken, whole = reopened(tmp_path)
+    assert re.match(f"Broken.*{reason}", problem_of(broken)), problem_of(broken)
+    assert repr(snapshot(broken)) == keys
+    np.testing.assert_array_equal(shown_worlds([broken], SEEN)[0], native)
+    assert_shown([whole], SEEN)
+    use(broken)
+    assert_shown([whole], SEEN)
+
+
+def unknown_mode(obj: bpy.types.Object) -> None:
+    own_properties(obj)["rigid_motion"]["mode"] = 77
+
+
+def own_delta_that_is_no_number(obj: bpy.types.Object) -> None:
+    own_properties(obj)["rigid_motion"]["own_quaternion"] = (NAN, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (unknown_mode, "has a mode that this version does not know: choose another"),
+        (own_delta_that_is_no_number, "delta transform is not a finite number: set it anew"),
+    ],
+)
+def test_settings_that_make_no_sense_leave_an_object_its_own_motion(tmp_path, damage, reason):
+    make(damage)
+    broken, whole = reopened(tmp_path)
+    assert reason in problem_of(broken)
+    assert problem_of(broken).startswith("Broken")
+    assert not [path for path, _ in curves_of(broken) if path.startswith("delta_")]
+    assert_shown([whole], SEEN)
+    use(broken)
+    set_mode(broken, "BLENDER")
+    assert_shown([whole], SEEN)
+
+
+def test_choosing_a_mode_for_the_object_mends_a_mode_channel(tmp_path):
+    make(mode_key(NAN))
+    broken, _ = reopened(tmp_path)
+    set_mode(broken, "pga_lerp")
+    assert problem_of(broken) == ""
+    assert_shown([broken], SEEN)
+
+
+# What can be mended, or never mattered
+
+
+def without_deltas(*some: int) -> Damage:
+    """In-betweens are gone: these of the F-curves, or all of them."""
+
+    def damage(obj: bpy.types.Object) -> None:
+        channelbag = channelbag_of(obj)
+        gone = [fcurve for fcurve in channelbag.fcurves if fcurve.data_path.startswith("delta_")]
+        for fcurve in [gone[place] for place in some] or gone:
+            channelbag.fcurves.remove(fcurve)
+
+    return damage
+
+
+def cut_deltas(obj: bpy.types.Object) -> None:
+    """In-betweens are there for three frames alone."""
+    channelbag = channelbag_of(obj)
+    for fcurve in [fcurve for fcurve in channelbag.fcurves if fcurve.data_path == "delta_location"]:
+        group, index = fcurve.group, fcurve.array_index
+        channelbag.fcurves.remove(fcurve)
+        fcurve = channelbag.fcurves.new("delta_location", index=index)
+        fcurve.group = group
+        fcurve.keyframe_points.insert(1.0, 5.0)
+        fcurve.convert_to_samples(1, 4)
+
+
+def garbage_records(obj: bpy.types.Object) -> None:
+    records = obj.animation_data.action.rigid_motion.slots
+    for handle in (-1, 0, 2**31 - 1, *[record.handle for record in records], *range(500)):
+        record = records.add()
+        record.handle, record.digest = handle, "\N{PILE OF POO}" * 40
+
+
+def right_record_without_deltas(obj: bpy.types.Object) -> None:
+    without_deltas()(obj)
+    obj.rigid_motion.filled = (False,) * 4
+
+
+def no_records(obj: bpy.types.Object) -> None:
+    obj.animation_data.action.rigid_motion.slots.clear()
+
+
+def records_of_another_kind(obj: bpy.types.Object) -> None:
+    kept = own_properties(obj.animation_data.action)
+    del kept["rigid_motion"]
+    kept["rigid_motion"] = "nonsense"
+
+
+def curves_that_mean_nothing(obj: bpy.types.Object) -> None:
+    channelbag = channelbag_of(obj)
+    for path, index in (("location", 7), ("]][[", 0), ("rigid_motion.nothing", 3), ('["\n"]', 2), ("scale", 90)):
+        channelbag.fcurves.new(path, index=index).keyframe_points.insert(5.0, NAN)
+    channelbag.fcurves.new("delta_rotation_euler", index=1)
+    channelbag.fcurves.new("rigid_motion.mode")
+
+
+def spare_slots(obj: bpy.types.Object) -> None:
+    action = obj.animation_data.action
+    for number in range(20):
+        slot = action.slots.new("OBJECT", f"Spare {number}")
+        if number % 2:
+            action.layers[0].strips[0].channelbag(slot, ensure=True).fcurves.new("location")
+
+
+MENDED: dict[str, Damage] = {
+    "in-betweens gone": without_deltas(),
+    "an in-between gone": without_deltas(4),
+    "in-betweens cut": cut_deltas,
+    "garbage records": garbage_records,
+    "a right record without in-betweens": right_record_without_deltas,
+    "no records": no_records,
+    "records of another kind": records_of_another_kind,
+    "F-curves that mean nothing": curves_that_mean_nothing,
+    "slots without users": spare_slots,
+    "an interpolation that there is not": numbers(LOCATION_Y, "interpolation", 77, 1),
+    "an easing that there is not": each(numbers(LOCATION_Y, "interpolation", 5), numbers(LOCATION_Y, "easing", 77, 1)),
+    "a quaternion without length": each(*(numbers((TURN_W[0], index), "co.y", 0.0, 1) for index in range(4))),
+    "no quaternion with a length": each(*(numbers((TURN_W[0], index), "co.y", 0.0) for index in range(4))),
+    "a scale of zero": each(*(numbers(("scale", index), "co.y", 0.0, 1) for index in range(3))),
+    "no scale but zero": each(*(numbers(("scale", index), "co.y", 0.0) for index in range(3))),
+    "handles far off": each(
+        numbers(LOCATION_Y, "handle_right.x", 1e9, 0), numbers(LOCATION_Y, "handle_left.x", -1e9, 1)
+    ),
+}
+
+
+@pytest.mark.parametrize("what", MENDED)
+def test_what_can_be_mended_moves_rigidly(tmp_path, what):
+    make(MENDED[what])
+    objects = reopened(tmp_path)
+    assert [problem_of(obj) for obj in objects] == ["", ""]
+    assert_shown(objects, SEEN)
+    use(objects[0])
+    assert_shown(objects, SEEN)
+
+
+def test_the_first_of_two_keys_on_a_frame_ends_the_segment_before_it(tmp_path):
+    make(each(*(numbers((path, i), "co.x", FRAMES[1], 2) for path in TRANSFORMS for i in range(WIDTHS[path]))))
+    broken, _ = reopened(tmp_path)
+    shown = shown_worlds([broken], range(1, 11))[0]
+    make(lambda obj: None)
+    animation.set_enabled(True)
+    expected = expected_worlds(bpy.data.objects["Broken"], range(1, 11))
+    assert np.abs(shown - expected).max() < 1e-5
+
+
+def test_in_betweens_that_were_turned_into_keys_are_left_alone_and_named(tmp_path):
+    def damage(obj: bpy.types.Object) -> None:
+        curves_of(obj)["delta_location", 0].convert_to_keyframes(1, 41)
+
+    make(damage)
+    broken, whole = reopened(tmp_path)
+    assert re.match("Broken.*Delta Location X.*delete that channel", problem_of(broken)), problem_of(broken)
+    assert [name for name in curves_of(broken) if name[0].startswith("delta_")] == [("delta_location", 0)]
+    assert len(curves_of(broken)["delta_location", 0].keyframe_points) == 40
+    assert_shown([whole], SEEN)
+    use(broken)
+    channelbag_of(broken).fcurves.remove(curves_of(broken)["delta_location", 0])
+    bpy.context.view_layer.update()
+    assert problem_of(broken) == ""
+    assert_shown([broken, whole], SEEN)
+
+
+# Actions without what an Action has
+
+
+def empty_action(obj: bpy.types.Object) -> None:
+    obj.animation_data.action = bpy.data.actions.new("Empty")
+
+
+def action_without_layers(obj: bpy.types.Object) -> None:
+    action = obj.animation_data.action
+    action.layers.remove(action.layers[0])
+
+
+def slot_gone(obj: bpy.types.Object) -> None:
+    obj.animation_data.action.slots.remove(obj.animation_data.action_slot)
+
+
+def no_slot_chosen(obj: bpy.types.Object) -> None:
+    obj.animation_data.action_slot = None
+
+
+def channels_gone(obj: bpy.types.Object) -> None:
+    channelbag_of(obj).fcurves.clear()
+
+
+def keys_gone(obj: bpy.types.Object) -> None:
+    for fcurve in curves_of(obj).values():
+        if len(fcurve.keyframe_points):
+            fcurve.keyframe_points.clear()
+
+
+def action_gone(obj: bpy.types.Object) -> None:
+    bpy.data.actions.remove(obj.animation_data.action)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [empty_action, action_without_layers, slot_gone, no_slot_chosen, channels_gone, keys_gone, action_gone],
+)
+def test_without_keys_an_object_rests_with_its_own_delta_transforms(tmp_path, damage):
+    def with_deltas(obj: bpy.types.Object) -> None:
+        obj.rigid_motion.own_location = (1.0, 2.0, 3.0)
+        damage(obj)
+
+    make(with_deltas)
+    broken, whole = reopened(tmp_path)
+    assert problem_of(broken) == ""
+    assert tuple(broken.delta_location) == (1.0, 2.0, 3.0)
+    assert not any(broken.rigid_motion.filled)
+    assert_shown([whole], SEEN)
+    use(broken)
+
+
+# Names
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(
+            '"',
+            "'",
+            "\\",
+            "]",
+            '["x"]',
+            "a\nb",
+            "\t",
+            " ",
+            "%s{0}",
+            "../..",
+            "\N{PILE OF POO}" * 15,
+            "x" * 63,
+            "\u202e",
+        ),
+        *("Ä" * 31, "OBBroken", "rigid_motion.mode", "\x7f\x01"),
+    ],
+    ids=repr,
+)
+def test_odd_names_change_nothing(tmp_path, name):
+    def rename(obj: bpy.types.Object) -> None:
+        obj.animation_data.action.name = obj.animation_data.action_slot.name_display = name
+
+    make(rename, name=name)
+    objects = reopened(tmp_path)
+    assert objects[0].name == name
+    assert_shown(objects, SEEN)
+    use(objects[0])
+    assert_shown(objects, SEEN)
+    numbers(LOCATION_Y, "co.y", NAN, 1)(objects[0])
+    assert problem_of(objects[0]).startswith(name)
+
+
+# Masses
+
+
+def keys_on(frames: np.ndarray, *channels: tuple[str, int]) -> Damage:
+    """Very many keys: Blender itself takes its time where they are not all alike."""
+
+    def damage(obj: bpy.types.Object) -> None:
+        for (path, index), fcurve in curves_of(obj).items():
+            if (path, index) in (channels or [(path, index) for path in TRANSFORMS for index in range(WIDTHS[path])]):
+                points = fcurve.keyframe_points
+                points.clear()
+                points.add(len(frames))
+                values = np.sin(frames * 0.01 + index) + 1.5
+                points.foreach_set("co", np.stack((frames, values), axis=1).astype(np.float32).ravel())
+                points.foreach_set("interpolation", np.ones(len(frames), np.int32))
+
+    return damage
+
+
+MILLION = np.arange(1e6)
+
+
+def test_a_million_keys_in_a_few_frames_are_taken_as_they_are(tmp_path):
+    make(keys_on(1.0 + MILLION * 39e-6, LOCATION_Y))
+    objects = reopened(tmp_path)
+    with soon():
+        assert problem_of(objects[0]) == ""
+    assert_shown(objects[1:], SEEN)
+    use(objects[0])
+
+
+def test_a_million_keys_on_one_frame_are_none_too_many(tmp_path):
+    make(keys_on(np.full(10**6, 11.0), LOCATION_Y))
+    objects = reopened(tmp_path)
+    assert_shown(objects[1:], SEEN)
+    use(objects[0])
+
+
+def test_keys_over_a_million_frames_are_too_many(tmp_path):
+    make(keys_on(MILLION, LOCATION_Y))
+    broken, whole = reopened(tmp_path)
+    with soon():
+        assert problem_of(broken).startswith("Broken has keys over 999999 frames, at most 250000 can be filled in")
+    assert not [path for path, _ in curves_of(broken) if path.startswith("delta_")]
+    assert_shown([whole], SEEN)
+    use(broken)
+
+
+def test_a_motion_that_goes_on_for_a_million_frames_is_too_long(tmp_path):
+    def damage(obj: bpy.types.Object) -> None:
+        bpy.context.scene.frame_end = 1_000_000
+        for fcurve in curves_of(obj).values():
+            fcurve.extrapolation = "LINEAR"
+
+    make(damage)
+    broken, whole = reopened(tmp_path)
+    assert problem_of(broken).startswith("Broken goes on outside of its keys")
+    assert_shown([whole], SEEN)
+    use(broken)
+
+
+@pytest.mark.parametrize("frames", [1e-3, 0.02, 1.0])
+def test_a_cycle_of_next_to_no_time_ends(tmp_path, frames):
+    def damage(obj: bpy.types.Object) -> None:
+        bpy.context.scene.frame_end = 50_000
+        keys_on(1.0 + frames * np.arange(4) / 3.0)(obj)
+        for (path, _), fcurve in curves_of(obj).items():
+            if path in TRANSFORMS:
+                fcurve.modifiers.new("CYCLES")
+
+    make(damage)
+    broken, whole = reopened(tmp_path)
+    with soon():
+        assert problem_of(broken) == "" or problem_of(broken).startswith("Broken")
+    assert_shown([whole], SEEN)
+    use(broken)
+
+
+def test_a_million_modes_are_none_too_many(tmp_path):
+    def damage(obj: bpy.types.Object) -> None:
+        mode_key(1.0)(obj)
+        keys_on(1.0 + MILLION * 39e-6, MODE)(obj)
+
+    make(damage)
+    broken, whole = reopened(tmp_path)
+    assert_shown([broken, whole], SEEN)
+    use(broken)

@@ -1,0 +1,224 @@
+"""Key reduction: what it promises of its keys, recomputed apart from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from addon.motion import MODES, Poses, decimate, interpolate, reduce_keys, repair, twists
+from addon.motion.quaternions import align_signs, normalise
+from scripts.trajectories import read_trajectories
+from tests.motion.test_twists import pose_matrix
+
+RADIUS = 0.1
+RECORDINGS = Path(__file__).parents[3] / "shared" / "data" / "recordings"
+HANDS = (
+    *("aframe_head.csv", "aframe_left.csv", "aframe_right.csv"),
+    *("broad_fast_rotation.csv", "freiburg1_xyz.tum"),
+    *("vive_index_left.csv", "vive_index_right.csv"),
+)
+"""Hand controllers and hand-held bodies."""
+
+
+def shell_errors(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float = RADIUS) -> np.ndarray:
+    """The largest displacement of the three shell points on every sample, by matrices."""
+    shown = interpolate(times[keys], poses[keys], times, mode)
+    points = np.vstack((radius * np.eye(3), np.ones(3)))
+    a, b = (
+        np.array([pose_matrix(*pose) for pose in zip(some.quaternions, some.positions, strict=True)]) @ points
+        for some in (shown, poses)
+    )
+    return np.linalg.norm((a - b)[:, :3], axis=1).max(axis=1)
+
+
+def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> tuple[np.ndarray, Poses]:
+    """A recording at uneven times: a smooth walk of a body, with rests, and noise on top."""
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(0.005, 0.02, count))
+    knots = np.linspace(times[0], times[-1], max(4, int(rough * (times[-1] - times[0]))))
+    values = np.cumsum(random.normal(size=(len(knots), 6)) * (random.uniform(size=(len(knots), 1)) > 0.3), axis=0)
+    rows = np.array([np.interp(times, knots, column) for column in values.T])
+    width = min(15, count)
+    smooth = np.array([np.convolve(row, np.ones(width) / width, mode="same") for row in rows])
+    turn, _ = twists.exponential(np.concatenate((smooth[:3], np.zeros((3, count)))))
+    quaternions = turn.T + noise * random.normal(size=(count, 4))
+    positions = 0.3 * smooth[3:].T + noise * random.normal(size=(count, 3))
+    return times, Poses(positions, align_signs(normalise(quaternions)))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.integers(2, 250),
+    st.integers(0, 2**16),
+    st.sampled_from((0.0, 1e-4, 1e-2)),
+    st.sampled_from((1e-5, 1e-3, 0.02, 1.0)),
+    st.sampled_from(tuple(MODES)),
+    st.sampled_from((0.0, 0.1, 2.0)),
+)
+def test_the_error_stays_within_the_tolerance_everywhere(count, seed, noise, tolerance, mode, radius):
+    times, poses = wandering(count, seed, noise)
+    keys = reduce_keys(times, poses, mode, tolerance, radius)
+    assert keys[0] == 0
+    assert keys[-1] == count - 1
+    assert np.all(np.diff(keys) > 0)
+    assert shell_errors(times, poses, keys, mode, radius).max() <= tolerance * (1.0 + 1e-9) + 1e-12
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(3, 250), st.integers(0, 2**16), st.sampled_from((1e-3, 0.02, 0.3)), st.sampled_from(tuple(MODES)))
+def test_the_root_mean_square_stays_within_the_tolerance(count, seed, tolerance, mode):
+    times, poses = wandering(count, seed)
+    keys = reduce_keys(times, poses, mode, tolerance, RADIUS, rms=True)
+    assert np.sqrt(np.mean(shell_errors(times, poses, keys, mode) ** 2)) <= tolerance * (1.0 + 1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(2, 200), st.integers(0, 2**16), st.integers(2, 40), st.booleans(), st.sampled_from(tuple(MODES)))
+def test_a_budget_is_spent_and_not_passed(count, seed, budget, rms, mode):
+    times, poses = wandering(count, seed)
+    keys = reduce_keys(times, poses, mode, radius=RADIUS, budget=budget, rms=rms)
+    assert len(keys) == min(budget, count)
+    assert keys[0] == 0
+    assert keys[-1] == count - 1
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_larger_budget_buys_a_smaller_error(mode):
+    times, poses = wandering(600, 3)
+    errors = [
+        shell_errors(times, poses, reduce_keys(times, poses, mode, budget=budget), mode).max()
+        for budget in (5, 10, 20, 40, 80)
+    ]
+    assert errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "pga_slerp", "cga_slerp", "motor_spline"])
+def test_one_screw_needs_two_keys(mode):
+    times = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.02, 300))
+    turn, advance = twists.exponential(np.outer((0.3, 0.5, -0.2, 0.4, 0.1, 0.3), times - times[0]))
+    assert reduce_keys(times, Poses(advance.T, turn.T), mode, 1e-9).tolist() == [0, 299]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_body_at_rest_needs_two_keys(mode):
+    poses = Poses(np.tile((1.0, 2.0, 3.0), (200, 1)), np.tile((0.5, 0.5, 0.5, 0.5), (200, 1)))
+    assert reduce_keys(np.arange(200.0), poses, mode, 1e-6).tolist() == [0, 199]
+
+
+def test_keys_are_spent_where_something_happens():
+    times = np.arange(0.0, 10.0, 0.01)
+    swing = np.where(times < 5.0, 0.0, np.sin(6.0 * (times - 5.0)) ** 2)
+    poses = Poses(np.outer(swing, (0.3, 0.1, 0.0)), np.tile((1.0, 0.0, 0.0, 0.0), (1000, 1)))
+    keys = reduce_keys(times, poses, tolerance=0.002)
+    assert np.count_nonzero(times[keys] < 4.9) <= 2
+    assert np.count_nonzero(times[keys] > 5.0) > 10
+
+
+def test_it_does_better_than_even_keys_and_than_greedy_insertion():
+    times, poses = wandering(900, 4)
+    keys = reduce_keys(times, poses, tolerance=0.03)
+    even = np.unique(np.linspace(0, 899, 2 * len(keys)).round().astype(int))
+    assert shell_errors(times, poses, even, "motor_spline").max() > 0.03
+    assert len(keys) < 0.85 * len(greedy(times, poses, 0.03))
+
+
+def test_shaking_spares_keys():
+    times, poses = wandering(600, 5)
+    few, fewer = (reduce_keys(times, poses, tolerance=0.01, shakes=shakes) for shakes in (0, 8))
+    assert len(fewer) < len(few)
+
+
+def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
+    """Keys put in one after the other, each where the error is largest."""
+    keys = [0, len(times) - 1]
+    while (errors := shell_errors(times, poses, np.array(keys), "motor_spline")).max() > tolerance:
+        keys = sorted({*keys, int(np.argmax(errors))})
+    return np.array(keys)
+
+
+def test_signs_of_quaternions_do_not_matter():
+    times, poses = wandering(300, 6)
+    flipped = Poses(poses.positions, poses.quaternions * np.random.default_rng(1).choice((-1, 1), (300, 1)))
+    assert reduce_keys(times, flipped, tolerance=0.01).tolist() == reduce_keys(times, poses, tolerance=0.01).tolist()
+
+
+def test_scale_is_part_of_the_pose():
+    times, poses = wandering(300, 7)
+    scales = 1.0 + 0.5 * np.sin(7.0 * times)
+    growing = Poses(poses.positions, poses.quaternions, scales)
+    keys = reduce_keys(times, growing, tolerance=0.002)
+    shown = interpolate(times[keys], growing[keys], times, "motor_spline")
+    assert RADIUS * np.abs(shown.scales - scales).max() <= 0.002 + 1e-9
+    assert len(keys) > len(reduce_keys(times, poses, tolerance=0.002))
+
+
+GOOD = wandering(20, 1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "either a tolerance or a budget"),
+        ({"tolerance": 0.1, "budget": 4}, "either a tolerance or a budget"),
+        ({"tolerance": 0.0}, "not a positive number"),
+        ({"tolerance": float("nan")}, "not a positive number"),
+        ({"budget": 1}, "too small"),
+        ({"tolerance": 0.1, "mode": "bezier"}, "no mode 'bezier'"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        reduce_keys(*GOOD, **options)
+
+
+def test_bad_samples_are_named():
+    times, poses = wandering(20, 1)
+    broken = poses.positions.copy()
+    broken[7] = np.nan
+    with pytest.raises(ValueError, match="sample 7 is not finite"):
+        reduce_keys(times, Poses(broken, poses.quaternions), tolerance=0.1)
+    with pytest.raises(ValueError, match="sample 5 is not later"):
+        reduce_keys(np.where(np.arange(20) == 5, times[4], times), poses, tolerance=0.1)
+    with pytest.raises(ValueError, match="20 times do not fit"):
+        reduce_keys(times, poses[:19], tolerance=0.1)
+
+
+@pytest.fixture(scope="module")
+def recordings() -> dict[str, tuple[np.ndarray, Poses]]:
+    found = {}
+    for path in sorted(RECORDINGS.glob("*")):
+        if path.suffix != ".md":
+            trajectory = read_trajectories(str(path)).trajectories[0]
+            times, poses, _ = repair(trajectory.times, trajectory.poses)
+            found[path.name] = times, poses
+    return found
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    ("mode", "tolerance"),
+    [("lerp_slerp", 0.005), ("dq_sclerp", 0.005), ("motor_spline", 0.001), ("motor_spline", 0.03)],
+)
+def test_recordings_keep_to_the_tolerance(recordings, mode, tolerance):
+    for name, (times, poses) in recordings.items():
+        keys = reduce_keys(times, poses, mode, tolerance, RADIUS)
+        assert shell_errors(times, poses, keys, mode).max() <= tolerance * (1.0 + 1e-9), name
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(("rate", "most"), [(30, 0.50), (20, 0.52), (15, 0.55), (12, 0.55)])
+def test_half_the_keys_do_for_the_error_of_vector_and_quaternion(recordings, rate, most):
+    shares = []
+    for name in HANDS:
+        times, poses = recordings[name]
+        even = decimate(times, rate)
+        times, poses = times[: even[-1] + 1], poses[: even[-1] + 1]
+        error = float(np.sqrt(np.mean(shell_errors(times, poses, even, "lerp_slerp") ** 2)))
+        keys = reduce_keys(times, poses, "motor_spline", error, RADIUS, rms=True, shakes=0)
+        assert np.sqrt(np.mean(shell_errors(times, poses, keys, "motor_spline") ** 2)) <= error * (1.0 + 1e-9)
+        shares.append(len(keys) / len(even))
+    assert np.exp(np.mean(np.log(shares))) <= most

@@ -1,0 +1,215 @@
+"""What the motor spline promises beside what every mode does: no corners, no say of far keys, rests that rest."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import expm, logm
+
+from addon.motion import MODES, Poses, interpolate, twists
+from addon.motion.quaternions import angle_between, normalise
+from tests.motion.cases import assert_same, random_quaternions
+from tests.motion.test_properties import assert_close, motions, placed, reseated
+from tests.motion.test_twists import pose_matrix
+
+SMOOTH = [name for name, mode in MODES.items() if mode.is_smooth]
+every_spline = pytest.mark.parametrize("mode", SMOOTH)
+
+
+def motion(count: int = 9, seed: int = 0, scaled: bool = False) -> tuple[np.ndarray, Poses]:
+    """Uneven times and keys that turn by all angles."""
+    random = np.random.default_rng(seed)
+    times = np.cumsum(random.uniform(0.2, 1.5, count))
+    scales = np.exp(random.normal(size=count)) if scaled else None
+    return times, Poses(random.normal(size=(count, 3)), random_quaternions(random, count), scales)
+
+
+def twist_at(times: np.ndarray, keys: Poses, moment: float, side: int, mode: str) -> np.ndarray:
+    """The body twist just before or behind a moment, by one-sided differences of the third order."""
+    step = 2e-4 * side
+    poses = interpolate(times, keys, np.sort(moment + step * np.arange(4)), mode)[:: 1 if side > 0 else -1]
+    here, there = poses[[0] * 3], poses[1:]
+    ways = twists.between(here.positions, here.quaternions, there.positions, there.quaternions)
+    if keys.scales is not None:
+        ways = np.concatenate((ways, np.log(there.scales / here.scales)[None]))
+    return ways @ np.array((3.0, -1.5, 1.0 / 3.0)) / step
+
+
+@every_spline
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_twist_goes_on_through_every_key(mode, seed, scaled):
+    times, keys = motion(seed=seed, scaled=scaled)
+    for moment in times[1:-1]:
+        before, behind = (twist_at(times, keys, moment, side, mode) for side in (-1, 1))
+        assert np.abs(before - behind).max() < 1e-6 * np.abs(before).max()
+
+
+@every_spline
+def test_a_screw_has_a_corner_where_the_spline_has_none(mode):
+    times, keys = motion()
+    before, behind = (twist_at(times, keys, times[4], side, "dq_sclerp") for side in (-1, 1))
+    assert np.abs(before - behind).max() > 0.1 * np.abs(before).max()
+
+
+@every_spline
+def test_a_key_has_a_say_in_no_more_segments_than_the_table_tells(mode):
+    times, keys = motion(12)
+    moments = np.linspace(times[0], times[-1], 1201)
+    still = interpolate(times, keys, moments, mode)
+    positions = keys.positions.copy()
+    positions[6] += 1.0
+    moved = interpolate(times, Poses(positions, keys.quaternions), moments, mode)
+    changed = moments[np.abs(moved.positions - still.positions).max(axis=1) > 1e-12]
+    first, last = times[6 - 1 - MODES[mode].ahead], times[6 + 1 + MODES[mode].behind]
+    assert changed.min() > first
+    assert changed.max() < last
+    assert changed.min() < first + 0.05 * (times[6] - first)
+
+
+@every_spline
+@settings(deadline=None)
+@given(st.integers(0, 2**16))
+def test_neither_the_axes_of_the_world_nor_those_of_the_body_matter(mode, seed):
+    times, keys = motion(6, seed)
+    random = np.random.default_rng(seed + 1)
+    world, body = (Poses(random.normal(size=3), random_quaternions(random)) for _ in range(2))
+    moments = np.linspace(times[0], times[-1], 61)
+    path = interpolate(times, keys, moments, mode)
+    assert_close(interpolate(times, placed(world, keys), moments, mode), placed(world, path))
+    assert_close(interpolate(times, reseated(keys, body), moments, mode), reseated(path, body))
+
+
+@every_spline
+@settings(deadline=None)
+@given(motions())
+def test_backwards_it_is_the_same_motion(mode, drawn):
+    times, keys = drawn
+    turns = angle_between(keys.quaternions[1:], keys.quaternions[:-1])
+    if np.any(turns > np.pi - 1e-3):
+        return
+    moments = np.linspace(times[0], times[-1], 41)
+    there = interpolate(times, keys, moments, mode)
+    back = interpolate(-times[::-1], keys[::-1], -moments[::-1], mode)[::-1]
+    assert_close(back, there, 1e-6)
+
+
+@every_spline
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+def test_where_a_key_repeats_the_body_rests(mode, scaled):
+    times, keys = motion(9, scaled=scaled)
+    keys = keys[[0, 1, 2, 3, 3, 3, 4, 5, 6]]
+    moments = np.linspace(times[3], times[5], 200)
+    resting = interpolate(times, keys, moments, mode)
+    assert_same(resting, keys[[3] * 200], 1e-12)
+    for moment, side in ((times[3], -1), (times[5], 1)):
+        assert np.abs(twist_at(times, keys, moment, side, mode)).max() < 1e-5
+
+
+@every_spline
+@pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_turns_of_almost_half_a_turn_stay_sound(mode, short):
+    times, _ = motion(7)
+    random = np.random.default_rng(8)
+    axes = random.normal(size=(7, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turned = random_quaternions(random, 7)
+    for place in range(1, 7):
+        half = 0.5 * (np.pi - short)
+        step = pose_matrix(np.append(np.cos(half), np.sin(half) * axes[place]), np.zeros(3))
+        turned[place] = quaternion_of(pose_matrix(turned[place - 1], np.zeros(3)) @ step)
+    keys = Poses(random.normal(size=(7, 3)), turned)
+    moments = np.linspace(times[0], times[-1], 4001)
+    path = interpolate(times, keys, moments, mode)
+    steps = angle_between(path.quaternions[1:], path.quaternions[:-1]) / np.diff(moments)
+    # No faster anywhere than a few half turns in the shortest segment.
+    assert steps.max() < 4.0 * np.pi / np.diff(times).min()
+    assert np.abs(np.linalg.norm(path.quaternions, axis=1) - 1.0).max() < 1e-12
+    assert_close(interpolate(times, keys, times, mode), keys, 1e-9)
+
+
+def quaternion_of(matrix: np.ndarray) -> np.ndarray:
+    """Of a rotation matrix, by its eigenvector: sound for every angle."""
+    m = matrix
+    k = np.array(
+        (
+            (m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]),
+            (m[2, 1] - m[1, 2], m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]),
+            (m[0, 2] - m[2, 0], m[0, 1] + m[1, 0], m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]),
+            (m[1, 0] - m[0, 1], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], m[2, 2] - m[0, 0] - m[1, 1]),
+        )
+    )
+    values, vectors = np.linalg.eigh(k)
+    return normalise(vectors[:, np.argmax(values)])
+
+
+def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray) -> np.ndarray:
+    """The motor spline by SciPy's matrix functions, one moment after the other, shape (m, 4, 4)."""
+    poses = [pose_matrix(q, p) for q, p in zip(keys.quaternions, keys.positions, strict=True)]
+    ways = [logm(np.linalg.inv(a) @ b).real for a, b in itertools.pairwise(poses)]
+    h = np.diff(times)
+    speeds = [ways[0] / h[0]]
+    for i in range(1, len(ways)):
+        # The slope at 0 of the parabola through what lies behind, here, and ahead.
+        speeds.append((ways[i - 1] / h[i - 1] * h[i] + ways[i] / h[i] * h[i - 1]) / (h[i - 1] + h[i]))
+    speeds.append(ways[-1] / h[-1])
+    found = []
+    for moment in moments:
+        i = int(np.clip(np.searchsorted(times, moment, side="right") - 1, 0, len(h) - 1))
+        u = (moment - times[i]) / h[i]
+        leave, arrive = h[i] * speeds[i] - ways[i], h[i] * speeds[i + 1] - ways[i]
+        found.append(poses[i] @ expm(u * ways[i]) @ expm(u * (1 - u) ** 2 * leave - u**2 * (1 - u) * arrive))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_motor_spline_is_that_of_matrix_exponentials(seed):
+    times, keys = motion(6, seed)
+    moments = np.linspace(times[0], times[-1], 50)
+    path = interpolate(times, keys, moments, "motor_spline")
+    expected = slow_spline(times, keys, moments)
+    for pose, matrix in zip(zip(path.quaternions, path.positions, strict=True), expected, strict=True):
+        np.testing.assert_allclose(pose_matrix(*pose), matrix, rtol=0, atol=1e-8)
+
+
+def test_without_turning_it_is_the_cubic_through_the_keys():
+    times, keys = motion(8)
+    keys = Poses(keys.positions, np.tile((1.0, 0.0, 0.0, 0.0), (8, 1)))
+    h, slopes = np.diff(times)[:, None], np.diff(keys.positions, axis=0) / np.diff(times)[:, None]
+    inner = (h[1:] * slopes[:-1] + h[:-1] * slopes[1:]) / (h[:-1] + h[1:])
+    cubic = CubicHermiteSpline(times, keys.positions, np.concatenate((slopes[:1], inner, slopes[-1:])))
+    moments = np.linspace(times[0], times[-1], 300)
+    path = interpolate(times, keys, moments, "motor_spline")
+    np.testing.assert_allclose(path.positions, cubic(moments), rtol=0, atol=1e-12)
+
+
+@every_spline
+def test_a_screw_with_even_keys_stays_one(mode):
+    """Along one screw, at one speed, whatever the times of the keys."""
+    times, _ = motion(7)
+    random = np.random.default_rng(9)
+    turn, advance = twists.exponential(np.outer(random.normal(size=6), 0.5 * (times - times[0])))
+    keys = Poses(advance.T, turn.T)
+    moments = np.linspace(times[0], times[-1], 200)
+    assert_close(interpolate(times, keys, moments, mode), interpolate(times, keys, moments, "dq_sclerp"), 1e-12)
+
+
+@every_spline
+def test_beyond_its_ends_it_goes_on_along_the_outermost_screw(mode):
+    times, keys = motion(5)
+    moments = np.array((times[0] - 2.0, times[-1] + 3.0))
+    beyond = interpolate(times, keys, moments, mode, extrapolate=True)
+    assert np.isfinite(beyond.positions).all()
+    for moment, side in ((times[0], -1), (times[-1], 1)):
+        inside = twist_at(times, keys, moment, -side, mode)
+        step = 1e-4 * side
+        pose = interpolate(times, keys, np.sort([moment, moment + step]), mode, extrapolate=True)[::side]
+        way = twists.between(pose.positions[[0]], pose.quaternions[[0]], pose.positions[[1]], pose.quaternions[[1]])[
+            :, 0
+        ]
+        np.testing.assert_allclose(way / step, inside, rtol=1e-5, atol=1e-6)

@@ -1,0 +1,86 @@
+"""Exponentials and logarithms of twists, against SciPy's of matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, logm
+
+from addon.motion import twists
+from addon.motion.quaternions import align_signs
+from tests.motion.cases import random_quaternions
+
+ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.02999, 0.03001, 0.5, 2.0, 3.1, np.pi - 1e-9]
+
+
+def matrix_of(twist: np.ndarray) -> np.ndarray:
+    """The 4 x 4 matrix of a twist (6,)."""
+    (x, y, z), advance = twist[:3], twist[3:]
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    matrix[:3, 3] = advance
+    return matrix
+
+
+def pose_matrix(quaternion: np.ndarray, translation: np.ndarray) -> np.ndarray:
+    w, x, y, z = quaternion
+    matrix = np.eye(4)
+    matrix[:3, :3] = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def some_twists(angle: float, count: int = 20) -> np.ndarray:
+    random = np.random.default_rng(3)
+    axes = random.normal(size=(3, count))
+    return np.concatenate((angle * axes / np.linalg.norm(axes, axis=0), random.normal(size=(3, count))))
+
+
+@pytest.mark.parametrize("angle", [*ANGLES, 3.5, 6.0, 9.0])
+def test_exponentials_are_those_of_matrices(angle):
+    given = some_twists(angle)
+    for twist, quaternion, translation in zip(given.T, *(rows.T for rows in twists.exponential(given)), strict=True):
+        np.testing.assert_allclose(pose_matrix(quaternion, translation), expm(matrix_of(twist)), rtol=0, atol=1e-13)
+
+
+def test_small_and_large_twists_together_are_what_they_are_alone():
+    together = np.concatenate([some_twists(angle, 3) for angle in ANGLES], axis=1)
+    quaternions, translations = twists.exponential(together)
+    for place, angle in enumerate(ANGLES):
+        own, alone = slice(3 * place, 3 * place + 3), twists.exponential(some_twists(angle, 3))
+        np.testing.assert_allclose(quaternions[:, own], alone[0], rtol=0, atol=1e-15)
+        np.testing.assert_allclose(translations[:, own], alone[1], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("angle", ANGLES)
+def test_a_logarithm_leads_back(angle, sign):
+    given = some_twists(angle)
+    quaternions, translations = twists.exponential(given)
+    found = twists.logarithm(sign * quaternions, translations)
+    # Near half a turn the axis is known to the rounding of w, and counts twice.
+    np.testing.assert_allclose(found, given, rtol=0, atol=1e-12)
+
+
+def test_logarithms_are_those_of_matrices():
+    random = np.random.default_rng(4)
+    quaternions = random_quaternions(random, 30)
+    translations = random.normal(size=(30, 3))
+    found = twists.logarithm(quaternions.T, translations.T)
+    for twist, quaternion, translation in zip(found.T, quaternions, translations, strict=True):
+        matrix = logm(pose_matrix(quaternion, translation)).real
+        np.testing.assert_allclose(matrix_of(twist), matrix, rtol=0, atol=1e-8)
+
+
+def test_the_twist_between_poses_leads_from_one_to_the_other():
+    random = np.random.default_rng(5)
+    quaternions = align_signs(random_quaternions(random, 40, 2))
+    positions = random.normal(size=(40, 2, 3))
+    found = twists.between(positions[:, 0], quaternions[:, 0], positions[:, 1], quaternions[:, 1])
+    for row in range(40):
+        first, second = (pose_matrix(quaternions[row, end], positions[row, end]) for end in range(2))
+        np.testing.assert_allclose(first @ expm(matrix_of(found[:, row])), second, rtol=0, atol=1e-12)
