@@ -7,7 +7,8 @@ Each way starts from the keys (positions and quaternions) and ends with position
 round by round, so that a machine that slows down slows all of them; a figure is a way's fastest round, and what counts
 are the ratios. "In the algebra" is the mode written out in NumPy as in the paper, for every in-between anew (this
 program's own reference); "closed form" is the best formula known to this program without a table of segments.
-Needs the packages of the "test" extra.
+Key reduction is timed on recordings of growing length, beside the greedy insertion that one would write first.
+Needs the packages of the "test" extra; pypose (its SE(3) B-spline) is measured where it is installed.
 """
 
 from __future__ import annotations
@@ -28,11 +29,18 @@ from pytransform3d.trajectories import (
     dual_quaternions_sclerp,
     pqs_from_dual_quaternions,
 )
-from scipy.spatial.transform import RigidTransform, Rotation, Slerp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import RigidTransform, Rotation, RotationSpline, Slerp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from addon.motion import MODES, Poses, interpolate
+try:
+    import pypose
+    import torch
+except ImportError:
+    pypose = None
+
+from addon.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from addon.motion.quaternions import align_signs, multiply
 
 ENOUGH = 4.0
@@ -164,18 +172,44 @@ def scipy_slerp(case: Case) -> Callable[[], object]:
     return run
 
 
+def scipy_spline(case: Case) -> Callable[[], object]:
+    """`RotationSpline` and `CubicSpline`: a C2 spline for the rotation, and another for the position."""
+
+    def run() -> tuple[np.ndarray, np.ndarray]:
+        turns = RotationSpline(case.key_times, Rotation.from_quat(case.keys.quaternions[0], scalar_first=True))
+        path = CubicSpline(case.key_times, case.keys.positions[0])
+        return path(case.times), turns(case.times).as_quat(scalar_first=True)
+
+    return run
+
+
+def pypose_spline(case: Case) -> Callable[[], object]:
+    """`pypose.bspline`: a cumulative B-spline of SE(3), at even steps in every segment."""
+    step = float(case.times[1] - case.times[0])
+
+    def run() -> object:
+        rows = np.concatenate((case.keys.positions[0], np.roll(case.keys.quaternions[0], -1, axis=1)), axis=1)
+        return pypose.bspline(pypose.SE3(torch.from_numpy(rows)), interval=step, extrapolate=True).numpy()
+
+    return run
+
+
 def ways(case: Case) -> dict[tuple[str, str], Callable[[], object]]:
     """(mode, who computes it) to what computes it."""
     result: dict[tuple[str, str], Callable[[], object]] = {}
     for mode in MODES:
         result[mode, "Rigid Motion"] = lambda mode=mode: interpolate(case.key_times, case.keys, case.times, mode)
-        result[mode, "NumPy, in the algebra"] = numpy_algebra(case, mode)
+        if not MODES[mode].is_smooth:
+            result[mode, "NumPy, in the algebra"] = numpy_algebra(case, mode)
     for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp"):
         result[mode, "NumPy, closed form"] = numpy_closed_form(case, mode)
     result["dq_sclerp", "pytransform3d"] = pytransform3d_sclerp(case)
     result["dq_sclerp", "SciPy"] = scipy_screw(case)
     if case.times.ndim == 1 and case.keys.shape[0] == 1:
         result["lerp_slerp", "SciPy"] = scipy_slerp(case)
+        result["motor_spline", "SciPy, RotationSpline and CubicSpline"] = scipy_spline(case)
+        if pypose and np.allclose(np.diff(case.times), case.times[1] - case.times[0]):
+            result["motor_spline", "pypose, B-spline"] = pypose_spline(case)
     return result
 
 
@@ -214,6 +248,60 @@ def report(case: Case, seconds: dict[tuple[str, str], list[float]]) -> Iterator[
     yield ""
 
 
+def recording(count: int) -> tuple[np.ndarray, Poses]:
+    """A hand at 90 samples a second that reaches, turns and rests, for as long as is asked for."""
+    random = np.random.default_rng(11)
+    times = np.arange(count) / 90.0
+    rates = random.uniform(0.1, 1.5, size=(6, 8, 1))
+    swings = (np.sin(2.0 * np.pi * rates * times + random.uniform(0.0, 6.0, size=(6, 8, 1))) / rates).sum(axis=1)
+    lively = np.clip(3.0 * np.sin(2.0 * np.pi * 0.05 * times), 0.0, 1.0)
+    way = np.cumsum(lively * np.gradient(swings, axis=1), axis=1)
+    turn, _ = twists.exponential(np.concatenate((0.5 * way[:3], np.zeros((3, count)))))
+    noise = 2e-4 * random.normal(size=(count, 3))
+    return times, Poses(0.05 * way[3:].T + noise, turn.T)
+
+
+def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
+    """Keys put in where the error is largest, one in each segment that passes the tolerance, until none does."""
+    keys = np.array((0, len(times) - 1))
+    while True:
+        shown = interpolate(times[keys], poses[keys], times, "motor_spline")
+        errors = shell_error(shown, poses)
+        worst = np.maximum.reduceat(errors, keys[:-1])
+        if worst.max() <= tolerance:
+            return keys
+        over = np.flatnonzero(worst > tolerance)
+        ends = np.append(keys, len(times))
+        keys = np.union1d(keys, [keys[i] + int(np.argmax(errors[keys[i] : ends[i + 1]])) for i in over])
+
+
+def reductions(counts: tuple[int, ...], tolerance: float = 0.005) -> Iterator[str]:
+    """Key reduction as lines of Markdown, beside greedy insertion."""
+    yield "### Key reduction"
+    yield ""
+    yield (
+        f"A made-up hand at 90 samples a second, `motor_spline` within {tolerance * 1e3:g} mm at a radius of 0.1 m; "
+        "seconds, the faster of two runs, and keys."
+    )
+    yield ""
+    yield "| samples | `reduce_keys`, s | µs a sample | keys | greedy insertion, s | keys |"
+    yield "|---:|---:|---:|---:|---:|---:|"
+    for count in counts:
+        times, poses = recording(count)
+        seconds, found = {}, {}
+        for name, choose in (("ours", reduce_keys), ("greedy", greedy)):
+            options = {"tolerance": tolerance}
+            for _ in range(2):
+                start = time.perf_counter()
+                found[name] = len(choose(times, poses, **options))
+                seconds[name] = min(seconds.get(name, np.inf), time.perf_counter() - start)
+        yield (
+            f"| {count} | {seconds['ours']:.2f} | {seconds['ours'] / count * 1e6:.0f} | {found['ours']} "
+            f"| {seconds['greedy']:.2f} | {found['greedy']} |"
+        )
+    yield ""
+
+
 def versions() -> str:
     """What was measured, on what."""
     return (
@@ -234,6 +322,8 @@ def main(arguments: list[str] | None = None) -> int:
     for case in cases(options.count):
         print(f"{case.title} ...", file=sys.stderr, flush=True)
         lines += report(case, race(ways(case), options.rounds))
+    print("key reduction ...", file=sys.stderr, flush=True)
+    lines += reductions((900, 1000, 10_000, options.count))
     print("\n".join(lines))
     if options.output:
         options.output.write_text("\n".join(lines), encoding="utf-8", newline="\n")
