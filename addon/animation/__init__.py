@@ -6,6 +6,7 @@ fcurves     F-curves in NumPy                           easings     Blender's ea
 inbetweens  from sources to delta transforms            filling     writing those
 live        refreshing after every edit                 insertion   keys that are inserted in between
 mode_keys   choosing modes                              bake        real keys for every frame
+reducing    the few keys that a recording needs         originals   what there was before either
 """
 
 from . import live, properties
@@ -13,22 +14,30 @@ from .bake import bake, bake_poses, is_baked, unbake
 from .channels import channelbag_of, read_poses, write_channel
 from .live import problem_of, refresh, set_enabled
 from .mode_keys import key_frames, modes_of, set_mode
+from .reducing import Reduction, is_reduced, let_keys_go, radius_of, reduce_keys_of, reduction_of, restore_keys
 from .slots import Refused
 from .sources import MODE_IDS
 
 __all__ = [
     "MODE_IDS",
+    "Reduction",
     "Refused",
     "bake",
     "bake_poses",
     "channelbag_of",
     "is_baked",
+    "is_reduced",
     "key_frames",
+    "let_keys_go",
     "modes_of",
     "problem_of",
+    "radius_of",
     "read_poses",
+    "reduce_keys_of",
+    "reduction_of",
     "refresh",
     "register",
+    "restore_keys",
     "set_enabled",
     "set_mode",
     "unbake",

@@ -14,9 +14,9 @@ from ..motion.eulers import ORDERS, eulers_from_quaternions
 from ..motion.quaternions import align_signs, conjugate, multiply
 from . import live
 from .channels import write_channel
-from .filling import adopt
 from .inbetweens import InBetweens, in_betweens
 from .mode_keys import set_mode_in
+from .originals import BAKED, has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
 from .reading import read
 from .slots import Refused, Slot, Transformable, curves_in, slots_of
 from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, Source
@@ -100,8 +100,7 @@ def bake(
     """
     if not step > 0.0:
         raise Refused(f"{obj.name}: the step between baked keys has to be above zero, not {step}")
-    if obj.animation_data is not None and obj.animation_data.use_tweak_mode:
-        raise Refused(f"{obj.name}: leave the strip that is being edited first (NLA Editor, Tab)")
+    refuse_tweak_mode(obj)
     readings = [(slot, read(slot, curves_in(slot.channelbag))) for slot in slots_of([obj])]
     readings = [(slot, source) for slot, source in readings if source.is_live]
     if not readings:
@@ -122,30 +121,14 @@ def unbake(obj: bpy.types.Object) -> None:
     Refused
         Where it is not baked, or its Actions cannot be exchanged. Nothing is changed then.
     """
-    if not is_baked(obj):
-        raise Refused(f"{obj.name} is not baked, or has another Action by now")
-    if obj.animation_data.use_tweak_mode:
-        raise Refused(f"{obj.name}: leave the strip that is being edited first (NLA Editor, Tab)")
-    bakes = obj.rigid_motion.bakes
-    with live.paused():
-        for place in reversed(range(len(bakes))):
-            baked, original = bakes[place].baked, bakes[place].original
-            if baked is not None and original is not None:
-                _exchange(obj, baked, original)
-                # The mode is animated in the baked Action, and need not be in the original.
-                obj.rigid_motion.mode = bakes[place].mode
-            bakes.remove(place)
-            if baked is not None and not baked.users:
-                bpy.data.actions.remove(baked)
-        for slot in slots_of([obj]):
-            adopt(slot, curves_in(slot.channelbag))
-    live.refresh([obj])
+    refuse_without_original(obj, BAKED)
+    refuse_tweak_mode(obj)
+    put_back(obj, BAKED)
 
 
 def is_baked(obj: bpy.types.Object) -> bool:
     """Whether an object moves by an Action with baked keys, and its original is still in the file."""
-    actions = {slot.action for slot in slots_of([obj])}
-    return any(entry.baked in actions and entry.original is not None for entry in obj.rigid_motion.bakes)
+    return has_original(obj, BAKED)
 
 
 def _widened(obj: bpy.types.Object, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
@@ -174,34 +157,16 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
 
 def _bake_slot(obj: bpy.types.Object, slot: Slot, source: Source, frames: np.ndarray) -> None:
     motion = in_betweens(source, frames)
-    original, baked, mode = slot.action, slot.action.copy(), obj.rigid_motion.mode
-    baked.name = f"{original.name} Baked"
-    for other in [other for other in baked.slots if other.handle != slot.handle]:
-        baked.slots.remove(other)
-    _exchange(obj, original, baked)
-    copy = next(copy for copy in slots_of([obj]) if copy.action == baked)
+    copy = move_by_copy(obj, slot, BAKED)
     curves = curves_in(copy.channelbag)
-    for path, values in _channels(Transformable.of(obj), source, motion).items():
+    for path, values in channel_values(Transformable.of(obj), source, motion).items():
         for index, column in enumerate(values.T):
             fcurve = curves.get((path, index)) or copy.channelbag.fcurves.new(path, index=index)
             _bake_channel(fcurve, frames, column)
     set_mode_in(copy, "BLENDER", frames[:-1])
-    entry = obj.rigid_motion.bakes.add()
-    entry.baked, entry.original, entry.mode = baked, original, mode
 
 
-def _exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
-    """Let an object move by another Action, with the slot of the same name in it."""
-    data = obj.animation_data
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
-    for user in (data, *strips):
-        if user.action == old:
-            name = user.action_slot.identifier
-            user.action = new
-            user.action_slot = new.slots[name]
-
-
-def _channels(what: Transformable, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
+def channel_values(what: Transformable, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
     """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
     own, poses, channels = source.own, motion.wanted, {}
     first = source.values_at(motion.frames[:1])[:, 0]

@@ -99,6 +99,15 @@ class Keys:
         """Values of the keys, shape (c, n)."""
         return self.points[..., 1]
 
+    def only(self, channels: Sequence[int]) -> Keys:
+        """The same of some of the channels."""
+        points, interpolation, left, right, easing = (
+            None if array is None else array[channels]
+            for array in (self.points, self.interpolation, self.left, self.right, self.easing)
+        )
+        settings = None if self.easing_settings is None else self.easing_settings[:, channels]
+        return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles)
+
     @property
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""

@@ -10,6 +10,7 @@ from bpy.props import (
     BoolVectorProperty,
     CollectionProperty,
     EnumProperty,
+    FloatProperty,
     FloatVectorProperty,
     IntProperty,
     PointerProperty,
@@ -18,6 +19,7 @@ from bpy.props import (
 
 from ..motion import MODES
 from . import live
+from .originals import BAKED, REDUCED
 
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
@@ -36,12 +38,24 @@ class ActionMotion(bpy.types.PropertyGroup):
     slots: CollectionProperty(type=SlotRecord)
 
 
-class BakedAction(bpy.types.PropertyGroup):
-    """An Action with baked keys, what it was baked from, and the mode that the object had then."""
+class ChangedAction(bpy.types.PropertyGroup):
+    """A copy of an Action that was given other keys, what it is a copy of, and the mode that the object had then."""
 
-    baked: PointerProperty(type=bpy.types.Action)
+    kind: EnumProperty(
+        items=[
+            (BAKED, "Baked", "It has keys for in-betweens too"),
+            (REDUCED, "Reduced", "It has few of the keys"),
+        ],
+        options={"HIDDEN"},
+    )
+    changed: PointerProperty(type=bpy.types.Action)
     original: PointerProperty(type=bpy.types.Action)
     mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
+    keys_before: IntProperty(options={"HIDDEN"})
+    keys_after: IntProperty(options={"HIDDEN"})
+    largest_error: FloatProperty(
+        description="How far the reduced motion is off where it is furthest, in Blender's units", options={"HIDDEN"}
+    )
 
 
 def _refresh(motion: ObjectMotion, _context: bpy.types.Context) -> None:
@@ -93,10 +107,10 @@ class ObjectMotion(bpy.types.PropertyGroup):
         options=set(),
         update=_refresh,
     )
-    bakes: CollectionProperty(type=BakedAction)
+    bakes: CollectionProperty(type=ChangedAction)
 
 
-CLASSES = (SlotRecord, ActionMotion, BakedAction, ObjectMotion)
+CLASSES = (SlotRecord, ActionMotion, ChangedAction, ObjectMotion)
 
 
 def register() -> None:

@@ -80,7 +80,7 @@ MODES: dict[str, Mode] = {
         cga.cga_slerp,
     ),
     "motor_spline": Mode(
-        "Smooth Screw (Motor Spline)",
+        "Smooth Screw (PGA)",
         "Screws that flow into one another: no corner at a key, neither in the path nor in the turning",
         curves.motor_spline,
         pga.pga_slerp,

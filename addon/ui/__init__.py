@@ -2,8 +2,9 @@
 
 targets      which objects and keys an editor means     operators    what can be done to them
 menus        entries in Blender's menus, and the pies   keymap       the pies' shortcut
-panels       the sidebar                                preferences  of the extension
+panels       the sidebar                                rows         its lines, aligned
 overlay      paths in the viewport                      look         how they look
+wording      what is said                               preferences  of the extension
 """
 
 from __future__ import annotations

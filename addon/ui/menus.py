@@ -15,12 +15,16 @@ from .wording import LABELS
 
 
 def _draw_modes(
-    context: bpy.types.Context, layout: bpy.types.UILayout, scope: str, modes: Iterable[str] = LABELS
+    context: bpy.types.Context,
+    layout: bpy.types.UILayout,
+    scope: str,
+    modes: Iterable[str] = LABELS,
+    no_icon: str = "BLANK1",
 ) -> None:
     present = modes_meant(context, context.object, scope)
     for mode in modes:
         # One tick where all is one; dots where modes are mixed.
-        icon = "BLANK1" if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
+        icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
         properties = layout.operator("rigid_motion.set_mode", text=LABELS[mode], icon=icon)
         properties.mode, properties.on = mode, scope
 
@@ -29,6 +33,10 @@ def _draw_rest(layout: bpy.types.UILayout, pie: str) -> None:
     layout.separator()
     layout.operator("rigid_motion.bake", text="Bake to Keys...")
     layout.operator("rigid_motion.unbake")
+    layout.separator()
+    layout.operator("rigid_motion.reduce_keys")
+    layout.operator("rigid_motion.restore_keys")
+    layout.operator("rigid_motion.let_keys_go")
     layout.separator()
     layout.operator("rigid_motion.clear")
     layout.operator("rigid_motion.refresh")
@@ -78,6 +86,10 @@ class RIGID_MOTION_MT_whole(bpy.types.Menu):
         _draw_modes(context, self.layout, WHOLE)
 
 
+CORNERS = ("motor_spline", "lerp_slerp", "pga_lerp", "cga_lerp", "cga_slerp")
+"""North, and then the corners. A pie has eight slices: the screw has one of them under one of its names."""
+
+
 class _Pie:
     """Blender's own in-betweens on the left, the screw on the right, what is like each other side by side."""
 
@@ -86,9 +98,10 @@ class _Pie:
     def draw(self, context: bpy.types.Context) -> None:
         pie = self.layout.menu_pie()
         pie.operator_context = "INVOKE_REGION_WIN"
-        _draw_modes(context, pie, self.scope, ("BLENDER", "dq_sclerp"))
+        # Entries of a menu are aligned, those of a pie stand alone.
+        _draw_modes(context, pie, self.scope, ("BLENDER", "dq_sclerp"), "NONE")
         pie.operator("rigid_motion.bake", text="Bake to Keys...")
-        _draw_modes(context, pie, self.scope, ("lerp_slerp", "pga_lerp", "pga_slerp", "cga_lerp", "cga_slerp"))
+        _draw_modes(context, pie, self.scope, CORNERS, "NONE")
 
 
 class RIGID_MOTION_MT_pie_object(_Pie, bpy.types.Menu):

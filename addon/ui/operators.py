@@ -13,12 +13,17 @@ from bpy.props import EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
+from ..animation.originals import BAKED, REDUCED
 from ..animation.properties import MODE_ITEMS
+from ..animation.reducing import metres_per_unit
 from .preferences import DEFAULT_MODE, default_mode
 from .targets import SCOPES, SELECTED, WHOLE, frames_meant, objects_for, scope_for
-from .wording import DESCRIPTIONS, LABELS, listed
+from .wording import DESCRIPTIONS, LABELS, length, listed, reduction_told
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
+
+MOST_TOLD = 5
+"""Objects that the redo panel tells of."""
 
 
 class _OnObjects:
@@ -103,7 +108,9 @@ class RIGID_MOTION_OT_set_mode(_OnObjects, bpy.types.Operator):
         frames = frames_meant(context, obj, self.on)
         animation.set_mode(obj, self.mode, frames)
         label = LABELS[self.mode]
-        return label if frames is None else f"{label} from frame {listed([f'{frame:g}' for frame in frames])}"
+        if frames is None:
+            return label
+        return f"{label} from frame{'s' * (len(frames) > 1)} {listed([f'{frame:g}' for frame in frames])}"
 
 
 class RIGID_MOTION_OT_clear(_OnObjects, bpy.types.Operator):
@@ -190,6 +197,15 @@ def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:
     return scene.frame_start, scene.frame_end
 
 
+def _objects_with(context: bpy.types.Context, kind: str) -> list[bpy.types.Object]:
+    """Those that had other keys before, which are still in the file."""
+    return [
+        obj
+        for obj in objects_for(context)
+        if any(note.kind == kind and note.original is not None for note in obj.rigid_motion.bakes)
+    ]
+
+
 class RIGID_MOTION_OT_unbake(_OnObjects, bpy.types.Operator):
     bl_idname = "rigid_motion.unbake"
     bl_label = "Un-Bake"
@@ -197,18 +213,126 @@ class RIGID_MOTION_OT_unbake(_OnObjects, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(len(obj.rigid_motion.bakes) for obj in objects_for(context)):
+        if _objects_with(context, BAKED):
             return True
         cls.poll_message_set("None of these objects is baked")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self.act([obj for obj in objects_for(context) if len(obj.rigid_motion.bakes)], self._unbake)
+        return self.act(_objects_with(context, BAKED), self._unbake)
 
     @staticmethod
     def _unbake(obj: bpy.types.Object) -> str:
         animation.unbake(obj)
         return "back to the keys from before baking"
+
+
+class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
+    bl_idname = "rigid_motion.reduce_keys"
+    bl_label = "Reduce Keys to Poses"
+    bl_description = (
+        "Leave only the keys that the motion needs, location and rotation together, in a copy of the Action: "
+        "for imported motion capture, baked simulations and solved cameras. Restore Keys gives all of them back"
+    )
+
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description="How far the surface of the object may be off on any frame. One millimetre where nothing is asked",
+        default=0.001,
+        min=1e-6,
+        soft_max=1.0,
+        step=0.1,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description=(
+            "How far that surface is from the origin: the larger, the more a rotation counts. "
+            "At 0 each object has the size of its own bounding box"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=10.0,
+        step=1.0,
+        precision=4,
+        subtype="DISTANCE",
+        options={"SKIP_SAVE"},
+    )
+    mode: EnumProperty(
+        name="Mode",
+        description="What fills in between the keys that are left, and which keys those are",
+        items=[item for item in MODE_ITEMS if item[0] != "BLENDER"],
+        default="motor_spline",
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("tolerance", "radius", "mode"):
+            layout.prop(self, name)
+        for obj in objects_for(context)[:MOST_TOLD]:
+            if (reduction := animation.reduction_of(obj)) is not None:
+                layout.label(text=f"{obj.name}: {reduction_told(context.scene, reduction)}", icon="INFO")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        objects = objects_for(context)
+        if not self.properties.is_property_set("tolerance"):
+            self.tolerance = 0.001 / metres_per_unit(context.scene)
+        if not self.radius and len(objects) == 1:
+            self.radius = animation.radius_of(objects[0])
+        return self.act(objects, lambda obj: self._reduce(context.scene, obj))
+
+    def _reduce(self, scene: bpy.types.Scene, obj: bpy.types.Object) -> str:
+        reduction = animation.reduce_keys_of(obj, self.mode, self.tolerance, self.radius or None)
+        return reduction_told(scene, reduction)
+
+
+class RIGID_MOTION_OT_restore_keys(_OnObjects, bpy.types.Operator):
+    bl_idname = "rigid_motion.restore_keys"
+    bl_label = "Restore Keys"
+    bl_description = "Give reduced objects all the keys back that they had before, to the last handle"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _poll_reduced(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self.act(_objects_with(context, REDUCED), self._restore)
+
+    @staticmethod
+    def _restore(obj: bpy.types.Object) -> str:
+        animation.restore_keys(obj)
+        return "back to the keys from before they were reduced"
+
+
+class RIGID_MOTION_OT_let_keys_go(_OnObjects, bpy.types.Operator):
+    bl_idname = "rigid_motion.let_keys_go"
+    bl_label = "Let Dense Keys Go"
+    bl_description = (
+        "Remove the keys from the file that Restore Keys would give back, once the reduced ones are good. "
+        "The reduced keys stay as they are"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _poll_reduced(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return self.act(_objects_with(context, REDUCED), self._let_go)
+
+    @staticmethod
+    def _let_go(obj: bpy.types.Object) -> str:
+        animation.let_keys_go(obj)
+        return "the keys from before they were reduced are gone"
+
+
+def _poll_reduced(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if _objects_with(context, REDUCED):
+        return True
+    operator.poll_message_set("The keys of these objects are not reduced")
+    return False
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):
@@ -233,5 +357,8 @@ CLASSES = (
     RIGID_MOTION_OT_clear,
     RIGID_MOTION_OT_bake,
     RIGID_MOTION_OT_unbake,
+    RIGID_MOTION_OT_reduce_keys,
+    RIGID_MOTION_OT_restore_keys,
+    RIGID_MOTION_OT_let_keys_go,
     RIGID_MOTION_OT_refresh,
 )

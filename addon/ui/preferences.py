@@ -65,7 +65,9 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
         "Blender's Path", "Color of the path as Blender's own in-betweens have it", DEFAULT_LOOK.native_color
     )
     mode_color: _color("Mode's Path", "Color of the path as the mode has it", DEFAULT_LOOK.mode_color)
-    key_color: _color("Keys", "Color of the keys on a path", DEFAULT_LOOK.key_color)
+    key_color: _color(
+        "Selected Keys", "Color of the selected keys on a path. The others are white", DEFAULT_LOOK.key_color
+    )
     tick_color: _color("Ticks", "Color of the marks that are evenly timed along a path", DEFAULT_LOOK.tick_color)
     line_width: FloatProperty(
         name="Line Width",

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+import bpy
+
+from ..animation import Reduction
 from ..animation.describing import SegmentFacts
 from ..animation.properties import MODE_ITEMS
 
@@ -13,6 +16,12 @@ LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """What each mode does for the motion, in one sentence without a full stop."""
+
+NO_KEYS = "No keys of location, rotation or scale yet"
+NO_SEGMENT = "No segment on this frame"
+STRIPS = "Moved by strips: enter one to see its segments (NLA Editor, Tab)"
+BAKED = "Baked to keys. Un-Bake brings its own keys back"
+OUT_OF_DATE = "The keys have changed since: Live Update is off, in the preferences"
 
 NEAR_HALF_TURN = math.radians(170.0)
 """From here on a small change of a key may send the object round the other way."""
@@ -41,6 +50,20 @@ def cautions(segment: SegmentFacts) -> list[str]:
 def degrees(angle: float) -> str:
     """An angle in radians, to be read."""
     return f"{math.degrees(angle):.1f}°"
+
+
+def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
+    """A length in Blender's units, to be read in those of the scene."""
+    settings = scene.unit_settings
+    if settings.system == "NONE":
+        return f"{units:.{precision}g}"
+    return bpy.utils.units.to_string(settings.system, "LENGTH", units * settings.scale_length, precision=precision)
+
+
+def reduction_told(scene: bpy.types.Scene, reduction: Reduction) -> str:
+    """What became of the keys of an object."""
+    error = length(scene, reduction.largest_error, precision=3)
+    return f"{reduction.before} keys became {reduction.after}, largest error {error}"
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:

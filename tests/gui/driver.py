@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import TypeVar
 
 import bpy
+import numpy as np
 
 from tests.gui import places
-from tests.gui.pictures import read_screen, write_png
-from tests.gui.places import Place
+from tests.gui.pictures import part_of, read_screen, write_png
+from tests.gui.places import Box, Place
 
 T = TypeVar("T")
 Steps = Generator[float | None, None, T]
@@ -133,7 +134,7 @@ class Hand:
         """Open a menu of an area's header by clicking along it. Menus are called by class: "DOPESHEET_MT_key"."""
         header = places.region(area, "HEADER")
         with _drawings_of(menu) as drawings:
-            for x in range(header.x + 30, header.x + header.width, 25):
+            for x in range(header.x + 30, header.x + header.width, 35):
                 yield from self.click((x, header.y + header.height // 2))
                 if drawings:
                     return
@@ -163,7 +164,9 @@ class Hand:
         yield 0.3
         yield from self.press("RET")
 
-    def pie(self, key: str, direction: str, picture: str | None = None, **modifiers: bool) -> Steps[None]:
+    def pie(
+        self, key: str, direction: str, picture: str | None = None, box: Box | None = None, **modifiers: bool
+    ) -> Steps[None]:
         """Hold the key of a pie menu, move in a direction of `COMPASS`, and let go; with a picture before, if named."""
         (x, y), (right, up) = self.place, COMPASS[direction]
         self._event(key, "PRESS", **modifiers)
@@ -171,7 +174,7 @@ class Hand:
         yield from self.glide((x + right * PIE_RADIUS, y + up * PIE_RADIUS))
         yield 0.2
         if picture:
-            yield from self.picture(picture)
+            yield from self.picture(picture, box)
         self._event(key, "RELEASE", **modifiers)
         yield
 
@@ -208,7 +211,7 @@ class Hand:
         """
         part = places.region(area, kind)
         flat = part.height < 40  # a header: one row of narrow buttons, where a sidebar has many rows of wide ones
-        right, down = (15, part.height // 2) if flat else (part.width // 6, 9)
+        right, down = (15, part.height // 2) if flat else (part.width // 4, 15)
         for y in range(part.y + part.height - down, part.y, -down):
             for x in range(part.x + right, part.x + part.width, right):
                 yield from self.hover((x, y))
@@ -238,18 +241,33 @@ class Hand:
             assert time.monotonic() < end, f"not within {seconds} s: {what}"
             yield
 
-    def picture(self, name: str) -> Steps[None]:
-        """Keep what is on the screen as NAME.png."""
+    def look(self) -> Steps[np.ndarray]:
+        """What is on the screen, drawn anew: pixels as in `tests.gui.pictures`."""
         for area in self.window.screen.areas:
             area.tag_redraw()
         yield 0.5  # the screen is the affair of another process, which may be behind
-        path = self.pictures / f"{name}.png"
         screen = os.environ.get("BLENDER_GUI_SCREEN")
-        if screen:
-            write_png(path, read_screen(Path(screen).read_bytes()))
-        else:
-            with bpy.context.temp_override(window=self.window):
-                bpy.ops.screen.screenshot(filepath=str(path))
+        return read_screen(Path(screen).read_bytes()) if screen else self._screenshot()
+
+    def picture(self, name: str, box: Box | None = None) -> Steps[np.ndarray]:
+        """Keep what is on the screen, or the part of it in a box, as NAME.png; and have its pixels."""
+        pixels = yield from self.look()
+        if box:
+            pixels = part_of(pixels, box)
+        write_png(self.pictures / f"{name}.png", pixels)
+        return pixels
+
+    def _screenshot(self) -> np.ndarray:
+        path = self.pictures / ".screenshot.png"
+        with bpy.context.temp_override(window=self.window):
+            bpy.ops.screen.screenshot(filepath=str(path))
+        image = bpy.data.images.load(str(path))
+        width, height = image.size
+        values = np.empty(width * height * image.channels, np.float32)
+        image.pixels.foreach_get(values)
+        bpy.data.images.remove(image)
+        path.unlink()
+        return np.rint(values.reshape(height, width, -1)[::-1, :, :3] * 255).astype(np.uint8)
 
 
 @contextmanager

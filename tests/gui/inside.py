@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.gui.driver import Hand, run
 
-SECONDS = 120.0
+SECONDS = 180.0
 """What one scenario may take, in a Blender that draws without a graphics card."""
 
 

@@ -37,13 +37,29 @@ def read_screen(dump: bytes) -> np.ndarray:
     return np.stack([(pixels >> shift) & 0xFF for shift in shifts], axis=-1).astype(np.uint8)
 
 
+def part_of(pixels: np.ndarray, box: tuple[int, int, int, int]) -> np.ndarray:
+    """The pixels in a box: x and y of its lower left corner, width and height, as Blender's areas have them.
+
+    Raises
+    ------
+    ValueError
+        Where nothing of the picture is in the box.
+    """
+    x, y, width, height = box
+    top = len(pixels) - y - height
+    part = pixels[max(top, 0) : max(top + height, 0), max(x, 0) : max(x + width, 0)]
+    if not part.size:
+        raise ValueError(f"the box {box} is outside of a picture of {pixels.shape[1]} x {pixels.shape[0]}")
+    return part
+
+
 def write_png(path: Path, pixels: np.ndarray) -> None:
     """Write pixels as a PNG file, or nothing at all."""
     height, width, _ = pixels.shape
     rows = np.zeros((height, 1 + width * 3), np.uint8)  # each row begins with its filter: none
     rows[:, 1:] = pixels.reshape(height, width * 3)
     header = struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)
-    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b"")]
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 9)), (b"IEND", b"")]
     png = b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
     )

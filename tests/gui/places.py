@@ -1,7 +1,8 @@
 """Where things are in a Blender window: areas, regions, keys in the Dope Sheet, points of the scene.
 
-A place is x, y in pixels of the window, from its lower left corner, as Blender's mouse events have it. Types are
-Blender's own: `Area.type` ("VIEW_3D"), `Region.type` ("WINDOW", "HEADER", "UI").
+A place is x, y in pixels of the window, from its lower left corner, as Blender's mouse events have it; a box is the
+place of its own lower left corner, width and height. Types are Blender's own: `Area.type` ("VIEW_3D"), `Region.type`
+("WINDOW", "HEADER", "UI").
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 Place = tuple[int, int]
+Box = tuple[int, int, int, int]
 
 
 def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
@@ -35,6 +37,17 @@ def centre(part: bpy.types.Area | bpy.types.Region) -> Place:
     return part.x + part.width // 2, part.y + part.height // 2
 
 
+def box(part: bpy.types.Area | bpy.types.Region) -> Box:
+    """All of an area or a region."""
+    return part.x, part.y, part.width, part.height
+
+
+def box_around(place: Place, width: int, height: int) -> Box:
+    """A box of this size with a place in its middle."""
+    x, y = place
+    return x - width // 2, y - height // 2, width, height
+
+
 def key(area: bpy.types.Area, frame: float, row: int = 0) -> Place:
     """A key in a Dope Sheet: in the summary (row 0), or in the row of a channel below it."""
     scale = bpy.context.preferences.system.ui_scale
@@ -44,6 +57,14 @@ def key(area: bpy.types.Area, frame: float, row: int = 0) -> Place:
     window_region = region(area)
     x, y = window_region.view2d.view_to_region(frame, view_y, clip=False)
     return _inside(window_region, x, y, f"frame {frame}, row {row}")
+
+
+def playhead(area: bpy.types.Area, frame: float) -> Place:
+    """The number of a frame on top of a Dope Sheet, where a click puts the playhead."""
+    window_region = region(area)
+    x, _ = window_region.view2d.view_to_region(frame, 0, clip=False)
+    strip = 23 * bpy.context.preferences.system.ui_scale
+    return _inside(window_region, x, window_region.height - strip / 2, f"frame {frame}")
 
 
 def point(area: bpy.types.Area, location: Sequence[float]) -> Place:

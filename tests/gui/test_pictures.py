@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.gui.pictures import read_screen, write_png
+from tests.gui.pictures import part_of, read_screen, write_png
 
 
 @pytest.fixture
@@ -48,3 +48,16 @@ def test_blender_reads_the_png_that_is_written(pixels, tmp_path, empty_file):
     seen = np.array(image.pixels).reshape(4, 6, 4)[::-1, :, :3]  # Blender's rows begin at the bottom
     np.testing.assert_array_equal(np.rint(seen * 255), pixels)
     assert [path.name for path in tmp_path.iterdir()] == ["picture.png"]
+
+
+def test_a_box_is_counted_from_the_lower_left_corner(pixels):
+    np.testing.assert_array_equal(part_of(pixels, (1, 0, 3, 2)), pixels[2:4, 1:4])
+    np.testing.assert_array_equal(part_of(pixels, (0, 3, 6, 1)), pixels[:1])
+
+
+def test_of_a_box_that_reaches_beyond_the_picture_there_is_what_the_picture_has(pixels):
+    np.testing.assert_array_equal(part_of(pixels, (-2, -1, 4, 3)), pixels[2:4, :2])
+    with pytest.raises(ValueError, match="outside of a picture of 6 x 4"):
+        part_of(pixels, (6, 0, 3, 3))
+    with pytest.raises(ValueError, match="outside"):
+        part_of(pixels, (0, -9, 3, 3))

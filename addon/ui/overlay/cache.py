@@ -8,6 +8,7 @@ that is merely played, or looked at from elsewhere, costs no more than looking p
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import bpy
@@ -32,6 +33,9 @@ class _Entry:
 
     action: int
     """Session id of the Action that the path was read from, 0 for none."""
+
+    selected: bytes = b""
+    """The frames of the keys that were selected."""
 
     stale: bool = False
 
@@ -60,6 +64,20 @@ def keep_only(drawn: int) -> None:
         _entries.popitem(last=False)
 
 
+def notice_selection(objects: Iterable[bpy.types.Object]) -> bool:
+    """Whether keys of these objects are selected otherwise than in their paths; those are looked at again then.
+
+    Selecting is no edit, so Blender's handlers tell nothing of it.
+    """
+    entries = [(_entries[obj.session_uid], obj) for obj in objects if obj.session_uid in _entries]
+    changed = [
+        entry for entry, obj in entries if entry.path and entry.selected != key_frames(obj, selected=True).tobytes()
+    ]
+    for entry in changed:
+        entry.stale = True
+    return bool(changed)
+
+
 def _read(obj: bpy.types.Object, settings: tuple, before: _Entry | None) -> _Entry:
     action = obj.animation_data.action if obj.animation_data else None
     entry = _Entry(None, (), settings, action.session_uid if action else 0)
@@ -68,7 +86,8 @@ def _read(obj: bpy.types.Object, settings: tuple, before: _Entry | None) -> _Ent
         if source is not None:
             mode, tick_step, axes_size, *_ = settings
             selected, axis_length = key_frames(obj, selected=True), axes_size * axis_length_of(obj, source)
-            entry.digest = (source.digest, selected.tobytes(), axis_length, settings)
+            entry.selected = selected.tobytes()
+            entry.digest = (source.digest, entry.selected, axis_length, settings)
             if before is not None and before.digest == entry.digest:
                 entry.path = before.path
             else:

@@ -161,15 +161,35 @@ class _Pen:
 
 def draw_paths() -> None:
     """Draw the paths of the selected objects in the viewport that is being drawn. It never raises."""
-    global _complaint
     try:
         if are_paths_shown(bpy.context):
             _draw(bpy.context)
     except Exception as problem:
-        # Once: the next redraw is a moment away.
-        if repr(problem) != _complaint:
-            _complaint = repr(problem)
-            log.exception("The paths could not be drawn")
+        _complain(problem)
+
+
+def follow_selection() -> None:
+    """Have the viewports drawn anew if keys were selected in the editor that is being drawn. It never raises."""
+    context = bpy.context
+    try:
+        # While it plays the viewports are drawn anyway, as fast as they can be.
+        if not are_paths_shown(context) or context.screen.is_animation_playing:
+            return
+        if cache.notice_selection(context.selected_objects):
+            for window in context.window_manager.windows:
+                for area in window.screen.areas:
+                    if area.type == "VIEW_3D":
+                        area.tag_redraw()
+    except Exception as problem:
+        _complain(problem)
+
+
+def _complain(problem: Exception) -> None:
+    global _complaint
+    # Once: the next redraw is a moment away.
+    if repr(problem) != _complaint:
+        _complaint = repr(problem)
+        log.exception("The paths could not be drawn")
 
 
 def _draw(context: bpy.types.Context) -> None:
@@ -221,24 +241,30 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
     pen.dot(batches.selected, look.key_color, diameter)
 
 
-_handle: object | None = None
-"""What Blender knows the overlay by."""
+PLACES = (
+    (bpy.types.SpaceView3D, draw_paths, "POST_VIEW"),
+    (bpy.types.SpaceDopeSheetEditor, follow_selection, "POST_PIXEL"),
+    (bpy.types.SpaceGraphEditor, follow_selection, "POST_PIXEL"),
+)
+"""The editors, what is called when one is drawn, and when."""
+
+_handles: list[tuple[type[bpy.types.Space], object]] = []
+"""What Blender knows those by."""
 
 _complaint = ""
 """What was wrong last."""
 
 
 def register() -> None:
-    global _handle
     if not bpy.app.background:
-        _handle = bpy.types.SpaceView3D.draw_handler_add(draw_paths, (), "WINDOW", "POST_VIEW")
+        for space, draw, moment in PLACES:
+            _handles.append((space, space.draw_handler_add(draw, (), "WINDOW", moment)))
 
 
 def unregister() -> None:
-    global _handle
-    if _handle is not None:
-        bpy.types.SpaceView3D.draw_handler_remove(_handle, "WINDOW")
-        _handle = None
+    for space, handle in _handles:
+        space.draw_handler_remove(handle, "WINDOW")
+    _handles.clear()
     _batches.clear()
     _dot_shader.cache_clear()
     _vertex_format.cache_clear()

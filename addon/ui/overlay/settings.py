@@ -6,6 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...animation.properties import MODE_ITEMS
+from ..rows import draw_text, labelled
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
 
@@ -13,8 +14,8 @@ MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MO
 class RigidMotionOverlay(bpy.types.PropertyGroup):
     show_paths: BoolProperty(
         name="Rigid Motion Paths",
-        description="Draw the ways of the selected objects, with their parents as they are on the current frame: how "
-        "Blender's own in-betweens run beside those of a rigid-motion mode",
+        description="Draw the paths of the selected objects: Blender's own, and beside it that of a rigid-motion mode. "
+        "Parents are taken as they are on the current frame",
         options=set(),
     )
     mode: EnumProperty(
@@ -25,13 +26,13 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     show_native: BoolProperty(
         name="Blender's Path",
-        description="Draw also how Blender's own in-betweens run",
+        description="Draw Blender's own path too, in its own color",
         default=True,
         options=set(),
     )
     show_axes: BoolProperty(
         name="Axes",
-        description="Draw how the object is turned on its way, by its local axes at some of the ticks",
+        description="Draw how the object is turned along its path, by its local axes at some of the ticks",
         default=True,
         options=set(),
     )
@@ -45,7 +46,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     tick_step: IntProperty(
         name="Frame Step",
-        description="Frames from one tick to the next. With 0 there are as many ticks as can be read",
+        description="Frames from one tick to the next. At 0, as many ticks as can be told apart",
         min=0,
         soft_max=100,
         options=set(),
@@ -55,19 +56,17 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """The settings of the overlay, for a panel."""
     settings = context.scene.rigid_motion_overlay
-    layout.use_property_split = True
-    layout.use_property_decorate = False
-    layout.prop(settings, "show_paths", text="Show")
+    labelled(layout).prop(settings, "show_paths", text="Show")
+    if settings.show_paths and not are_paths_shown(context):
+        draw_text(context, layout, "Hidden by Viewport Overlays", "INFO")
     column = layout.column()
     column.active = settings.show_paths
-    if settings.show_paths and not are_paths_shown(context):
-        column.label(text="Hidden by the Viewport Overlays", icon="INFO")
-    column.prop(settings, "mode")
-    column.prop(settings, "tick_step")
-    column.prop(settings, "show_native")
-    row = column.row(heading="Axes")
-    row.prop(settings, "show_axes", text="")
-    size = row.row()
+    labelled(column, "Mode").prop(settings, "mode", text="")
+    labelled(column, "Step").prop(settings, "tick_step", text="")
+    labelled(column).prop(settings, "show_native")
+    axes = labelled(column)
+    axes.prop(settings, "show_axes")
+    size = axes.row()
     size.active = settings.show_axes
     size.prop(settings, "axes_size", text="")
 

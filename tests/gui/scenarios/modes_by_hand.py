@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 import bpy
+import numpy as np
 
+from tests.animation.oracle import assert_shown, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
 FRAMES = (1, 20, 40)
+BETWEEN = range(4, 41, 9)
 BLENDER, STRAIGHT, SCREW = "BLENDER", "lerp_slerp", "dq_sclerp"
 PIE = "wm.call_menu_pie"
 
@@ -22,10 +25,11 @@ def cube() -> bpy.types.Object:
     return bpy.data.objects["Cube"]
 
 
-def is_filled_in() -> bool:
-    """Whether in-betweens are in the delta transforms of the cube half-way to its second key."""
-    bpy.context.scene.frame_set(10)
-    return any(abs(part) > 1e-3 for part in cube().delta_location)
+def assert_modes(keys: dict[float, int], of_object: str = BLENDER) -> None:
+    """The cube has this mode or else these keys of modes, and on every frame it is where they have it."""
+    assert cube().rigid_motion.mode == of_object or keys, cube().rigid_motion.mode
+    assert mode_keys() == keys, mode_keys()
+    assert_shown([cube()], BETWEEN)
 
 
 def mode_keys() -> dict[float, int]:
@@ -76,24 +80,22 @@ def scenario(hand: Hand) -> Steps[None]:
 def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By the pie, taken back, from the Object menu and from the context menu: for the whole object."""
     centre = places.centre(places.region(view))
+    x, y = centre
     yield from hand.hover(centre)
-    yield from hand.pie("T", "E", picture="pie", alt=True)
-    assert cube().rigid_motion.mode == SCREW
-    assert is_filled_in()
+    yield from hand.pie("T", "E", picture="pie", box=(x - 270, y - 160, 840, 320), alt=True)
+    assert_modes({}, SCREW)
     yield from hand.press("Z", ctrl=True)
-    assert cube().rigid_motion.mode == BLENDER
-    assert not is_filled_in(), "undo takes the in-betweens back too"
+    assert_modes({}, BLENDER)
     yield from hand.press("Z", ctrl=True, shift=True)
-    assert cube().rigid_motion.mode == SCREW
-    assert is_filled_in(), "redo brings them again"
+    assert_modes({}, SCREW)
 
     yield from hand.open_menu(view, "VIEW3D_MT_object")
     yield from hand.choose("Vector + Quaternion")
-    assert cube().rigid_motion.mode == STRAIGHT
+    assert_modes({}, STRAIGHT)
     yield from hand.click(centre, button="RIGHTMOUSE")
     yield from hand.picture("context-menu")
     yield from hand.choose("Clear Modes")
-    assert cube().rigid_motion.mode == BLENDER
+    assert_modes({}, BLENDER)
 
     cube().rotation_mode = "AXIS_ANGLE"
     yield from hand.hover(centre)
@@ -108,18 +110,22 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     """From the Key menu, the context menu and by the pie: for the selected keys."""
     yield from hand.click(places.key(sheet, 1))
     yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
+    yield from hand.press("UP_ARROW")
+    yield from hand.press("RIGHT_ARROW")
+    yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 330, 900, 560))
     yield from hand.choose("Screw (Dual Quaternion)")
-    assert mode_keys() == {1: 2, 20: 0}, mode_keys()
+    yield from hand.picture("panel-of-keys", places.box(places.region(sheet, "UI")))
+    assert_modes({1: 2, 20: 0})
     yield from hand.press("F9")
     yield from hand.picture("adjust-last-operation")
     yield from hand.press("ESC")
     yield from hand.click(places.key(sheet, 20))
     yield from hand.click(button="RIGHTMOUSE")
     yield from hand.choose("Motor Blend (PGA)")
-    assert mode_keys() == {1: 2, 20: 3, 40: 0}, mode_keys()
+    assert_modes({1: 2, 20: 3, 40: 0})
     yield from hand.hover(places.key(sheet, 100))
     yield from hand.pie("T", "SE", picture="pie-of-keys", alt=True)
-    assert mode_keys() == {1: 2, 20: 6, 40: 0}, mode_keys()
+    assert_modes({1: 2, 20: 6, 40: 0})
     yield from hand.press("A", alt=True)
     yield from hand.pie("T", "E", alt=True)
     yield from hand.picture("no-key-selected")
@@ -133,28 +139,30 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     x, y = yield from hand.find_button(view, "UI", "rigid_motion.mode")
     yield from hand.click((x, y))
     yield from hand.choose_row(1)
-    assert cube().rigid_motion.mode == STRAIGHT
+    assert_modes({}, STRAIGHT)
     yield from hand.click((x, y - ROW))
     yield from hand.picture("modes-in-the-panel")
     yield from hand.choose_row(2)
-    assert mode_keys() == {1: 2, 20: 1}, mode_keys()
+    assert_modes({1: 2, 20: 1})
     yield from hand.picture("panel")
     for _ in range(2):
         yield from hand.press("Z", ctrl=True)
-    assert cube().rigid_motion.mode == BLENDER
-    assert mode_keys() == {}
+    assert_modes({}, BLENDER)
 
 
 def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By the pie and its dialog; and back by F3."""
+    before = shown_worlds([cube()], BETWEEN)[0]
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.pie("T", "S", alt=True)
     yield from hand.picture("bake")
     yield from hand.press("RET")
     assert len(cube().rigid_motion.bakes) == 1, "the dialog bakes"
+    np.testing.assert_allclose(shown_worlds([cube()], BETWEEN)[0], before, atol=1e-5)
     yield from hand.picture("baked")
     yield from hand.search("Un-Bake")
     assert len(cube().rigid_motion.bakes) == 0
+    assert_modes({1: 2, 20: 6, 40: 0})
 
 
 def in_the_graph_editor(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
@@ -163,8 +171,8 @@ def in_the_graph_editor(hand: Hand, graph: bpy.types.Area) -> Steps[None]:
     yield from hand.hover(places.centre(places.region(graph)))
     yield from hand.press("A")
     yield from hand.pie("T", "E", picture="pie-in-the-graph-editor", alt=True)
-    assert mode_keys() == {1: 2, 20: 2, 40: 2}, mode_keys()
+    assert_modes({1: 2, 20: 2, 40: 2})
     yield from hand.open_menu(graph, "GRAPH_MT_key")
     yield from hand.choose("Vector + Quaternion")
-    assert mode_keys() == {1: 1, 20: 1, 40: 1}, mode_keys()
+    assert_modes({1: 1, 20: 1, 40: 1})
     yield from hand.picture("graph-editor")

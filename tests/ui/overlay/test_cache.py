@@ -7,7 +7,7 @@ import pytest
 
 from addon.animation import set_mode
 from addon.ui.overlay import cache
-from addon.ui.overlay.cache import SPARE, keep_only, path_of
+from addon.ui.overlay.cache import SPARE, keep_only, notice_selection, path_of
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import key, new_object
 
@@ -120,6 +120,24 @@ def test_a_script_that_edits_and_goes_to_another_frame_is_noticed(scene, obj):
     move_key(obj, scene)
     scene.frame_set(9)
     assert path_of(obj, scene) is not path
+
+
+def test_keys_selected_without_a_word_from_blender_are_noticed_when_asked_for(scene, obj):
+    """As in the Dope Sheet, where selecting is no edit."""
+    path = path_of(obj, scene)
+    assert not notice_selection([obj])
+    select(obj, scene)
+    assert path_of(obj, scene) is path
+    assert notice_selection([obj])
+    assert (path_of(obj, scene).selected != path.selected).tolist() == [False, True, False, False]
+    assert not notice_selection([obj])
+
+
+def test_a_selection_matters_only_to_paths_that_are_there(scene, obj):
+    without_path = new_object("None")
+    path_of(without_path, scene)
+    without_path.keyframe_insert("location", frame=1)
+    assert not notice_selection([obj, without_path])
 
 
 def test_undo_shows_the_path_from_before(scene, obj):

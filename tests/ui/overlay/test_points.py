@@ -10,8 +10,8 @@ import pytest
 
 from addon.animation import MODE_IDS, set_mode
 from addon.animation.mode_keys import source_of
-from addon.motion import MODES, Poses, interpolate
 from addon.animation.sources import ROWS
+from addon.motion import MODES, Poses, interpolate
 from addon.ui.overlay.cache import path_of
 from addon.ui.overlay.points import (
     AXES,

@@ -1,0 +1,410 @@
+"""Reducing keys: from a recording with a key on every frame to the few poses that a mode needs to tell its motion.
+
+A recording is whatever an object's channels say: imported mocap, a baked simulation, a solved camera. Its poses are
+those in the space of the channels, with the object's own delta transforms. The few keys go into a copy of the Action;
+the original stays in the file, for `restore_keys`. Frames are those of the Action, lengths are the scene's units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ..motion import MODES, Poses, reduce_keys, shell_error
+from . import live
+from .bake import channel_values
+from .fcurves import LINEAR, Keys
+from .inbetweens import in_betweens
+from .mode_keys import set_mode_in
+from .originals import (
+    REDUCED,
+    entries_in_use,
+    has_original,
+    let_go,
+    move_by_copy,
+    put_back,
+    refuse_tweak_mode,
+    refuse_without_original,
+)
+from .reading import read
+from .slots import MODE_PATH, WIDTHS, Refused, Slot, Transformable, curves_in, slots_of
+from .sources import MODE_IDS, ROWS, SAME_FRAME, SCALE, Source
+
+SMALLEST = 1e-6
+"""Errors of single precision, relative to how far the object gets."""
+
+SOME_SIZE = 0.1
+"""The radius, in metres, of what has no size."""
+
+SOLVED = {"CAMERA_SOLVER", "OBJECT_SOLVER", "FOLLOW_TRACK"}
+"""Constraints that have a button of their own for turning them into keys."""
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What became of the keys of an object: how many there were, how many are left, and the largest shell error."""
+
+    before: int
+    after: int
+    largest_error: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Fewer:
+    """The keys that one slot is to have, and what had them before."""
+
+    slot: Slot
+    before: int
+    frames: np.ndarray
+    """Shape (k,)."""
+
+    values: dict[tuple[str, int], np.ndarray]
+    """What is written on these frames, by data path and index, each of shape (k,)."""
+
+    key_frames: np.ndarray
+    """The same with frames of keys that a scale keeps, shape (n,)."""
+
+    largest_error: float
+
+
+def reduce_keys_of(
+    obj: bpy.types.Object, mode: str = "motor_spline", tolerance: float = 0.001, radius: float | None = None
+) -> Reduction:
+    """Leave an object only the keys that a mode needs to show the same motion.
+
+    A key is a pose: location, rotation and, where it is even, scale have keys on the same frames, with the values that
+    the recording has there. A scale that differs from axis to axis as it changes keeps the keys it has, and so does
+    everything else in the Action.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    mode : str
+        What fills in between the keys, one of `addon.motion.MODES`. It is keyed with them.
+    tolerance : float
+        The largest shell error on any frame, in the scene's units.
+    radius : float, optional
+        Of the shell, in the scene's units. `radius_of` the object, otherwise.
+
+    Returns
+    -------
+    Reduction
+
+    Raises
+    ------
+    Refused
+        Where there are no keys, or no fewer will do, or rigid motion cannot act on them. Nothing is changed then.
+    """
+    if mode not in MODES:
+        raise Refused(f"{obj.name}: there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    if not tolerance > 0.0:
+        raise Refused(f"{obj.name}: the tolerance has to be above zero, not {tolerance:g}")
+    refuse_tweak_mode(obj)
+    radius = radius_of(obj) if radius is None else radius
+    slots = [(slot, curves_in(slot.channelbag)) for slot in slots_of([obj])]
+    readings = [(slot, read(slot, curves)) for slot, curves in slots]
+    readings = [(slot, source) for slot, source in readings if source.channels]
+    if not readings:
+        raise Refused(_why_nothing_is_keyed(obj, [path for _, curves in slots for path, _ in curves]))
+    fewer = [_fewer_keys(obj, slot, source, mode, tolerance, radius) for slot, source in readings]
+    with live.paused():
+        for one in fewer:
+            _write(obj, one, mode)
+    live.refresh([obj])
+    return reduction_of(obj)
+
+
+def reduction_of(obj: bpy.types.Object) -> Reduction | None:
+    """What became of the keys that an object moves by when they were reduced. None where they were not."""
+    entries = [entry for entry in entries_in_use(obj) if entry.kind == REDUCED]
+    if not entries:
+        return None
+    return Reduction(
+        sum(entry.keys_before for entry in entries),
+        sum(entry.keys_after for entry in entries),
+        max(entry.largest_error for entry in entries),
+    )
+
+
+def is_reduced(obj: bpy.types.Object) -> bool:
+    """Whether an object moves by an Action with reduced keys, and its original is still in the file."""
+    return has_original(obj, REDUCED)
+
+
+def restore_keys(obj: bpy.types.Object) -> None:
+    """Give an object all the keys back that it had before they were reduced, to the last handle.
+
+    Raises
+    ------
+    Refused
+        Where they are not reduced, or gone. Nothing is changed then.
+    """
+    refuse_without_original(obj, REDUCED)
+    refuse_tweak_mode(obj)
+    put_back(obj, REDUCED)
+
+
+def let_keys_go(obj: bpy.types.Object) -> None:
+    """Let the keys leave the file that an object had before they were reduced.
+
+    Raises
+    ------
+    Refused
+        Where they are not reduced, or gone. Nothing is changed then.
+    """
+    refuse_without_original(obj, REDUCED)
+    let_go(obj, REDUCED)
+
+
+def radius_of(obj: bpy.types.Object) -> float:
+    """How far an object reaches from its origin as it is now, in the scene's units.
+
+    That is the farthest corner of its bounding box. Empties and cameras are as large as they are drawn; what has no
+    size at all counts as ten centimetres.
+    """
+    evaluated = _evaluated(obj)
+    corners = np.array(evaluated.bound_box)
+    size = 0.0
+    if np.ptp(corners) > 0.0:
+        size = float(np.linalg.norm(corners @ np.array(evaluated.matrix_world.to_3x3()).T, axis=1).max())
+    elif obj.type == "EMPTY":
+        size = obj.empty_display_size * _size(evaluated.matrix_world)
+    elif obj.type == "CAMERA":
+        size = obj.data.display_size * _size(evaluated.matrix_world)
+    return size or SOME_SIZE / metres_per_unit(bpy.context.scene)
+
+
+def metres_per_unit(scene: bpy.types.Scene) -> float:
+    return 1.0 if scene.unit_settings.system == "NONE" else scene.unit_settings.scale_length
+
+
+def _evaluated(obj: bpy.types.Object) -> bpy.types.Object:
+    return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+
+
+def _size(matrix: object) -> float:
+    """The scale of a matrix, the same along all axes."""
+    return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
+
+
+def _fewer_keys(
+    obj: bpy.types.Object, slot: Slot, source: Source, mode: str, tolerance: float, radius: float
+) -> _Fewer:
+    """The keys that one slot needs. `Refused` where it needs as many as it has."""
+    before, frames = _keys_in(source), _samples(source)
+    # What goes on outside of the keys, by cycles or at a slope, has to stay as well.
+    around = np.arange(source.frame_range[0], source.frame_range[1] + 1.0)
+    around = around[(around < frames[0]) | (around > frames[-1])]
+    seen = np.concatenate((around[around < frames[0]], frames, around[around > frames[-1]]))
+    truth, own = _poses(source, seen), np.isin(seen, frames)
+    unit, radius = _in_channels(obj, radius, truth.scales is not None)
+    tolerance /= unit
+    values = _values(obj, source, frames)
+    chosen = _chosen(obj, source, frames, truth[own], mode, tolerance, radius)
+    while True:
+        fewer = _with_keys(source, frames[chosen], {row: column[chosen] for row, column in values.items()}, mode)
+        error = shell_error(_poses(fewer, seen), truth, radius)
+        allowed = tolerance + SMALLEST * (float(np.abs(truth.positions).max()) + radius)
+        if error.max() <= allowed:
+            break
+        more = _worst(chosen, error[own], allowed)
+        if not len(more):
+            raise Refused(
+                f"{obj.name} goes on outside of its keys, and with fewer of them would go elsewhere there: give its "
+                "channels constant extrapolation and no cycles, or cycles that all have the same range"
+            )
+        chosen = np.union1d(chosen, more)
+    key_frames = _keys_in(fewer)
+    if len(key_frames) >= len(before):
+        raise Refused(_why_no_fewer(obj, len(before), keeps_scale=SCALE in source.keyed and 7 not in values))
+    paths = _paths(Transformable.of(obj))
+    return _Fewer(
+        slot,
+        len(before),
+        frames[chosen],
+        {paths[row]: column[chosen] for row, column in values.items()},
+        key_frames,
+        float(error.max()) * unit,
+    )
+
+
+def _in_channels(obj: bpy.types.Object, radius: float, scaled: bool) -> tuple[float, float]:
+    """The length of a unit of the channels in the scene, and a radius in it, before the pose itself scales it."""
+    evaluated = _evaluated(obj)
+    own, world = _size(evaluated.matrix_basis), _size(evaluated.matrix_world)
+    if not (own > 0.0 and world > 0.0):
+        return 1.0, radius
+    return world / own, radius / (world if scaled else world / own)
+
+
+def _chosen(
+    obj: bpy.types.Object,
+    source: Source,
+    frames: np.ndarray,
+    poses: Poses,
+    mode: str,
+    tolerance: float,
+    radius: float,
+) -> np.ndarray:
+    """The samples that are to be keys, if nothing but poses counted."""
+    if poses.scales is not None and not source.uniform_scale:
+        # It stays what it is, and makes the object this large.
+        radius, poses = radius * float(np.abs(poses.scales).max()), Poses(poses.positions, poses.quaternions)
+    elif poses.scales is not None and not np.all(poses.scales > 0.0):
+        raise Refused(f"{obj.name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)")
+    return reduce_keys(frames, poses, mode, tolerance, radius)
+
+
+def _worst(chosen: np.ndarray, error: np.ndarray, allowed: float) -> np.ndarray:
+    """In each segment between chosen samples the one that is furthest off, where it is too far."""
+    error[chosen] = 0.0
+    segment = np.searchsorted(chosen, np.arange(len(error)), side="right")
+    order = np.lexsort((error, segment))
+    furthest = order[np.flatnonzero(np.diff(segment[order], append=-1))]
+    return furthest[error[furthest] > allowed]
+
+
+def _keys_in(source: Source) -> np.ndarray:
+    """The frames of a source's own keys, those together that are one to Blender, shape (n,)."""
+    frames = source.keyed_frames
+    return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+
+
+def _samples(source: Source) -> np.ndarray:
+    """Where the recording is looked at: on its keys, and on whole frames where those are further apart."""
+    keys = _keys_in(source)
+    whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1.0)
+    place = np.clip(np.searchsorted(keys, whole), 1, max(len(keys) - 1, 1))
+    before, behind = keys[place - 1], keys[np.minimum(place, len(keys) - 1)]
+    apart = (whole - before > SAME_FRAME) & (behind - whole > SAME_FRAME) & (behind - before > 1.0 + SAME_FRAME)
+    return np.union1d(keys, whole[apart])
+
+
+def _poses(source: Source, frames: np.ndarray) -> Poses:
+    """What is to be seen of a source, with a scale wherever it has keys of it."""
+    wanted = in_betweens(source, frames).wanted
+    if wanted.scales is not None or SCALE not in source.keyed:
+        return wanted
+    return Poses(
+        wanted.positions,
+        wanted.quaternions,
+        (source.values_at(frames)[ROWS[SCALE]] * source.own[ROWS[SCALE], None]).mean(axis=0),
+    )
+
+
+def _values(obj: bpy.types.Object, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
+    """What the channels that get other keys have on these frames, each (n,), by their rows among the components."""
+    what = Transformable.of(obj)
+    by_path = channel_values(what, source, in_betweens(source, frames))
+    if SCALE in source.keyed and not source.uniform_scale:
+        scale = source.values_at(frames)[ROWS[SCALE]].T
+        if np.all(_is_constant(scale)):
+            by_path[what.prefix + what.properties[SCALE]] = scale
+    keyed = {row for own, _ in source.channels for row in own}
+    columns = {row: by_path[path][:, index] for row, (path, index) in _paths(what).items() if path in by_path}
+    return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
+
+
+def _is_constant(columns: np.ndarray) -> np.ndarray:
+    return np.ptp(columns, axis=0) <= SMALLEST * np.maximum(np.abs(columns).max(axis=0), 1.0)
+
+
+def _paths(what: Transformable) -> dict[int, tuple[str, int]]:
+    """Data path and index of each component."""
+    return {
+        ROWS[name].start + index: (what.prefix + prop, index)
+        for name, prop in what.properties.items()
+        for index in range(WIDTHS[prop])
+    }
+
+
+def _with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> Source:
+    """The source with these keys alone in the channels that have values, straight lines between them."""
+    old = {row: keys for own, keys in source.channels for row in own}
+    alike: dict[tuple, list[int]] = {}
+    for row in values:
+        alike.setdefault((old[row].linear, old[row].cycles) if row in old else (False, None), []).append(row)
+    channels = []
+    for (linear, cycles), rows in alike.items():
+        points = np.empty((len(rows), len(frames), 2), np.float32)
+        points[..., 0], points[..., 1] = frames, [values[row] for row in rows]
+        codes = np.full(points.shape[:2], LINEAR, np.int32)
+        channels.append((rows, Keys(points, codes, linear=linear, cycles=cycles)))
+    for own, keys in source.channels:
+        places = [place for place, row in enumerate(own) if row not in values]
+        if places:
+            channels.append(([own[place] for place in places], keys.only(places)))
+    rest = {row: value for row, value in source.rest.items() if row not in values}
+    return replace(source, channels=tuple(channels), rest=rest, mode=MODE_IDS.index(mode))
+
+
+def _write(obj: bpy.types.Object, fewer: _Fewer, mode: str) -> None:
+    copy = move_by_copy(obj, fewer.slot, REDUCED)
+    entry = obj.rigid_motion.bakes[-1]
+    entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
+    entry.largest_error = fewer.largest_error
+    fcurves, curves = copy.channelbag.fcurves, curves_in(copy.channelbag)
+    for (path, index), values in fewer.values.items():
+        _set_keys(curves.get((path, index)) or fcurves.new(path, index=index), fewer.frames, values)
+    if (MODE_PATH, 0) in curves:
+        fcurves.remove(curves[MODE_PATH, 0])
+    set_mode_in(copy, mode, fewer.key_frames)
+
+
+def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
+    """Put these keys in place of those that a channel has."""
+    keys = fcurve.keyframe_points
+    keys.clear()
+    keys.add(len(frames))
+    keys.foreach_set("co", np.stack((frames, values), axis=1).astype(np.float32).ravel())
+    kinds = bpy.types.Keyframe.bl_rna.properties
+    for name, value in (
+        ("interpolation", "LINEAR"),
+        ("handle_left_type", "AUTO_CLAMPED"),
+        ("handle_right_type", "AUTO_CLAMPED"),
+    ):
+        keys.foreach_set(name, np.full(len(frames), kinds[name].enum_items[value].value, np.int32))
+    fcurve.mute = False
+    fcurve.update()
+
+
+def _why_no_fewer(obj: bpy.types.Object, count: int, *, keeps_scale: bool) -> str:
+    if count <= 2:
+        return f"{obj.name} has {count} key{'s' * (count != 1)}: there is nothing to reduce"
+    if keeps_scale:
+        return (
+            f"{obj.name} keeps its {count} keys: its scale changes differently along its axes, which is no part of a "
+            "pose; move that animation to a child, or remove keys of the scale by hand"
+        )
+    return f"{obj.name} needs its {count} keys to stay within the tolerance: allow a larger one"
+
+
+def _why_nothing_is_keyed(obj: bpy.types.Object, paths: Sequence[str]) -> str:
+    """Why an object has no keys to reduce, and how it gets some."""
+    nothing = f"{obj.name} has no keys of location, rotation or scale"
+    constraints = {constraint.type for constraint in obj.constraints if constraint.enabled}
+    if obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
+        return f"{nothing}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)"
+    if constraints & SOLVED:
+        return (
+            f"{nothing}, a camera solution moves it: turn that into keys first "
+            "(Object Constraint Properties, Constraint to F-Curve)"
+        )
+    if constraints or any(path.startswith(("location", "rotation", "scale")) for path in _driven(obj)):
+        return (
+            f"{nothing}, constraints or drivers move it: bake them first "
+            "(Object > Animation > Bake Action, with Visual Keying)"
+        )
+    if any(path.startswith("pose.bones") for path in paths):
+        return (
+            f"{nothing}, its bones have: let an empty copy the transforms of a bone, bake the empty "
+            "(Object > Animation > Bake Action, with Visual Keying), and reduce that"
+        )
+    return f"{nothing}: there is nothing to reduce"
+
+
+def _driven(obj: bpy.types.Object) -> list[str]:
+    return [] if obj.animation_data is None else [driver.data_path for driver in obj.animation_data.drivers]

@@ -1,0 +1,153 @@
+"""A screw that is edited by hand: keys moved and inserted, undone, played, baked and un-baked, every pose checked.
+
+What is on the screen is held against `tests.animation.oracle` on every frame, after every edit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+from tests.animation.oracle import assert_shown, curves_of, expected_worlds, key_frames, shown_worlds, snapshot
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+
+FRAMES = (1, 20, 40)
+WHOLE = range(1, 61)
+SCREW = "dq_sclerp"
+
+ALIKE = 1e-5
+"""What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
+
+HALF_WAY = 0.3
+"""How far, in metres, the screw of these keys is at least from Blender's own way half-way between them."""
+
+
+def cube() -> bpy.types.Object:
+    """The default cube, asked for anew each time: undo replaces it."""
+    return bpy.data.objects["Cube"]
+
+
+def key_the_cube() -> None:
+    """Three keys, each a move with a turn about an axis that leans."""
+    obj = cube()
+    obj.rotation_mode = "QUATERNION"
+    for frame, location, angle in zip(FRAMES, ((-3, 0, 0), (0, 1, 1), (3, -1, 0)), (0, 1.8, 3.4), strict=True):
+        obj.location = location
+        obj.rotation_quaternion = (math.cos(angle / 2), 0.6 * math.sin(angle / 2), 0, 0.8 * math.sin(angle / 2))
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_quaternion", frame=frame)
+    bpy.context.scene.frame_set(10)
+    bpy.ops.ed.undo_push(message="Keys")
+
+
+def shown() -> np.ndarray:
+    """The cube's world matrices on all frames."""
+    return shown_worlds([cube()], WHOLE)[0]
+
+
+def assert_on_the_screw(*frames: float) -> None:
+    """The cube has keys on these frames, and between them it goes the way of the screw."""
+    assert key_frames(cube()).tolist() == list(frames), key_frames(cube())
+    assert cube().rigid_motion.mode == SCREW
+    assert_shown([cube()], WHOLE)
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator chooses the screw for the cube, edits its keys, watches it, and bakes it."""
+    hand.window.workspace = bpy.data.workspaces["Animation"]
+    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
+    key_the_cube()
+    native = shown()
+
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.pie("T", "E", alt=True)
+    assert_on_the_screw(*FRAMES)
+    assert np.linalg.norm((shown() - native)[9, :3, 3]) > HALF_WAY, "the screw is not Blender's own way"
+
+    yield from moved(hand, sheet)
+    yield from inserted(hand, view, sheet)
+    yield from played(hand, view)
+    yield from baked(hand, sheet)
+
+
+def moved(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
+    """The key in the middle comes later; undone and redone."""
+    before = shown()
+    yield from hand.click(places.key(sheet, 20))
+    yield from hand.press("G")
+    yield from hand.glide(places.key(sheet, 28))
+    yield from hand.click()
+    assert_on_the_screw(1, 28, 40)
+    after = shown()
+    assert np.abs(after - before).max() > HALF_WAY
+    yield from hand.picture("key-moved")
+
+    yield from hand.press("Z", ctrl=True)
+    assert_on_the_screw(*FRAMES)
+    np.testing.assert_allclose(shown(), before, atol=ALIKE)
+    yield from hand.press("Z", ctrl=True, shift=True)
+    assert_on_the_screw(1, 28, 40)
+    np.testing.assert_allclose(shown(), after, atol=ALIKE)
+
+
+def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
+    """A key at the playhead keeps the pose on the screen; undone, the keys around it are as they were."""
+    keys, before = snapshot(cube()), shown()
+    yield from hand.click(places.playhead(sheet, 15))
+    assert bpy.context.scene.frame_current == 15, bpy.context.scene.frame_current
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("I")
+    assert_on_the_screw(1, 15, 28, 40)
+    np.testing.assert_allclose(shown()[14], before[14], atol=ALIKE)
+    stored = [curves_of(cube())["location", axis].evaluate(15) for axis in range(3)]
+    np.testing.assert_allclose(stored, before[14, :3, 3], atol=ALIKE)
+    yield from hand.picture("key-inserted")
+
+    yield from hand.press("Z", ctrl=True)
+    assert_on_the_screw(1, 28, 40)
+    assert snapshot(cube()) == keys
+    np.testing.assert_allclose(shown(), before, atol=ALIKE)
+
+
+def played(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """While it plays, each frame that comes by shows the cube where the screw has it."""
+    scene = bpy.context.scene
+    expected = expected_worlds(cube(), range(1, scene.frame_end + 1))
+    seen: dict[int, np.ndarray] = {}
+
+    def note() -> bool:
+        seen[scene.frame_current] = np.array(cube().matrix_world)
+        return len(seen) > 8
+
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("SPACE")
+    assert bpy.context.screen.is_animation_playing
+    yield from hand.wait_until(note, "eight frames are played")
+    yield from hand.press("SPACE")
+    assert not bpy.context.screen.is_animation_playing
+    for frame, matrix in seen.items():
+        np.testing.assert_allclose(matrix, expected[frame - 1], atol=ALIKE, err_msg=f"frame {frame}")
+
+
+def baked(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
+    """By the pie of the Dope Sheet, and back from its Key menu: the same poses all the while."""
+    keys, before = snapshot(cube()), shown()
+    yield from hand.hover(places.key(sheet, 100))
+    yield from hand.pie("T", "S", alt=True)
+    yield from hand.press("RET")
+    assert key_frames(cube()).tolist() == list(range(1, 41)), key_frames(cube())
+    types = [key.type for key in curves_of(cube())["location", 0].keyframe_points]
+    assert [frame for frame, kind in enumerate(types, 1) if kind != "GENERATED"] == [1, 28, 40]
+    assert not any(path.startswith("delta_") for path, _ in curves_of(cube()))
+    np.testing.assert_allclose(shown(), before, atol=ALIKE)
+    yield from hand.picture("baked")
+
+    yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
+    yield from hand.choose("Un-Bake")
+    assert_on_the_screw(1, 28, 40)
+    assert snapshot(cube()) == keys
+    np.testing.assert_allclose(shown(), before, atol=ALIKE)

@@ -1,0 +1,344 @@
+"""Each mode's character in a small scene: what the pages in docs/ show, and that it is so.
+
+In every scene bodies go from key to key, with ghosts of them on the way and their paths drawn by the overlay. What a
+picture is meant to show is measured on the poses that Blender evaluates, before it is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Quaternion, Vector
+
+from tests.animation.oracle import assert_shown, curves_of, shown_worlds
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+
+STRAIGHT, SCREW, SMOOTH, BLEND, SPIRAL = "lerp_slerp", "dq_sclerp", "motor_spline", "pga_lerp", "cga_slerp"
+
+SIZE = (960, 480)
+"""Width and height of a picture, in pixels."""
+
+VIEW_SCALE = 1.44
+"""How wide an orthographic viewport sees at a view distance of 1: Blender's sensor of 72 mm before a lens of 50 mm."""
+
+TEXT = 0.045
+"""How high a text is, in widths of the picture."""
+
+Color = tuple[float, float, float]
+NATIVE, MODE = (0.80, 0.80, 0.80), (0.20, 0.72, 1.0)
+"""The overlay's colours for Blender's own path and for a mode's, as on the screen."""
+
+WOOD, METAL, STAND = (0.72, 0.48, 0.26), (0.55, 0.58, 0.62), (0.30, 0.31, 0.33)
+
+GHOST = 0.22
+"""How opaque a ghost is."""
+
+Box = tuple[Sequence[float], Sequence[float]]
+"""Middle and size."""
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """A lid, a hammer, a stick that is thrown, a dart on a winding way, hands of a clock, and a growing spiral."""
+    bpy.context.preferences.view.ui_scale = 1.5  # pages show pictures smaller than they are
+    yield 1.0
+    view = hand.area("VIEW_3D")
+    settle(view)
+    for shot in (lid, hammer, throw, flight, half_turn, spiral):
+        bpy.data.batch_remove([*bpy.data.objects, *bpy.data.curves])
+        bpy.context.scene.rigid_motion_overlay.tick_step = 2
+        width = shot(view)
+        bpy.context.scene.rigid_motion_overlay.show_paths = True
+        yield
+        yield from picture(hand, view, shot.__name__.replace("_", "-"), width)
+
+
+def settle(view: bpy.types.Area) -> None:
+    """A calm viewport: bodies in their own colours, and nothing but the paths drawn over them."""
+    space = view.spaces.active
+    space.show_gizmo = space.show_region_toolbar = space.show_region_ui = False
+    space.shading.color_type = "OBJECT"
+    overlay = space.overlay
+    for name in ("floor", "axis_x", "axis_y", "cursor", "text", "outline_selected", "object_origins", "stats"):
+        setattr(overlay, f"show_{name}", False)
+    settings = bpy.context.scene.rigid_motion_overlay
+    settings.show_axes = False
+
+
+def picture(hand: Hand, view: bpy.types.Area, name: str, width: float) -> Steps[None]:
+    """Keep the middle of the viewport, in which so much of the scene is to be seen from side to side."""
+    part = places.region(view)
+    space = view.spaces.active.region_3d
+    for text in bpy.data.curves:
+        text.size = TEXT * width
+    space.view_distance = width * max(part.width, part.height) / SIZE[0] / VIEW_SCALE
+    yield
+    pixels = yield from hand.picture(name, places.box_around(places.centre(part), *SIZE))
+    drawn = (np.abs(pixels / 255 - MODE).max(axis=2) < 0.02).sum()
+    assert drawn > 200, f"{name}: {drawn} pixels of a path"
+
+
+# Scenes: each builds itself, says what has to be true, aims the viewport, and returns how wide it is
+
+
+def lid(view: bpy.types.Area) -> float:
+    """The lid of a chest, with its origin in its middle. By the screw it stays in its hinge."""
+    aim(view, (80, 0, 16), (0.35, 0, 0.34))
+    body("Chest", STAND, ((0.6, 0, -0.3), (1.2, 0.7, 0.58)))
+    cover = body("Lid", WOOD, ((0, 0, 0), (1.2, 0.7, 0.1)), ((0.62, 0, 0), (0.05, 0.12, 0.1)))
+    for frame, angle in ((1, 0.0), (25, -110.0)):
+        turn = Quaternion((0, 1, 0), math.radians(angle))
+        key(cover, frame, turn @ Vector((0.6, 0, 0.05)), turn)
+    native = shown(cover)
+    choose(cover, SCREW)
+    hinge = (-0.6, 0, -0.05)
+    assert stray(native, hinge) > 0.2, "Blender's own lid leaves its hinge"
+    assert stray(shown(cover), hinge) < 1e-5, "the screw's does not"
+    ghosts(cover, native, NATIVE, (13,))
+    ghosts(cover, shown(cover), MODE, (8, 13, 18))
+    label("Blender", (-0.42, -0.4, -0.16), NATIVE, view)
+    label("Screw", (0.86, -0.4, 0.74), MODE, view)
+    bpy.context.scene.frame_set(25)
+    return 4.0
+
+
+def hammer(view: bpy.types.Area) -> float:
+    """A hammer that is swung about a wrist, with its origin in the head. By the screw it stays in the hand."""
+    aim(view, (90, 0, 0), (0, 0, 0.38))
+    wrist, grip = Vector((0, 0, 0)), Vector((0, 0, -1.0))
+    tool = body("Hammer", WOOD, ((0, 0, -0.5), (0.07, 0.07, 1.1)), ((0, 0, 0.02), (0.4, 0.16, 0.17)))
+    for frame, angle in ((1, -70.0), (25, 65.0)):
+        turn = Quaternion((0, 1, 0), math.radians(angle))
+        key(tool, frame, wrist - turn @ grip, turn)
+    native = shown(tool)
+    choose(tool, STRAIGHT)
+    straight = shown(tool)
+    choose(tool, SCREW)
+    assert stray(native, grip) > 0.5
+    assert stray(straight, grip) > 0.5, "along a straight line the grip leaves the hand too"
+    assert stray(shown(tool), grip) < 1e-5
+    ghosts(tool, straight, NATIVE, (9, 13, 17))
+    ghosts(tool, shown(tool), MODE, (9, 13, 17))
+    body("Hand", STAND, (wrist, (0.16, 0.3, 0.16)))
+    label("Screw", (0, 0, 1.15), MODE, view)
+    label("Blender,\nVector + Quaternion", (-1.08, 0, 0.1), NATIVE, view)
+    bpy.context.scene.frame_set(25)
+    return 3.9
+
+
+def throw(view: bpy.types.Area) -> float:
+    """A stick that flies and turns. Its middle flies straight with Vector + Quaternion, and bends with the screw."""
+    aim(view, (90, 0, 0), (0, 0, 0.77))
+    sticks = [body(name, METAL, ((0, 0, 0), (0.9, 0.08, 0.08)), ((0.4, 0, 0), (0.16, 0.12, 0.12))) for name in "AB"]
+    for stick, mode in zip(sticks, (STRAIGHT, SCREW), strict=True):
+        for frame, x, angle in ((1, -1.6, 0.0), (25, 1.6, 150.0)):
+            key(stick, frame, (x, 0, 0.3), Quaternion((0, 1, 0), math.radians(angle)))
+        choose(stick, mode)
+        color = MODE if mode == STRAIGHT else NATIVE
+        ghosts(stick, shown(stick), color, (1, 7, 13, 19, 25))
+    straight, bent = (shown(stick)[:, 2, 3] for stick in sticks)
+    assert np.ptp(straight) < 1e-5
+    assert np.ptp(bent) > 0.8
+    show_chosen_paths()
+    label("Vector + Quaternion", (0, 0, -0.28), MODE, view)
+    label("Screw", (-0.7, 0, 1.02), MODE, view)
+    bpy.context.scene.frame_set(1)
+    return 5.0
+
+
+def flight(view: bpy.types.Area) -> float:
+    """Two darts with the same four keys. The smooth screw has no corner at them."""
+    aim(view, (0, 0, 0), (0, -0.1, 0))
+    sharpest = {}
+    for mode, x, name in ((SCREW, -1.25, "Screw"), (SMOOTH, 1.25, "Smooth Screw")):
+        dart = body(name, METAL, ((0, 0, 0), (0.34, 0.06, 0.06)), ((-0.15, 0, 0), (0.1, 0.22, 0.03)))
+        for frame, place, heading in (
+            (0, (x - 0.95, -0.5, 0), 60),
+            (12, (x - 0.4, 0.5, 0), 20),
+            (24, (x + 0.3, -0.35, 0), 0),
+            (36, (x + 0.95, 0.5, 0), 45),
+        ):
+            key(dart, frame, place, Quaternion((0, 0, 1), math.radians(heading)))
+        run_evenly(dart)
+        choose(dart, mode)
+        sharpest[mode] = sharpest_bend(shown(dart))
+        ghosts(dart, shown(dart), MODE, range(4, 37, 3))
+        label(name, (x, -0.95, 0), MODE, view)
+    assert sharpest[SCREW] > 60.0, sharpest
+    assert sharpest[SMOOTH] < 30.0, sharpest
+    show_chosen_paths()
+    bpy.context.scene.rigid_motion_overlay.tick_step = 3
+    bpy.context.scene.frame_set(0)
+    return 4.9
+
+
+def half_turn(view: bpy.types.Area) -> float:
+    """Two hands of clocks that turn nearly half round. The screw's goes evenly, the blend's hurries in the middle."""
+    aim(view, (90, 0, 0), (0, 0, 0.35))
+    pace = {}
+    for mode, x, name in ((SCREW, -1.25, "Screw"), (BLEND, 1.25, "Motor Blend")):
+        pivot, tip = Vector((x, 0, 0)), Vector((0, 0, 1.0))
+        pointer = body(name, METAL, ((0, 0, -0.5), (0.05, 0.05, 1.0)))
+        for frame, angle in ((0, -89.0), (24, 89.0)):
+            turn = Quaternion((0, 1, 0), math.radians(angle))
+            key(pointer, frame, pivot + turn @ tip, turn)
+        run_evenly(pointer)
+        choose(pointer, mode)
+        body("Pivot", STAND, (pivot, (0.14, 0.14, 0.14)))
+        ghosts(pointer, shown(pointer), MODE, range(4, 25, 3))
+        label(name, (x, 0, -0.35), MODE, view)
+        pace[mode] = np.linalg.norm(np.diff(shown(pointer)[:, :3, 3], axis=0), axis=1)
+    assert np.ptp(pace[SCREW]) < 1e-4
+    assert pace[BLEND].max() > 1.8 * pace[BLEND].min(), pace[BLEND]
+    show_chosen_paths()
+    bpy.context.scene.rigid_motion_overlay.tick_step = 3
+    bpy.context.scene.frame_set(0)
+    return 4.9
+
+
+def spiral(view: bpy.types.Area) -> float:
+    """A block that grows by the same factor as its distance from a middle. By the spiral it does so all the time."""
+    aim(view, (40, 0, 0), (-0.05, 0.1, 0))
+    block = body("Block", WOOD, ((0, 0, 0), (0.6, 0.6, 0.6)))
+    turn = Quaternion((0, 0, 1), math.radians(130.0))
+    place, scale, turned = Vector((0.28, 0, 0)), 0.22, Quaternion()
+    for frame in (1, 17, 33, 49):
+        key(block, frame, place, turned, scale=scale)
+        place, scale, turned = 1.75 * (turn @ place), 1.75 * scale, turn @ turned
+    native = shown(block)
+    choose(block, SPIRAL)
+    assert np.ptp(shares(native)) > 0.2 * shares(native).mean()
+    assert np.ptp(shares(shown(block))) < 1e-4 * shares(native).mean()
+    body("Middle", STAND, ((0, 0, 0), (0.06, 0.06, 0.3)))
+    ghosts(block, shown(block), MODE, (9, 17, 22, 27, 33, 37, 41))
+    label("Versor Spiral", (-1.45, -0.95, 0.2), MODE, view)
+    label("Blender", (0.53, 0.43, 0.2), NATIVE, view)
+    bpy.context.scene.frame_set(49)
+    return 5.0
+
+
+# What they are built of
+
+
+def aim(view: bpy.types.Area, degrees: Sequence[float], middle: Sequence[float]) -> None:
+    """Look at a point from a direction, which is given as the rotation of a camera."""
+    space = view.spaces.active.region_3d
+    space.view_perspective = "ORTHO"
+    space.view_rotation = Euler([math.radians(angle) for angle in degrees]).to_quaternion()
+    space.view_location = middle
+
+
+def body(name: str, color: Color, *boxes: Box) -> bpy.types.Object:
+    """A body of boxes around its origin."""
+    corners, faces = [], []
+    for middle, size in boxes:
+        first = len(corners)
+        unit = [(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]
+        corners += [[m + s * u for m, s, u in zip(middle, size, corner, strict=True)] for corner in unit]
+        sides = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
+        faces += [[first + corner for corner in side] for side in sides]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], faces)
+    return add(name, mesh, (*linear(color), 1.0))
+
+
+def add(name: str, data: bpy.types.ID, color: Sequence[float]) -> bpy.types.Object:
+    obj = bpy.data.objects.new(name, data)
+    obj.rotation_mode = "QUATERNION"
+    obj.color = color
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def key(
+    obj: bpy.types.Object,
+    frame: int,
+    location: Sequence[float],
+    rotation: Quaternion,
+    scale: float | None = None,
+) -> None:
+    """Key a pose."""
+    obj.location, obj.rotation_quaternion = location, rotation
+    paths = ["location", "rotation_quaternion"]
+    if scale is not None:
+        obj.scale = (scale,) * 3
+        paths.append("scale")
+    for path in paths:
+        obj.keyframe_insert(path, frame=frame)
+
+
+def run_evenly(obj: bpy.types.Object) -> None:
+    """Have no easing between the keys."""
+    for fcurve in curves_of(obj).values():
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
+
+
+def choose(obj: bpy.types.Object, mode: str) -> None:
+    """Give an object a mode, as the animator does, and compare it with Blender's own path."""
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.rigid_motion.set_mode(mode=mode)
+    bpy.context.scene.rigid_motion_overlay.show_native = True
+
+
+def show_chosen_paths() -> None:
+    """Show the paths of all objects that have keys, each in its own mode alone."""
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj.animation_data is not None)
+    bpy.context.scene.rigid_motion_overlay.show_native = False
+
+
+def shown(obj: bpy.types.Object) -> np.ndarray:
+    """The object's world matrices on all frames from its first key to its last, and they are as they have to be."""
+    first, last = (int(frame) for frame in obj.animation_data.action.frame_range)
+    frames = range(first, last + 1)
+    assert_shown([obj], frames)
+    return shown_worlds([obj], frames)[0]
+
+
+def stray(worlds: np.ndarray, point: Sequence[float]) -> float:
+    """How far a point of a body comes away from where it is on the first frame."""
+    way = (worlds @ np.array((*point, 1.0)))[:, :3]
+    return float(np.linalg.norm(way - way[0], axis=1).max())
+
+
+def sharpest_bend(worlds: np.ndarray) -> float:
+    """The most that a path turns from one frame to the next, in degrees."""
+    steps = np.diff(worlds[:, :3, 3], axis=0)
+    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+    alike = np.einsum("ij,ij->i", steps[:-1], steps[1:])
+    return float(np.degrees(np.arccos(np.clip(alike, -1.0, 1.0))).max())
+
+
+def shares(worlds: np.ndarray) -> np.ndarray:
+    """How far away from the middle a body is, in its own sizes."""
+    return np.linalg.norm(worlds[:, :3, 3], axis=1) / np.linalg.norm(worlds[:, :3, 0], axis=1)
+
+
+def ghosts(obj: bpy.types.Object, worlds: np.ndarray, color: Color, frames: Sequence[int]) -> None:
+    """What the object is like on these frames, counted from its first, which is 1, to be seen through."""
+    for frame in frames:
+        ghost = add("Ghost", obj.data, (*linear(color), GHOST))
+        ghost.matrix_world = Matrix(worlds[frame - 1])
+
+
+def label(text: str, place: Sequence[float], color: Color, view: bpy.types.Area) -> None:
+    """A text that faces the viewer, with its middle at a place; of one height in all pictures, once they are framed."""
+    data = bpy.data.curves.new(text, "FONT")
+    data.body = text
+    data.align_x, data.align_y = "CENTER", "CENTER"
+    # Light falls on it as on everything, so it is given more than it is to show.
+    obj = add(text, data, (*(1.6 * part for part in linear(color)), 1.0))
+    obj.location, obj.rotation_quaternion = place, view.spaces.active.region_3d.view_rotation
+    obj.show_in_front = True
+
+
+def linear(color: Color) -> Color:
+    """A colour as on the screen, in the linear form that objects have."""
+    return tuple(part**2.2 for part in color)

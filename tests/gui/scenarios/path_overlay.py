@@ -1,0 +1,151 @@
+"""The paths of the cube on the screen: shown from the panel, compared, hidden, and kept up with when keys are moved.
+
+That they are drawn, and in their colours, is counted in the pixels of the screen.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+
+FRAMES = (1, 30, 50)
+Color = tuple[float, float, float]
+NATIVE, MODE, SELECTED = (0.80, 0.80, 0.80), (0.20, 0.72, 1.0), (1.0, 0.75, 0.20)
+"""The overlay's colours, as the preferences have them at first."""
+
+
+def cube() -> bpy.types.Object:
+    """The default cube, asked for anew each time: undo replaces it."""
+    return bpy.data.objects["Cube"]
+
+
+def key_the_cube() -> None:
+    """A way along x that turns a lot, with keys that are not selected."""
+    obj = cube()
+    obj.rotation_mode = "QUATERNION"
+    obj.scale = (0.4, 0.6, 0.25)
+    places_and_turns = zip(
+        FRAMES, ((-3, -1, 0), (1, 1, 1), (3, -2, 0)), ((0, 0, 0), (0, 0, 2.6), (2, 0, 2)), strict=True
+    )
+    for frame, location, (x, y, z) in places_and_turns:
+        angle = math.hypot(x, y, z)
+        axis = np.array((x, y, z)) / (angle or 1.0)
+        obj.location = location
+        obj.rotation_quaternion = (math.cos(angle / 2), *(math.sin(angle / 2) * axis))
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_quaternion", frame=frame)
+    bpy.context.scene.frame_set(12)
+
+
+def look(hand: Hand, view: bpy.types.Area, name: str) -> Steps[dict[Color, int]]:
+    """Keep a picture of the viewport, and count its pixels of each of the overlay's colours."""
+    part = places.region(view)
+    pixels = yield from hand.picture(name, places.box(part))
+    # The sidebar and the rotation gizmo are drawn over the right of the viewport.
+    shown = pixels[:, : part.width * 2 // 3] / 255
+    return {color: int((np.abs(shown - color).max(axis=2) < 0.02).sum()) for color in (NATIVE, MODE, SELECTED)}
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator looks at the cube's way, sees what a screw would make of it, plays, and puts it all out of sight."""
+    key_the_cube()
+    for screen in bpy.data.screens:
+        for area in screen.areas:
+            if area.type == "VIEW_3D":
+                area.spaces.active.region_3d.view_distance = 12
+    yield from shown_from_the_panel(hand, hand.area("VIEW_3D"))
+    yield from hidden(hand, hand.area("VIEW_3D"))
+
+    hand.window.workspace = bpy.data.workspaces["Animation"]
+    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    yield from beside_the_dope_sheet(hand, hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR"))
+
+
+def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Blender's path alone, and then beside that of a mode that nobody has chosen yet."""
+    settings = bpy.context.scene.rigid_motion_overlay
+    without = yield from look(hand, view, "without")
+    assert without[MODE] == 0, without
+
+    yield from hand.open_sidebar(view, "Animation")
+    show = yield from hand.find_button(view, "UI", "show_paths")
+    yield from hand.click(show)
+    assert settings.show_paths
+    seen = yield from look(hand, view, "native")
+    assert seen[NATIVE] > without[NATIVE] + 100, seen
+    assert seen[MODE] == 0, "no mode is chosen yet"
+
+    mode = yield from hand.find_button(view, "UI", "rigid_motion_overlay.mode")
+    yield from hand.click(mode)
+    yield from hand.picture("modes-to-compare")
+    yield from hand.choose_row(2)
+    assert settings.mode == "dq_sclerp", settings.mode
+    seen = yield from look(hand, view, "compared")
+    assert seen[MODE] > 300, seen
+    assert seen[NATIVE] > without[NATIVE] + 100, seen
+    assert cube().rigid_motion.mode == "BLENDER", "looking changes nothing"
+    x, y, width, height = places.box(places.region(view))
+    yield from hand.picture("path-and-panel", (x + width - 860, y + height - 660, 860, 440))
+
+
+def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """With all overlays, with Blender's own path alone, and with the object."""
+    settings = bpy.context.scene.rigid_motion_overlay
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("Z", shift=True, alt=True)
+    assert not view.spaces.active.overlay.show_overlays
+    seen = yield from look(hand, view, "overlays-off")
+    assert seen[MODE] == 0, seen
+    yield from hand.press("Z", shift=True, alt=True)
+
+    both = yield from look(hand, view, "overlays-on")
+    native = yield from hand.find_button(view, "UI", "show_native")
+    yield from hand.click(native)
+    assert not settings.show_native
+    seen = yield from look(hand, view, "mode-alone")
+    assert seen[MODE] > 300, seen
+    assert seen[NATIVE] < both[NATIVE] - 100, (seen, both)
+    yield from hand.click(native)
+    show = yield from hand.find_button(view, "UI", "show_paths")
+    yield from hand.click(show)
+    seen = yield from look(hand, view, "switched-off")
+    assert seen[MODE] == 0, seen
+    yield from hand.click(show)
+
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("H")
+    assert cube().hide_get()
+    seen = yield from look(hand, view, "cube-hidden")
+    assert seen[MODE] == 0, seen
+    yield from hand.press("H", alt=True)
+    seen = yield from look(hand, view, "shown-again")
+    assert seen[MODE] > 300, seen
+
+
+def beside_the_dope_sheet(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[None]:
+    """A key that is selected or moved there is so in the viewport, and playing leaves the path."""
+    yield from hand.hover(places.centre(places.region(sheet)))
+    yield from hand.press("A", alt=True)
+    seen = yield from look(hand, view, "no-key-selected")
+    assert seen[SELECTED] == 0, seen
+    yield from hand.click(places.key(sheet, FRAMES[1]))
+    seen = yield from look(hand, view, "key-selected")
+    assert seen[SELECTED] > 20, seen
+
+    yield from hand.press("G")
+    yield from hand.glide(places.key(sheet, FRAMES[1] + 12))
+    yield from hand.click()
+    seen = yield from look(hand, view, "key-moved")
+    assert seen[SELECTED] > 20, seen
+
+    before = bpy.context.scene.frame_current
+    yield from hand.press("SPACE")
+    yield from hand.wait_until(lambda: bpy.context.scene.frame_current > before + 3, "playback goes on")
+    yield from hand.press("SPACE")
+    seen = yield from look(hand, view, "played")
+    assert seen[MODE] > 100, seen
