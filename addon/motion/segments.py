@@ -116,9 +116,9 @@ class Segments:
         Where nothing turns there is no axis: n is zero, and the whole chord is across.
         """
         (mw, *m), (dw, *d) = self.middle, self.difference
-        n = mw * np.stack(d) - dw * np.stack(m) - _cross(d, m)
+        n = mw * np.stack(d) - dw * np.stack(m) - twists.cross(d, m)
         along = n * np.einsum("ks,ks->s", n, self.chord)
-        return along, self.chord - along, _cross(n, self.chord)
+        return along, self.chord - along, twists.cross(n, self.chord)
 
 
 Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, "np.ndarray | None"]]
@@ -306,10 +306,6 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
 def _components(vectors: np.ndarray) -> np.ndarray:
     """Vectors (..., k) one after the other as components (k, S)."""
     return np.ascontiguousarray(vectors.reshape(-1, vectors.shape[-1]).T)
-
-
-def _cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
 def _length(components: np.ndarray) -> np.ndarray:

@@ -9,6 +9,8 @@ Source: Murray, Li and Sastry, "A Mathematical Introduction to Robotic Manipulat
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .quaternions import conjugate, multiply, rotate
@@ -39,8 +41,8 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     quaternions = np.empty((4, twists.shape[1]))
     quaternions[0] = cosine
     np.multiply(half_sinc, turn, out=quaternions[1:])
-    across = _cross(turn, advance)
-    return quaternions, advance + first * across + second * _cross(turn, across)
+    across = cross(turn, advance)
+    return quaternions, advance + first * across + second * cross(turn, across)
 
 
 def logarithm(quaternions: np.ndarray, translations: np.ndarray) -> np.ndarray:
@@ -59,8 +61,8 @@ def logarithm(quaternions: np.ndarray, translations: np.ndarray) -> np.ndarray:
         (1.0 - 0.5 * far / np.tan(0.5 * far)) / (far * far),
     )
     turn = sign * ratio * quaternions[1:]
-    across = _cross(turn, translations)
-    return np.concatenate((turn, translations - 0.5 * across + bend * _cross(turn, across)))
+    across = cross(turn, translations)
+    return np.concatenate((turn, translations - 0.5 * across + bend * cross(turn, across)))
 
 
 def between(
@@ -71,5 +73,6 @@ def between(
     return logarithm(multiply(back, second).T, rotate(back, second_positions - first_positions).T)
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
+    """The vector product of vectors (3, n)."""
     return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
