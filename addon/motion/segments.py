@@ -15,7 +15,7 @@ A mode's fast form is a function from `Segments` to `Curves`; they are in `addon
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
