@@ -24,11 +24,20 @@ import numpy as np
 from . import twists
 from .piecewise import BLOCK, blocks, combine, is_dense, multiply
 from .poses import Poses
-from .quaternions import align_signs, rotate
+from .quaternions import align_signs
 from .quaternions import multiply as product
 
 STILL = 1e-12
 """Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
+
+LONG = 96
+"""Samples of a segment from which on a series is worth its while, in place of a curve that takes many steps."""
+
+TERMS = 26
+"""Of a series at the most."""
+
+SETTLED = 1e-11
+"""The size of terms that a series does without, compared with its largest."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -245,18 +254,53 @@ def _evaluate(
     `position` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
     """
     all_counts = np.diff(bounds)
-    own = len(numbers)
-    numbers = np.concatenate((numbers, mode.parameters))
-    for segment, sample in blocks(bounds):
+    for segment, sample in blocks(bounds, BLOCK if mode.bends is None else BLOCK // 4):
         counts = all_counts[segment]
-        repeated = np.repeat(numbers[:, segment], counts, axis=1)
-        s = position(sample, *repeated[:own])
-        basis, scales = mode.basis(s, [*repeated[own:]], within)
-        _combine(mode, segment, basis, counts, out[:7, sample])
-        if scales is not None:
-            out[7, sample] = scales
-        if mode.bends is not None:
-            _bend(mode.bends[..., segment], s, within, counts, out[:, sample])
+        s = position(sample, *np.repeat(numbers[:, segment], counts, axis=1))
+        series = None
+        if mode.bends is not None and within and s.size >= LONG * np.count_nonzero(counts):
+            series = _series(mode, segment, len(out))
+        if series is None:
+            _poses(mode, segment, s, within, counts, out[:, sample])
+        else:
+            combine(series, _chebyshev(s, series.shape[1]), counts, out[:, sample])
+
+
+def _poses(mode: Curves, segment: slice, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (7 or 8, n) with what some of the curves are at s (n,), of which the i-th has counts[i]."""
+    parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
+    basis, scales = mode.basis(s, [*parameters], within)
+    _combine(mode, segment, basis, counts, out[:7])
+    if scales is not None:
+        out[7] = scales
+    if mode.bends is not None:
+        _bend(mode.bends[..., segment], s, within, counts, out)
+
+
+def _series(mode: Curves, segment: slice, rows: int) -> np.ndarray | None:
+    """Some of the curves as Chebyshev series, shape (rows, terms, segments); None where they do not settle soon."""
+    segments = segment.stop - segment.start
+    angles = np.pi * (np.arange(TERMS) + 0.5) / TERMS
+    at_nodes = np.empty((rows, segments * TERMS))
+    _poses(mode, segment, np.tile(np.cos(angles), segments), True, np.full(segments, TERMS), at_nodes)
+    # The discrete cosine transform, as a matrix.
+    transform = np.cos(np.outer(np.arange(TERMS), angles)) * 2.0 / TERMS
+    transform[0] *= 0.5
+    series = at_nodes.reshape(rows, segments, TERMS) @ transform.T
+    sizes = np.abs(series).max(axis=0)
+    needed = 2 + int(np.flatnonzero((sizes > SETTLED * sizes.max(axis=1, keepdims=True)).any(axis=0)).max(initial=0))
+    return np.ascontiguousarray(series[..., :needed].transpose(0, 2, 1)) if needed < TERMS else None
+
+
+def _chebyshev(s: np.ndarray, terms: int) -> np.ndarray:
+    """The first Chebyshev polynomials at s (n,), shape (terms, n)."""
+    rows = np.empty((terms, s.size))
+    rows[0], rows[1] = 1.0, s
+    twice = 2.0 * s
+    for term in range(2, terms):
+        np.multiply(twice, rows[term - 1], out=rows[term])
+        rows[term] -= rows[term - 2]
+    return rows
 
 
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
@@ -297,7 +341,9 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
     added = np.empty((len(bends) if len(out) > 7 else 6, s.size))
     combine(bends[: len(added)], functions, counts, added)
     turns, advances = twists.exponential(added[:6])
-    out[:3] += rotate(out[3:7].T, advances.T).T
+    w, xyz = out[3], out[4:7]
+    across = 2.0 * twists.cross(xyz, advances)
+    out[:3] += advances + w * across + twists.cross(xyz, across)
     out[3:7] = product(out[3:7].T, turns.T).T
     if len(out) > 7:
         out[7] *= np.exp(added[6])
