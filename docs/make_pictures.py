@@ -14,6 +14,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
 from addon.motion import MODES
+from scripts.comparison.choices import Uniform
 from scripts.comparison.stage import StageSettings, build_stage
 from scripts.comparison.study import read_clips, reconstruct
 
@@ -26,7 +27,7 @@ def main() -> None:
     settings = StageSettings(resolution=(1280, 720), antialiasing="8")
     for picture, (asset, rate, moment) in STILLS.items():
         (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{asset}.csv")], "blender")
-        scene = build_stage(reconstruct(clip, rate, MODES, radius=0.1), settings)
+        scene = build_stage(reconstruct(clip, Uniform(rate), MODES, radius=0.1), settings)
         if hasattr(scene.render.image_settings, "media_type"):
             scene.render.image_settings.media_type = "IMAGE"
         scene.render.image_settings.file_format = "PNG"

@@ -1,7 +1,8 @@
 """Compare interpolation modes on recorded trajectories.
 
-Of every recording only a few keys a second are kept; each mode fills them in again; what was lost is measured, and
-shown in a video in which the modes move side by side. Without INPUT, the recordings in assets/ are compared.
+Of every recording only a few keys a second are kept, evenly or where the motion needs them; each mode fills them in
+again; what was lost is measured, and shown in a video in which the modes move side by side. Without INPUT, the
+recordings in assets/ are compared.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import shlex
 import sys
 import time
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,10 +29,14 @@ except ImportError as error:
     sys.exit(2)
 
 from addon.motion import MODES
-from scripts.comparison.clips import Clip, Reconstruction
+from scripts.comparison import needed
+from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
+from scripts.comparison.clips import Clip
 from scripts.comparison.film import render_film, save_blend
 from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_reconstruction
+from scripts.comparison.needed import KeysNeeded
 from scripts.comparison.progress import Progress
+from scripts.comparison.reconstructions import Reconstruction
 from scripts.comparison.report import Settings, write_report
 from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings, build_stage
 from scripts.comparison.study import read_clips, reconstruct
@@ -38,6 +44,11 @@ from scripts.comparison.subject import SubjectError, load_subject
 from scripts.comparison.timeline import Timeline
 from scripts.trajectories import TrajectoryError
 from scripts.trajectories.axes import AXES
+
+RATES = "5,10,15,20"
+"""Keys a second where none are asked for."""
+
+KEYS_NEEDED = "keys_needed.csv"
 
 EPILOG = """
 inputs:
@@ -50,10 +61,21 @@ examples:
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
   python scripts/compare.py shot.blend:Camera --no-video
+  python scripts/compare.py take.csv --decimate adaptive --tolerance 5mm
+  python scripts/compare.py take.csv --decimate adaptive --budget 5,10 --rates 10
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
-It writes OUTPUT/report.html (all of it in one file), OUTPUT/metrics.csv, and in OUTPUT/CLIP/RATE/ for every clip and
-rate keys.csv, MODE.csv, comparison.mp4 and comparison.blend. The last line it prints is the path of the report.
+choosing keys:
+  --decimate uniform keeps --rates keys a second, evenly in time and the same for every mode. With --decimate adaptive
+  each mode gets keys of its own among the recorded samples: the fewest that keep its shell error within --tolerance
+  everywhere, or --budget keys a second, on average over the clip, that make its RMS shell error small. Given neither,
+  --rates are the budgets. Rates that are given beside adaptive keys are kept evenly as well, for comparison. The report
+  then also shows the curve of error over keys, and how many keys every mode needs to be as good as lerp_slerp at 30,
+  20, 15 and 12 a second; that alone takes up to a second for every 100 samples.
+
+It writes OUTPUT/report.html (all of it in one file), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv, and
+for every clip and choice of keys a folder (OUTPUT/CLIP/10, /budget-10, /tolerance-5mm) with keys.csv (MODE.keys.csv for
+adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The last line it prints is the path of the report.
 Exit code: 0 done, 1 a video could not be rendered, 2 a wrong input or option, 130 stopped by Ctrl-C; after that the
 report holds what was ready.
 """
@@ -66,7 +88,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings; those in assets/ where none is given")
     parser.add_argument(
-        "--rates", type=_rates, default="5,10,15,20", metavar="HZ,...", help="keys a second that are kept (%(default)s)"
+        "--rates", type=_amounts(Uniform), metavar="HZ,...", help=f"keys a second that are kept ({RATES})"
     )
     parser.add_argument(
         "--modes", type=_modes, default=",".join(MODES), metavar="MODE,...", help="what fills them in (%(default)s)"
@@ -77,6 +99,22 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--axes", choices=AXES, default="blender", help="axes of the recordings (%(default)s)")
     parser.add_argument(
         "--radius", type=_positive, default=0.1, metavar="M", help="of the shell error, in metres (%(default)s)"
+    )
+    keys = parser.add_argument_group("choosing keys")
+    keys.add_argument(
+        "--decimate",
+        choices=("uniform", "adaptive"),
+        default="uniform",
+        help="keep keys evenly in time, or where each mode needs them (%(default)s)",
+    )
+    keys.add_argument(
+        "--tolerance",
+        type=_amounts(Tolerance),
+        metavar="LENGTH,...",
+        help="largest shell error of adaptive keys: 5mm, 0.5cm, 0.005m; a plain number is in the recording's unit",
+    )
+    keys.add_argument(
+        "--budget", type=_amounts(Budget), metavar="HZ,...", help="adaptive keys a second, on average over the clip"
     )
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
@@ -111,12 +149,33 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         )
     except ValueError as error:
         parser.error(str(error))
+    try:
+        options.choices = _choices(options)
+    except ValueError as error:
+        parser.error(str(error))
     if not options.inputs:
         assets = ROOT / "assets"
         if Path.cwd() == ROOT:
             assets = assets.relative_to(ROOT)
         options.inputs = [str(path) for path in sorted(assets.glob("*.csv"))]
     return options
+
+
+def _choices(options: argparse.Namespace) -> list[Choice]:
+    """All choices of keys of the run. Raises ValueError for options that do not go together."""
+    rates, tolerance, budget = options.rates, options.tolerance, options.budget
+    if options.decimate == "uniform":
+        for option, given in (("--tolerance", tolerance), ("--budget", budget)):
+            if given:
+                raise ValueError(f"{option} is for keys that are chosen by the motion: add --decimate adaptive")
+        return rates or _amounts(Uniform)(RATES)
+    if tolerance and budget:
+        raise ValueError(
+            "--tolerance and --budget exclude one another: a tolerance decides how many keys there are, a budget how "
+            "large the error is; give one of them"
+        )
+    by_motion = tolerance or budget or [Budget(rate.written) for rate in rates or _amounts(Uniform)(RATES)]
+    return [*(rates or []), *by_motion]
 
 
 def main(arguments: list[str]) -> int:
@@ -144,6 +203,8 @@ def main(arguments: list[str]) -> int:
         run = _Run(options, progress, shlex.join(["compare.py", *arguments]))
         try:
             run.measure(clips)
+            if options.decimate == "adaptive":
+                run.count_keys()
             if run.reconstructions and not options.no_video:
                 run.film()
         except KeyboardInterrupt:
@@ -153,7 +214,8 @@ def main(arguments: list[str]) -> int:
             return 2
         if not run.reconstructions:
             if not run.interrupted:
-                progress.note("compare.py: every clip is too short for two keys at these rates; give higher --rates")
+                higher = "--budget" if options.budget else "--rates"
+                progress.note(f"compare.py: every clip is too short for two keys at these rates; give higher {higher}")
             return 130 if run.interrupted else 2
         report = run.report()
     seconds = time.perf_counter() - started
@@ -173,19 +235,22 @@ class _Run:
     def __init__(self, options: argparse.Namespace, progress: Progress, command: str) -> None:
         self.options, self.progress, self.command = options, progress, command
         self.reconstructions: list[Reconstruction] = []
+        self.needed: list[KeysNeeded] = []
         self.films: dict[tuple[str, str], Path] = {}
         self.rendering = 0.0
         self.failed = self.interrupted = False
 
     def measure(self, clips: list[Clip]) -> None:
         """All numbers first: they take seconds, and are there whatever becomes of the videos."""
-        with self.progress.stage("Measuring", len(clips) * len(self.options.rates)) as stage:
+        # What an earlier run found must not pass for a finding of this.
+        (self.options.output / KEYS_NEEDED).unlink(missing_ok=True)
+        with self.progress.stage("Measuring", len(clips) * len(self.options.choices)) as stage:
             for clip in clips:
-                for rate in self.options.rates:
-                    stage.say(f"{clip.name} at {rate} keys/s")
-                    made = reconstruct(clip, rate, self.options.modes, self.options.radius)
+                for choice in self.options.choices:
+                    stage.say(f"{clip.name} {choice.phrase}")
+                    made = reconstruct(clip, choice, self.options.modes, self.options.radius)
                     if made is None:
-                        self.progress.note(f"{clip.name}: too short for two keys at {rate} a second; left out")
+                        self.progress.note(f"{clip.name}: too short for two keys at {choice.rate} a second; left out")
                     else:
                         write_reconstruction(self._folder(made), made)
                         self.reconstructions.append(made)
@@ -193,19 +258,28 @@ class _Run:
         rows = [row for made in self.reconstructions for row in measure_reconstruction(made)]
         write_metrics(self.options.output / "metrics.csv", rows)
 
+    def count_keys(self) -> None:
+        """How many keys every mode needs, on the clips that there are reconstructions of."""
+        clips = {made.clip.name: made.clip for made in self.reconstructions}
+        with self.progress.stage("Counting the keys needed", len(clips) * len(needed.RATES)) as stage:
+            for clip in clips.values():
+                stage.say(clip.name)
+                self.needed.append(needed.keys_needed(clip, self.options.modes, self.options.radius, stage.advance))
+        needed.write_keys_needed(self.options.output / KEYS_NEEDED, self.needed)
+
     def film(self) -> None:
-        """A .blend and an MP4 for every clip and rate."""
+        """A .blend and an MP4 for every clip and choice of keys."""
         self.films = {
-            (made.clip.name, made.rate): self._folder(made) / "comparison.mp4" for made in self.reconstructions
+            (made.clip.name, made.choice.name): self._folder(made) / "comparison.mp4" for made in self.reconstructions
         }
         count = sum(
             Timeline.of(made, self.options.fps, self.options.slow_motion).count for made in self.reconstructions
         )
         with self.progress.stage("Rendering", count) as stage:
             for made in self.reconstructions:
-                title = f"{made.clip.name} at {made.rate} keys/s"
+                title = f"{made.clip.name} {made.choice.phrase}"
                 stage.say(title)
-                path = self.films[made.clip.name, made.rate]
+                path = self.films[made.clip.name, made.choice.name]
                 path.unlink(missing_ok=True)  # A film of an earlier run must not pass for one of this.
                 try:
                     scene = build_stage(made, self.options.stage)
@@ -234,20 +308,24 @@ class _Run:
                 "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
             },
         )
-        write_report(path, self.reconstructions, films=self.films, settings=settings)
+        write_report(path, self.reconstructions, films=self.films, settings=settings, needed=self.needed)
         return path.resolve()
 
     def _folder(self, made: Reconstruction) -> Path:
-        return self.options.output / made.clip.name / made.rate
+        return self.options.output / made.clip.name / made.choice.name
 
 
-def _rates(text: str) -> list[str]:
-    """Rates as written: each is the name of a folder as well."""
-    rates = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
-    wrong = [rate for rate in rates if not re.fullmatch(r"\d{1,6}(\.\d{1,6})?", rate, re.ASCII) or float(rate) <= 0.0]
-    if wrong or not rates:
-        raise argparse.ArgumentTypeError(f"{wrong[0] if wrong else text!r} is no rate; give numbers such as 5,7.5,10")
-    return rates
+def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
+    """How a list of amounts is read: each as a choice of that kind."""
+
+    def parse_amounts(text: str) -> list[Choice]:
+        written = ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]
+        try:
+            return [kind(amount) for amount in dict.fromkeys(written)]
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parse_amounts
 
 
 def _modes(text: str) -> list[str]:

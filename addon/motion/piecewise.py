@@ -51,6 +51,8 @@ def multiply(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, ou
     changes = np.flatnonzero(counts[1:] != counts[:-1]) + 1
     begin = 0
     for first, last in itertools.pairwise((0, *changes.tolist(), len(counts))):
+        if counts[first] == 0:
+            continue
         shape = (-1, last - first, int(counts[first]))
         end = begin + shape[1] * shape[2]
         np.matmul(

@@ -33,10 +33,10 @@ STILL = 1e-12
 LONG = 96
 """Samples of a segment from which on a series is worth its while, in place of a curve that takes many steps."""
 
-TERMS = 26
+TERMS = 32
 """Of a series at the most."""
 
-SETTLED = 1e-11
+SETTLED = 1e-13
 """The size of terms that a series does without, compared with its largest."""
 
 SMALLEST_ANGLE = 1e-150

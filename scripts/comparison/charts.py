@@ -9,7 +9,7 @@ and the gutters around the plot come from the page (`page/page.css`), which is h
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,12 @@ COLUMNS = 500
 
 GRID_X, GRID_Y = 5000, 2000
 """The curves' coordinates are whole numbers up to these: a tenth of a pixel, and short to write."""
+
+STROKE = 70
+"""The height of marks, in the coordinates of curves."""
+
+STROKE_GAP = 10
+"""Between rows of marks, in the same."""
 
 LINE_OF_TEXT = 15
 """In pixels, in labels."""
@@ -39,6 +45,19 @@ class Curve:
     y: np.ndarray
     colour: str
     """#rrggbb"""
+
+    dashed: bool = False
+    """Drawn with dashes, for a companion of another curve in its colour, that one's label standing for both."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Values of x that get a short stroke above the axis."""
+
+    x: np.ndarray
+
+    colour: str | None = None
+    """#rrggbb, or that of the soft ink of the page."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +104,13 @@ def axis_over(name: str, unit: str, values: np.ndarray, *, log: bool = False) ->
         low, high = low - 0.05 * (high - low), high + 0.05 * (high - low)
         high = high if high > low else low + 1.0
     return Axis(name, unit, float(low), float(high), log)
+
+
+def with_rows_below(axis: Axis, rows: int) -> Axis:
+    """A linear axis from 0 on that has room below 0 for so many rows of marks, where no curve covers them."""
+    share = (rows * (STROKE + STROKE_GAP) + STROKE_GAP) / GRID_Y
+    low = -axis.high * share / (1.0 - share)
+    return replace(axis, low=low, ticks=tuple(nice_ticks(0.0, axis.high).tolist()))
 
 
 def nice_ticks(low: float, high: float, count: int = 5) -> np.ndarray:
@@ -140,7 +166,8 @@ def line_chart(
     y: Axis,
     *,
     points: bool = False,
-    marks: np.ndarray | None = None,
+    listed: bool = False,
+    marks: Sequence[Marks] = (),
     level: float | None = None,
 ) -> Markup:
     """A chart with its labels, to be put into a page.
@@ -155,22 +182,25 @@ def line_chart(
         Points that are not finite, or not above 0 on a log axis, are left out.
     x, y : Axis
     points : bool
-        Whether each point gets a dot, and each curve its label at its end; for few points. Otherwise the labels stand
-        in one list beside the plot.
-    marks : array, shape (m,), optional
-        Values of x that get a short stroke on the axis.
+        Whether each point gets a dot, and each curve its label at its end; for few points.
+    listed : bool
+        Whether the labels stand in one list beside the plot all the same, for curves that end here and there. Where
+        there are no dots they always do.
+    marks : sequence of Marks
+        Each in a row of its own, the first on the axis.
     level : float, optional
         A value of y that gets a line across.
     """
     curves = [_drawable(curve, x, y) for curve in curves]
+    named = [curve for curve in curves if not curve.dashed]
     drawing = element(
         "svg",
         element("title", title, id=f"{name}-title"),
         element("desc", description, id=f"{name}-desc"),
         _grid(x, y),
-        _stretched(curves, x, y, _marks(marks, x), level),
+        _stretched(curves, x, y, [_marks(some, x, row) for row, some in enumerate(marks)], level),
         [_dots(curve, x, y) for curve in curves] if points else None,
-        _labels_at_ends(curves, y) if points else _labels_in_list(curves),
+        _labels_at_ends(named, y) if points and not listed else _labels_in_list(named),
         xmlns="http://www.w3.org/2000/svg",
         class_="chart",
         width="100%",
@@ -181,8 +211,8 @@ def line_chart(
         data_x=_described(x),
         data_y=_described(y),
     )
-    longest = max((len(label) for curve in curves for label in curve.labels), default=0)
-    return element("div", drawing, _legend(curves), class_="plot", style=f"--gutter:{34 + 6.3 * longest:.0f}px")
+    longest = max((len(label) for curve in named for label in curve.labels), default=0)
+    return element("div", drawing, _legend(named), class_="plot", style=f"--gutter:{34 + 6.3 * longest:.0f}px")
 
 
 def _drawable(curve: Curve, x: Axis, y: Axis) -> Curve:
@@ -190,7 +220,7 @@ def _drawable(curve: Curve, x: Axis, y: Axis) -> Curve:
     for axis, values in ((x, curve.x), (y, curve.y)):
         if axis.log:
             kept &= values > 0.0
-    return Curve(curve.labels, curve.x[kept], curve.y[kept], curve.colour)
+    return replace(curve, x=curve.x[kept], y=curve.y[kept])
 
 
 def _described(axis: Axis) -> str:
@@ -223,7 +253,7 @@ def _tick_labels(ticks: Sequence[float], log: bool) -> list[str]:
     return [f"{tick:.10g}" for tick in np.round(ticks, 12)]
 
 
-def _stretched(curves: list[Curve], x: Axis, y: Axis, marks: Markup | None, level: float | None) -> Markup:
+def _stretched(curves: list[Curve], x: Axis, y: Axis, marks: list[Markup], level: float | None) -> Markup:
     levels = None
     if level is not None:
         at = round((1.0 - float(y.share(np.array(level)))) * GRID_Y)
@@ -237,7 +267,7 @@ def _stretched(curves: list[Curve], x: Axis, y: Axis, marks: Markup | None, leve
                 "path",
                 element("title", " = ".join(curve.labels)),
                 d=_path(x.share(curve.x), y.share(curve.y)),
-                class_="curve",
+                class_="curve dashed" if curve.dashed else "curve",
                 style=f"--colour:{curve.colour}",
                 stroke=curve.colour,
                 fill="none",
@@ -263,12 +293,16 @@ def _path(along: np.ndarray, up: np.ndarray) -> str:
     )
 
 
-def _marks(marks: np.ndarray | None, x: Axis) -> Markup | None:
-    if marks is None:
-        return None
+def _marks(marks: Marks, x: Axis, row: int) -> Markup:
     # Those that would fall on one another are drawn once.
-    at = np.unique((x.share(marks) * COLUMNS).round()) * (GRID_X // COLUMNS)
-    return element("path", d="".join(f"M{value:.0f} {GRID_Y}v-70" for value in at), class_="marks")
+    at = np.unique((x.share(marks.x) * COLUMNS).round()) * (GRID_X // COLUMNS)
+    foot = GRID_Y - row * (STROKE + STROKE_GAP)
+    return element(
+        "path",
+        d="".join(f"M{value:.0f} {foot}v-{STROKE}" for value in at),
+        class_="marks" if marks.colour is None else "marks coloured",
+        style=None if marks.colour is None else f"--colour:{marks.colour}",
+    )
 
 
 def _dots(curve: Curve, x: Axis, y: Axis) -> Markup:
@@ -278,7 +312,7 @@ def _dots(curve: Curve, x: Axis, y: Axis) -> Markup:
             element("circle", cx=f"{along * 100:.2f}%", cy=f"{(1.0 - up) * HEIGHT:.1f}", r=3.5)
             for along, up in zip(x.share(curve.x), y.share(curve.y), strict=True)
         ],
-        class_="dots",
+        class_="dots hollow" if curve.dashed else "dots",
         style=f"--colour:{curve.colour}",
         fill=curve.colour,
     )

@@ -1,4 +1,4 @@
-"""What a comparison is about: a recorded clip, and what each mode makes of the few keys that are kept of it.
+"""Clips: what a comparison is about, the motion of one body in one recording.
 
 Times are seconds and poses are in the recording's own axes and units, repaired. Errors are in metres and do not depend
 on the axes; only what Blender shows is converted (`scripts.trajectories.axes`).
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from addon.motion import Poses
-from addon.motion.measures import Errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,32 +43,3 @@ class Clip:
         if self.metres_per_unit == 1.0:
             return poses
         return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
-
-
-@dataclass(frozen=True, eq=False)
-class Reconstruction:
-    """A clip at one rate: the keys that were kept, and what each mode filled in between them."""
-
-    clip: Clip
-
-    rate: str
-    """Keys a second, as the user wrote it."""
-
-    keys: np.ndarray
-    """The samples that were kept, rising indices into the clip, shape (k,)."""
-
-    poses: dict[str, Poses]
-    """Mode id to the poses at `times`."""
-
-    errors: dict[str, Errors]
-    """Mode id to the errors against the clip at `times`."""
-
-    @property
-    def samples(self) -> slice:
-        """The samples of the clip between its first and its last key, both included."""
-        return slice(int(self.keys[0]), int(self.keys[-1]) + 1)
-
-    @property
-    def times(self) -> np.ndarray:
-        """The times of `samples`."""
-        return self.clip.times[self.samples]

@@ -1,22 +1,21 @@
-"""What the numbers of a run say, in sentences: computed from the metrics, for any clips, rates and modes.
+"""What the numbers of a run say, in sentences: computed from the metrics, for any clips, choices of keys and modes.
 
 The error meant here is the RMS shell error. Errors are compared as ratios to those of the reference mode on the same
-clip at the same rate, and averaged over clips by the geometric mean, so that a clip with large motion counts as much
-as one with small.
+clip with the same choice, and averaged over clips by the geometric mean, so that a clip with large motion counts as
+much as one with small. Where a tolerance decides, the number of keys takes the place of the error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from addon.motion.measures import shell_error
-
-from .clips import Reconstruction
+from .choices import Choice, Tolerance, Uniform
 from .metrics import Metrics
+from .reconstructions import Reconstruction, identical_modes
 
 REFERENCE = "lerp_slerp"
 """The state of the art in the paper: what the other modes are held against."""
@@ -32,11 +31,11 @@ SAME = "the same"
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """The RMS shell errors of a run as one array."""
+    """The RMS shell errors of a run as one array, for its choices of one kind."""
 
     clips: tuple[str, ...]
-    rates: tuple[str, ...]
-    """As the user wrote them, from the lowest to the highest."""
+    choices: tuple[Choice, ...]
+    """From the smallest amount to the largest."""
 
     modes: tuple[str, ...]
 
@@ -44,7 +43,24 @@ class Summary:
     """The modes once more, those together that gave the same poses throughout: see `identical_modes`."""
 
     errors: np.ndarray
-    """Shape (clips, rates, modes), NaN where a clip has no such rate."""
+    """Shape (clips, choices, modes), NaN where a clip is too short for a choice.
+
+    Where a tolerance decides, keys a second instead, which are what it leaves to compare.
+    """
+
+    @property
+    def kind(self) -> type[Choice]:
+        """Of all choices."""
+        return type(self.choices[0])
+
+    @property
+    def amounts(self) -> tuple[str, ...]:
+        return tuple(choice.amount for choice in self.choices)
+
+    @property
+    def what(self) -> str:
+        """What is compared."""
+        return "number of keys" if self.kind is Tolerance else "error"
 
     @property
     def reference(self) -> str:
@@ -53,55 +69,37 @@ class Summary:
 
     @cached_property
     def ratios(self) -> np.ndarray:
-        """Errors as multiples of the reference's, shape (clips, rates, modes). NaN where that has none."""
+        """Errors as multiples of the reference's, shape (clips, choices, modes). NaN where that has none."""
         reference = self.of(self.reference)[..., None]
         return np.divide(self.errors, reference, out=np.full_like(self.errors, np.nan), where=reference > NOTHING)
 
     @cached_property
     def relative(self) -> np.ndarray:
-        """The geometric mean of the ratios over the clips, shape (rates, modes). NaN where no clip has one."""
+        """The geometric mean of the ratios over the clips, shape (choices, modes). NaN where no clip has one."""
         return np.exp(_mean_over_clips(np.log(np.maximum(self.ratios, 1e-12))))
 
     def of(self, mode: str) -> np.ndarray:
-        """The errors of one mode, shape (clips, rates)."""
+        """The errors of one mode, shape (clips, choices)."""
         return self.errors[..., self.modes.index(mode)]
 
 
-def summarise(rows: Sequence[Metrics], groups: Iterable[tuple[str, ...]]) -> Summary:
-    """Gather the rows of all clips, rates and modes."""
-    clips = tuple(dict.fromkeys(row.clip for row in rows))
-    rates = tuple(sorted(dict.fromkeys(row.rate_hz for row in rows), key=float))
-    modes = tuple(dict.fromkeys(row.mode for row in rows))
-    errors = np.full((len(clips), len(rates), len(modes)), np.nan)
-    for row in rows:
-        errors[clips.index(row.clip), rates.index(row.rate_hz), modes.index(row.mode)] = row.rms_shell_m
-    return Summary(clips, rates, modes, tuple(groups), errors)
+def summarise(measured: Sequence[tuple[Reconstruction, Sequence[Metrics]]]) -> list[Summary]:
+    """Gather the rows of all clips and modes, a summary for each kind of choice that there is."""
+    kinds = dict.fromkeys(type(reconstruction.choice) for reconstruction, _ in measured)
+    return [_summary([one for one in measured if type(one[0].choice) is kind]) for kind in kinds]
 
 
-def identical_modes(reconstructions: Sequence[Reconstruction]) -> tuple[tuple[str, ...], ...]:
-    """The modes in groups that gave the same poses in all of these reconstructions.
-
-    The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
-    Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
-    """
-    groups: list[list[str]] = []
-    for mode in dict.fromkeys(mode for reconstruction in reconstructions for mode in reconstruction.poses):
-        for group in groups:
-            if all(_same(reconstruction, group[0], mode) for reconstruction in reconstructions):
-                group.append(mode)
-                break
-        else:
-            groups.append([mode])
-    return tuple(map(tuple, groups))
-
-
-def _same(reconstruction: Reconstruction, first: str, second: str) -> bool:
-    if first not in reconstruction.poses or second not in reconstruction.poses:
-        return False
-    poses, others = (reconstruction.clip.in_metres(reconstruction.poses[mode]) for mode in (first, second))
-    rounding = 1e-12 * (1.0 + np.abs(poses.positions).max())
-    apart = shell_error(poses, others).max()
-    return bool(apart <= 1e-6 * reconstruction.errors[first].shell.max() + rounding)
+def _summary(measured: Sequence[tuple[Reconstruction, Sequence[Metrics]]]) -> Summary:
+    reconstructions = [reconstruction for reconstruction, _ in measured]
+    rows = [(reconstruction.choice, row) for reconstruction, some in measured for row in some]
+    clips = tuple(dict.fromkeys(row.clip for _, row in rows))
+    choices = tuple(sorted(dict.fromkeys(choice for choice, _ in rows), key=lambda choice: choice.size))
+    modes = tuple(dict.fromkeys(row.mode for _, row in rows))
+    errors = np.full((len(clips), len(choices), len(modes)), np.nan)
+    for choice, row in rows:
+        found = row.keys_per_s if isinstance(choice, Tolerance) else row.rms_shell_m
+        errors[clips.index(row.clip), choices.index(choice), modes.index(row.mode)] = found
+    return Summary(clips, choices, modes, identical_modes(reconstructions), errors)
 
 
 def findings(summary: Summary, labels: dict[str, str]) -> list[str]:
@@ -122,7 +120,7 @@ def _what_is_identical(summary: Summary, labels: dict[str, str]) -> list[str]:
     same = [listed([labels[mode] for mode in group]) for group in summary.groups if len(group) > 1]
     if not same:
         return []
-    where = "" if summary.errors[..., 0].size == 1 else ", on every clip at every rate"
+    where = "" if summary.errors[..., 0].size == 1 else f", on every clip {_every(summary)}"
     return [
         f"Identical in-betweens came from {'; and from '.join(same)}{where}. They share a line in the plots, and here "
         "the first of them speaks for the others."
@@ -137,22 +135,22 @@ def _compared_with_the_reference(summary: Summary, labels: dict[str, str]) -> li
         if summary.reference in group or not np.isfinite(relative).any():
             continue
         changes = [
-            f"{_change(ratio)} at {rate}"
-            for rate, ratio in zip(summary.rates, relative, strict=True)
+            f"{_change(ratio)} {choice.at} {choice.amount}"
+            for choice, ratio in zip(summary.choices, relative, strict=True)
             if np.isfinite(ratio)
         ]
+        said = f"{listed(changes)} {summary.kind.unit}".rstrip()
         sentences.append(
-            f"Compared with {labels[summary.reference]}, the error of {labels[group[0]]} was {listed(changes)} keys/s"
-            f"{mean}."
+            f"Compared with {labels[summary.reference]}, the {summary.what} of {labels[group[0]]} was {said}{mean}."
         )
     return sentences
 
 
 def _keys_for_the_same_error(summary: Summary, labels: dict[str, str]) -> list[str]:
     """The paper's question: how far down can the rate go, until the error is that of the reference at a higher one?"""
-    rates = np.array([float(rate) for rate in summary.rates])
+    rates = np.array([choice.size for choice in summary.choices])
     whole = (summary.errors > NOTHING).all(axis=(1, 2))
-    if len(rates) < 2 or not whole.any():
+    if summary.kind is not Uniform or len(rates) < 2 or not whole.any():
         return []
     curves = {group: np.log(summary.of(group[0])[whole]).mean(axis=0) for group in summary.groups}
     target = next(curve for group, curve in curves.items() if summary.reference in group)[-1]
@@ -163,7 +161,7 @@ def _keys_for_the_same_error(summary: Summary, labels: dict[str, str]) -> list[s
     ]
     if not needed:
         return []
-    highest = summary.rates[-1]
+    highest = summary.amounts[-1]
     paper = UPDATES_IN_THE_PAPER.get(highest)
     beside = f"; the paper's table has {paper} instead of {highest}" if paper else ""
     return [
@@ -176,10 +174,11 @@ def _who_is_closest(summary: Summary, labels: dict[str, str]) -> list[str]:
     errors = np.stack([summary.of(group[0]) for group in summary.groups], axis=-1)
     names = [labels[group[0]] for group in summary.groups]
     sentences, nothing = [], []
-    for at, rate in enumerate(summary.rates):
+    best = "Fewest keys" if summary.kind is Tolerance else "Closest to the recording"
+    for at, choice in enumerate(summary.choices):
         told_apart = errors[:, at][np.isfinite(errors[:, at]).all(axis=-1) & (errors[:, at].max(axis=-1) > NOTHING)]
         if not len(told_apart):
-            nothing.append(rate)
+            nothing.append(choice.amount)
         if not len(told_apart) or len(names) < 2:
             continue
         wins = np.bincount(told_apart.argmin(axis=-1), minlength=len(names))
@@ -188,9 +187,9 @@ def _who_is_closest(summary: Summary, labels: dict[str, str]) -> list[str]:
         if len(summary.clips) > 1:
             who += f" on {wins[ranked[0]]} of {_clips(len(told_apart))}"
             who += "".join(f", {names[place]} on {wins[place]}" for place in ranked[1:])
-        sentences.append(f"Closest to the recording at {rate} keys/s: {who}.")
+        sentences.append(f"{best} {choice.phrase}: {who}.")
     if nothing:
-        sentences.append(f"At {listed(nothing)} keys/s no mode was off by more than rounding.")
+        sentences.append(f"At {listed(nothing)} {summary.kind.unit} no mode was off by more than rounding.")
     return sentences
 
 
@@ -198,19 +197,24 @@ def _extremes(summary: Summary, labels: dict[str, str]) -> list[str]:
     if len(summary.clips) < 2 or not np.isfinite(summary.ratios).any():
         return []
     sentences = []
+    article = "a" if summary.kind is Tolerance else "an"
     for place, title in (
         (np.nanargmin(summary.ratios), "The largest gain over"),
         (np.nanargmax(summary.ratios), "The largest loss to"),
     ):
-        clip, rate, mode = np.unravel_index(place, summary.ratios.shape)
-        change = _change(ratio := summary.ratios[clip, rate, mode])
+        clip, choice, mode = np.unravel_index(place, summary.ratios.shape)
+        change = _change(ratio := summary.ratios[clip, choice, mode])
         if change != SAME and (ratio < 1.0) == title.endswith("over"):
             first = next(group[0] for group in summary.groups if summary.modes[mode] in group)
             sentences.append(
-                f"{title} {labels[summary.reference]} was that of {labels[first]} on {summary.clips[clip]} at "
-                f"{summary.rates[rate]} keys/s: an error {change}."
+                f"{title} {labels[summary.reference]} was that of {labels[first]} on {summary.clips[clip]} "
+                f"{summary.choices[choice].phrase}: {article} {summary.what} {change}."
             )
     return sentences
+
+
+def _every(summary: Summary) -> str:
+    return "within every tolerance" if summary.kind is Tolerance else "at every rate"
 
 
 def _mean_over_clips(values: np.ndarray) -> np.ndarray:

@@ -37,6 +37,8 @@ GHOST_INSET = 0.003
 """How much smaller the ghost is all around, in units of the object: where both agree, the object hides it."""
 
 BAR_HEIGHT = 0.009
+NUMBER_WIDTH = 3.6
+"""Of the error with its unit, in units of its size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,9 @@ class Cast:
     """In millimetres: that of a full bar."""
 
     mesh: bpy.types.Mesh
+    notes: dict[str, str]
+    """Mode id to what is written small below the name of the mode."""
+
     traced: np.ndarray
     """The point of the object whose path is drawn, shape (3,)."""
 
@@ -82,10 +87,10 @@ class Lanes:
         self.trail_group, self.marks_group = trails.trail_group(), trails.marks_group()
         motion, timeline = cast.motion, cast.timeline
         self.path = trails.polyline("Recording path", timeline.fine_frames, cast.path_of(motion.recording))
-        self.keys = trails.polyline("Keys", motion.key_frames, cast.path_of(motion.keys), joined=False)
         self.readout = captions.readout_group("Error in mm", captions.decimals_for(cast.largest_error), self.ink)
         labels = [label_of(mode) for mode in motion.modes]
         self.label_width = max(captions.width_of(label) for label in labels)
+        self.note_width = max(captions.width_of(note) for note in cast.notes.values())
         self.broken_label_width = max(captions.width_of(captions.in_two_lines(label)) for label in labels)
 
     def build(self, mode: str, cell: layout.Cell) -> None:
@@ -125,7 +130,9 @@ class Lanes:
         cast, rate, metres = self.cast, self.cast.timeline.rate, self.cast.layout.metres
         trail = trails.polyline(f"{mode} trail", cast.timeline.fine_frames, cast.path_of(cast.motion.modes[mode]))
         window = {"Past": PATH_BEHIND_SECONDS * rate, "Ahead": PATH_AHEAD_SECONDS * rate}
-        crowded = max(1.0, sum(window.values()) / (MARKS_SHOWN * cast.timeline.frames_per_key(len(cast.motion.keys))))
+        keys = cast.motion.keys[mode]
+        marks = trails.polyline(f"{mode} keys", cast.motion.key_frames[mode], cast.path_of(keys), joined=False)
+        crowded = max(1.0, sum(window.values()) / (MARKS_SHOWN * cast.timeline.frames_per_key(len(keys))))
         apply_group(
             self._child(lane, f"{mode} trail", trail),
             self.trail_group,
@@ -144,7 +151,7 @@ class Lanes:
             Material=self.faint,
         )
         apply_group(
-            self._child(lane, f"{mode} keys", self.keys),
+            self._child(lane, f"{mode} keys", marks),
             self.marks_group,
             **{side: frames / crowded for side, frames in window.items()},
             Radius=MARK_RADIUS * metres,
@@ -168,7 +175,13 @@ class Lanes:
             id_line = line
         number_size = min(0.046, number_size)
         self._put(captions.words(f"{mode} label", label, label_size, self.ink), left, label_line)
-        self._put(captions.words(f"{mode} id", mode, id_size, self.faint), left, id_line)
+        note = self.cast.notes[mode]
+        if self.note_width * id_size > room - (0.0 if cell.beside else NUMBER_WIDTH * number_size):
+            note = captions.in_two_lines(note)
+        if "\n" in note:
+            id_size *= 0.8
+            id_line += id_size
+        self._put(captions.words(f"{mode} id", note, id_size, self.faint), left, id_line)
         self._put(captions.words(f"{mode} unit", "mm", 0.6 * number_size, self.faint, "RIGHT"), right, line)
         number = captions.readout(
             f"{mode} error", self.readout, number_size, self.cast.timeline.frames, self.cast.errors[mode]

@@ -18,8 +18,8 @@ import numpy as np
 from addon.motion import Poses
 from addon.motion.measures import rms
 
-from .clips import Reconstruction
 from .files import write_text
+from .reconstructions import Reconstruction
 
 BYTES_PER_KEY = 7 * 8
 """A position and a quaternion, as doubles: what the paper sends for an update."""
@@ -27,13 +27,13 @@ BYTES_PER_KEY = 7 * 8
 
 @dataclass(frozen=True)
 class Metrics:
-    """One clip at one rate under one mode. The fields are the columns of `metrics.csv`, in their order."""
+    """One clip with one choice of keys under one mode. The fields are the columns of `metrics.csv`, in their order."""
 
     clip: str
     mode: str
 
     rate_hz: str
-    """As the user wrote it."""
+    """As the user wrote it; empty where a tolerance decides."""
 
     keys: int
 
@@ -53,6 +53,15 @@ class Metrics:
     rms_rotation_deg: float
     rms_velocity_m_s: float
 
+    decimation: str
+    """How the keys were chosen: "uniform" or "adaptive"."""
+
+    tolerance_m: float | None
+    """The largest shell error that was allowed; empty in the table where a rate decides."""
+
+    keys_per_s: float
+    """On average, the first key not counted."""
+
 
 def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     """The metrics of every mode, in the order of the modes.
@@ -69,36 +78,41 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     ValueError
         Where there are fewer than two keys, which have no time between them.
     """
-    keys = len(reconstruction.keys)
-    if keys < 2:
+    clip, choice, times = reconstruction.clip, reconstruction.choice, reconstruction.times
+    if len(times) < 2:
         raise ValueError(
-            f"{reconstruction.clip.name} at {reconstruction.rate} keys/s: {keys} key has no in-betweens to measure; "
+            f"{clip.name} {choice.phrase}: 1 key has no in-betweens to measure; "
             "give a longer recording or a higher rate"
         )
-    times = reconstruction.times
     duration = float(times[-1] - times[0])
-    return [
-        Metrics(
-            clip=reconstruction.clip.name,
-            mode=mode,
-            rate_hz=reconstruction.rate,
-            keys=keys,
-            samples=len(times),
-            duration_s=duration,
-            bytes_per_s=(keys - 1) / duration * BYTES_PER_KEY,
-            rms_shell_m=rms(errors.shell),
-            p95_shell_m=float(np.percentile(errors.shell, 95.0)),
-            max_shell_m=float(np.max(errors.shell)),
-            rms_position_m=rms(errors.position),
-            rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
-            rms_velocity_m_s=rms(errors.velocity),
+    rows = []
+    for mode, errors in reconstruction.errors.items():
+        keys = len(reconstruction.keys[mode])
+        rows.append(
+            Metrics(
+                clip=clip.name,
+                mode=mode,
+                rate_hz=choice.rate,
+                keys=keys,
+                samples=len(times),
+                duration_s=duration,
+                bytes_per_s=(keys - 1) / duration * BYTES_PER_KEY,
+                rms_shell_m=rms(errors.shell),
+                p95_shell_m=float(np.percentile(errors.shell, 95.0)),
+                max_shell_m=float(np.max(errors.shell)),
+                rms_position_m=rms(errors.position),
+                rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
+                rms_velocity_m_s=rms(errors.velocity),
+                decimation=choice.decimation,
+                tolerance_m=choice.tolerance(clip),
+                keys_per_s=(keys - 1) / duration,
+            )
         )
-        for mode, errors in reconstruction.errors.items()
-    ]
+    return rows
 
 
 def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
-    """Write `metrics.csv`: a header and a row for every clip, rate and mode."""
+    """Write `metrics.csv`: a header and a row for every clip, choice of keys and mode."""
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow(field.name for field in dataclasses.fields(Metrics))
@@ -125,8 +139,15 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
 
 
 def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:
-    """Write `keys.csv` and a `MODE.csv` for every mode into `folder`."""
-    clip, keys = reconstruction.clip, reconstruction.keys
-    write_poses(folder / "keys.csv", clip.times[keys], clip.poses[keys])
+    """Write a `MODE.csv` for every mode into `folder`, and the keys.
+
+    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each.
+    """
+    clip = reconstruction.clip
     for mode, poses in reconstruction.poses.items():
         write_poses(folder / f"{mode}.csv", reconstruction.times, poses)
+    tables = {f"{mode}.keys.csv": keys for mode, keys in reconstruction.keys.items()}
+    if reconstruction.choice.decimation == "uniform":
+        tables = {"keys.csv": next(iter(tables.values()))}
+    for name, keys in tables.items():
+        write_poses(folder / name, clip.times[keys], clip.poses[keys])

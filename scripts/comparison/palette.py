@@ -1,8 +1,8 @@
 """Colours: one for each mode wherever it is shown, and those of the stage around it. sRGB, as in a web page.
 
 The modes have the colours of Okabe and Ito (Color Universal Design, 2008), which people with any of the common forms
-of colour blindness can tell apart, but for a lighter blue: all reach a contrast of 3 on the stage. Nothing here needs
-Blender.
+of colour blindness can tell apart, but for a lighter blue, and a leaf green beside them that keeps apart from all: each
+reaches a contrast of 3 on the stage. Nothing here needs Blender.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ MODE_COLOURS: dict[str, str] = {
     "pga_slerp": "#009E73",
     "cga_lerp": "#CC79A7",
     "cga_slerp": "#4C72E0",
+    "motor_spline": "#88BB66",
 }
 """Mode id to colour."""
 

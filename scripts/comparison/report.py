@@ -23,13 +23,17 @@ import numpy as np
 
 from addon.motion import MODES
 
-from .charts import Axis, Curve, axis_over, line_chart
-from .clips import Reconstruction
+from .charts import Axis, Marks, axis_over, line_chart, with_rows_below
+from .choices import Budget, Tolerance, Uniform
 from .files import replacing
-from .findings import Summary, findings, identical_modes, listed, summarise
+from .findings import Summary, findings, listed, summarise
 from .markup import Content, Markup, element, join
 from .metrics import Metrics, measure_reconstruction
+from .needed import KeysNeeded
+from .needed_section import clip_part, keys_section
 from .palette import colour_of
+from .parts import curve, heading, is_best, label, mode_cell, number_cell, rounded, swatch, table
+from .reconstructions import Reconstruction, identical_modes
 
 PAGE = Path(__file__).parent / "page"
 
@@ -84,12 +88,17 @@ COLUMNS = (
 )
 
 
+KEY_COLUMNS = (Column("Keys", "", "keys", 1.0), Column("Keys", "/s", "keys_per_s", 1.0))
+"""Where the modes have different numbers of keys."""
+
+
 def write_report(
     path: Path,
     reconstructions: Sequence[Reconstruction],
     *,
     films: Mapping[tuple[str, str], Path],
     settings: Settings,
+    needed: Sequence[KeysNeeded] = (),
 ) -> None:
     """Write the report of a run.
 
@@ -100,9 +109,12 @@ def write_report(
     reconstructions : sequence of Reconstruction
         Those of one clip follow one another. At least one.
     films : mapping
-        (clip name, rate) to its video, for those that there are. Files that do not exist count as missing. Links to
-        them are relative to the page's folder. Where it is empty, the report does not speak of videos.
+        (clip name, name of the choice) to its video, for those that there are. Files that do not exist count as
+        missing. Links to them are relative to the page's folder. Where it is empty, the report does not speak of
+        videos.
     settings : Settings
+    needed : sequence of KeysNeeded
+        Of clips that have reconstructions. Where it is empty, the report does not speak of the keys that are needed.
 
     Raises
     ------
@@ -110,14 +122,14 @@ def write_report(
         Where there is nothing to report.
     """
     if not reconstructions:
-        raise ValueError("no reconstruction to report: every clip is shorter than two keys at every rate")
-    page = _page(path, reconstructions, films, settings)
+        raise ValueError("no reconstruction to report: every clip is too short for two keys")
+    page = _page(path, reconstructions, films, settings, needed)
     before, after = page.split(FILMS_GO_HERE)
     with replacing(path) as stream:
         stream.write(before)
-        for (clip, rate), film in films.items():
+        for (clip, choice), film in films.items():
             if film.is_file():
-                _write_film(stream, _name_of(reconstructions, clip, rate), film)
+                _write_film(stream, _name_of(reconstructions, clip, choice), film)
         stream.write(after)
 
 
@@ -126,44 +138,63 @@ def _page(
     reconstructions: Sequence[Reconstruction],
     films: Mapping[tuple[str, str], Path],
     settings: Settings,
+    needed: Sequence[KeysNeeded],
 ) -> str:
     rows = {id(reconstruction): measure_reconstruction(reconstruction) for reconstruction in reconstructions}
-    groups = identical_modes(reconstructions)
-    summary = summarise([row for some in rows.values() for row in some], groups)
-    by_clip = [list(of_clip) for _, of_clip in groupby(reconstructions, key=lambda one: one.clip.name)]
+    summaries = summarise([(reconstruction, rows[id(reconstruction)]) for reconstruction in reconstructions])
+    of_clip = {one.clip: one for one in needed}
+    by_clip = [list(some) for _, some in groupby(reconstructions, key=lambda one: one.clip.name)]
     clips = [
-        _clip_section(number, of_clip, [rows[id(one)] for one in of_clip], films, path.parent)
-        for number, of_clip in enumerate(by_clip, start=1)
+        _clip_section(
+            number,
+            some,
+            [rows[id(one)] for one in some],
+            films,
+            path.parent,
+            # A single clip has its keys in the section of all clips.
+            of_clip.get(some[0].clip.name) if len(needed) > 1 else None,
+        )
+        for number, some in enumerate(by_clip, start=1)
     ]
     script = (PAGE / "page.js").read_text(encoding="utf-8")
     return Template((PAGE / "page.html").read_text(encoding="utf-8")).substitute(
         script=script,
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         style=(PAGE / "page.css").read_text(encoding="utf-8"),
-        lead=_lead(summary),
+        lead=_lead(summaries),
         date=element("time", f"{settings.date:%d %B %Y, %H:%M}", datetime=settings.date.isoformat(timespec="minutes")),
         program=element("span", settings.program),
-        navigation=join(_navigation(by_clip)),
-        summary=_summary_section(summary),
-        modes=_modes_section(summary, settings),
+        navigation=join(_navigation(by_clip, bool(needed))),
+        summary=_summary_section(summaries),
+        needed=keys_section(needed) if needed else "",
+        modes=_modes_section(summaries[0], settings),
         clips=join(clips),
-        settings=_settings_section(summary, settings),
+        settings=_settings_section(summaries, settings),
     )
 
 
-def _lead(summary: Summary) -> Markup:
-    clips, rates, modes = len(summary.clips), summary.rates, len(summary.modes)
+def _lead(summaries: Sequence[Summary]) -> Markup:
+    clips, modes = len(summaries[0].clips), len(summaries[0].modes)
     return element(
         "p",
-        f"{'One recorded clip' if clips == 1 else f'{clips} recorded clips, each'} thinned to {listed(rates)} "
-        f"keys a second and filled in again by {'one mode' if modes == 1 else f'{modes} modes'} of interpolation: how "
-        f"far is the in-between motion from what was recorded?",
+        f"{'One recorded clip' if clips == 1 else f'{clips} recorded clips, each'} thinned to "
+        f"{', and to '.join(map(_kept, summaries))} and filled in again by "
+        f"{'one mode' if modes == 1 else f'{modes} modes'} of interpolation: how far is the in-between motion from "
+        "what was recorded?",
         class_="lead",
     )
 
 
-def _navigation(by_clip: list[list[Reconstruction]]) -> list[Markup]:
-    places = [("summary", "Summary"), ("modes", "Modes and measures")]
+def _kept(summary: Summary) -> str:
+    """The keys that are kept, in a sentence."""
+    if summary.kind is Tolerance:
+        return f"the fewest keys that keep a mode within {listed(summary.amounts)} everywhere,"
+    where = " on average, wherever a mode needs them," if summary.kind is Budget else ""
+    return f"{listed(summary.amounts)} keys a second{where}"
+
+
+def _navigation(by_clip: list[list[Reconstruction]], needed: bool) -> list[Markup]:
+    places = [("summary", "Summary"), *([("needed", "Keys needed")] if needed else []), ("modes", "Modes and measures")]
     places += [(f"clip-{number}", of_clip[0].clip.name) for number, of_clip in enumerate(by_clip, start=1)]
     places += [("settings", "This run")]
     return [element("li", element("a", title, href=f"#{place}")) for place, title in places]
@@ -172,53 +203,74 @@ def _navigation(by_clip: list[list[Reconstruction]]) -> list[Markup]:
 # -- summary ----------------------------------------------------------------------------------------------------------
 
 
-def _summary_section(summary: Summary) -> Markup:
-    reference = _label(summary.reference)
-    said = findings(summary, {mode: _label(mode) for mode in summary.modes})
+HEADINGS = {
+    Uniform: "Keys evenly spaced",
+    Budget: "As many keys, where the motion needs them",
+    Tolerance: "As few keys as keep to a tolerance",
+}
+"""Of the parts of the summary, where there are several kinds of choices."""
+
+
+def _summary_section(summaries: Sequence[Summary]) -> Markup:
     content: list[Content] = [element("h2", "Summary")]
+    for number, summary in enumerate(summaries, start=1):
+        if len(summaries) > 1:
+            content.append(element("h3", HEADINGS[summary.kind]))
+        content += _summarised(summary, "summary-chart" if number == 1 else f"summary-chart-{number}")
+    return element("section", content, id="summary")
+
+
+def _summarised(summary: Summary, chart: str) -> list[Content]:
+    reference = label(summary.reference)
+    said = findings(summary, {mode: label(mode) for mode in summary.modes})
+    content: list[Content] = []
     if said:
         content.append(element("ul", [element("li", sentence) for sentence in said], class_="findings"))
     if np.isfinite(summary.relative).any() and len(summary.modes) > 1:
         mean = f", geometric mean over the {len(summary.clips)} clips" if len(summary.clips) > 1 else ""
+        measure = "Number of keys" if summary.kind is Tolerance else "RMS shell error"
+        where = "within the same tolerance" if summary.kind is Tolerance else "at the same rate"
+        meaning = "as many" if summary.kind is Tolerance else "as far off"
         content += [
-            element("h3", f"Error relative to {reference}"),
+            element("h3", f"{summary.what.capitalize()} relative to {reference}"),
             element(
                 "p",
-                f"RMS shell error as a multiple of that of {reference} at the same rate{mean}: 1.00 "
-                "is as far off, lower is better.",
+                f"{measure} as a multiple of that of {reference} {where}{mean}: 1.00 is {meaning}, lower is better.",
                 class_="note",
             ),
             element(
                 "div",
                 _relative_table(summary),
-                _relative_chart(summary) if len(summary.rates) > 1 else None,
+                _relative_chart(summary, chart) if len(summary.choices) > 1 and summary.kind is not Tolerance else None,
                 class_="pair",
             ),
         ]
-    return element("section", content, id="summary")
+    return content
 
 
 def _relative_table(summary: Summary) -> Markup:
-    head = [_heading("Mode", "text"), *(_heading(rate, "number", "/s") for rate in summary.rates)]
+    unit = "" if summary.kind is Tolerance else "/s"
+    head = [heading("Mode", "text"), *(heading(amount, "number", unit) for amount in summary.amounts)]
     best = np.nanmin(np.where(np.isfinite(summary.relative), summary.relative, np.inf), axis=1)
     body = []
     for column, mode in enumerate(summary.modes):
         cells = [
-            _number_cell(ratio, f"{ratio:.2f}", best=_is_best(ratio, best[row]), tint=ratio)
+            number_cell(ratio, f"{ratio:.2f}", best=is_best(ratio, best[row]), tint=ratio)
             for row, ratio in enumerate(summary.relative[:, column])
         ]
-        body.append(element("tr", _mode_cell(mode), cells))
-    return _table(f"Error relative to {_label(summary.reference)}, by mode and keys per second", head, body)
+        body.append(element("tr", mode_cell(mode), cells))
+    by = "tolerance" if summary.kind is Tolerance else "keys per second"
+    return table(f"{summary.what.capitalize()} relative to {label(summary.reference)}, by mode and {by}", head, body)
 
 
-def _relative_chart(summary: Summary) -> Markup:
-    rates = np.array([float(rate) for rate in summary.rates])
-    curves = [_curve(group, rates, summary.relative[:, summary.modes.index(group[0])]) for group in summary.groups]
+def _relative_chart(summary: Summary, name: str) -> Markup:
+    rates = np.array([choice.size for choice in summary.choices])
+    curves = [curve(group, rates, summary.relative[:, summary.modes.index(group[0])]) for group in summary.groups]
     shown = summary.relative[np.isfinite(summary.relative)]
     half = max(float(np.abs(shown - 1.0).max()) * 1.15, 0.05)
-    y = Axis("error relative to " + _label(summary.reference), "", min(1.0 - half, shown.min()), 1.0 + half)
+    y = Axis("error relative to " + label(summary.reference), "", min(1.0 - half, shown.min()), 1.0 + half)
     return line_chart(
-        "summary-chart",
+        name,
         "Relative error over rate",
         "One line for each mode; below 1 the mode is closer to the recording than the reference.",
         curves,
@@ -240,7 +292,7 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
     modes = [
         element(
             "div",
-            element("dt", _swatch(mode), _label(mode), " ", element("code", mode)),
+            element("dt", swatch(mode), label(mode), " ", element("code", mode)),
             element("dd", MODES[mode].description),
         )
         for mode in summary.modes
@@ -262,7 +314,11 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
             "RMS, 95th percentile, largest",
             "Over the recording's own samples between the first and the last key, the keys themselves among them.",
         ),
-        ("Bytes/s", "Of the keys that were kept: seven double-precision numbers, 56 bytes, for a key."),
+        (
+            "Bytes/s",
+            "Of the keys that were kept: seven double-precision numbers, 56 bytes, for a key. Keys that are not evenly "
+            "spaced need their times too, which are not counted.",
+        ),
     ]
     return element(
         "section",
@@ -287,12 +343,13 @@ def _clip_section(
     rows: list[list[Metrics]],
     films: Mapping[tuple[str, str], Path],
     folder: Path,
+    needed: KeysNeeded | None,
 ) -> Markup:
     clip = reconstructions[0].clip
     name = f"clip-{number}"
     duration = float(clip.times[-1] - clip.times[0])
     rate = (len(clip.times) - 1) / duration
-    rates = [element("a", one.rate, href=f"#{name}-rate-{place}") for place, one in enumerate(reconstructions, 1)]
+    evenly = [place for place, one in enumerate(reconstructions) if isinstance(one.choice, Uniform)]
     repairs = [element("li", sentence) for sentence in clip.repairs]
     return element(
         "section",
@@ -305,7 +362,7 @@ def _clip_section(
                 element("code", clip.source),
                 class_="note",
             ),
-            element("p", "Go to ", rates, " keys/s", class_="jumps"),
+            [element("p", "Go to ", links, class_="jumps") for links in _jumps(name, reconstructions)],
         ),
         element(
             "div",
@@ -315,11 +372,16 @@ def _clip_section(
                 element("ul", repairs) if repairs else element("p", "Nothing."),
                 class_="repairs",
             ),
-            element("div", element("h3", "Error over rate"), _error_over_rate(name, reconstructions, rows))
-            if len(rates) > 1
+            element(
+                "div",
+                element("h3", "Error over rate"),
+                _error_over_rate(name, [reconstructions[place] for place in evenly], [rows[place] for place in evenly]),
+            )
+            if len(evenly) > 1
             else None,
             class_="pair",
         ),
+        clip_part(name, needed) if needed else None,
         [
             _rate_section(f"{name}-rate-{place}", one, some, films, folder)
             for place, (one, some) in enumerate(zip(reconstructions, rows, strict=True), start=1)
@@ -329,9 +391,24 @@ def _clip_section(
     )
 
 
+def _jumps(name: str, reconstructions: list[Reconstruction]) -> list[list[Content]]:
+    """Links to the choices of a clip, those of a kind together."""
+    places = {one: f"#{name}-rate-{place}" for place, one in enumerate(reconstructions, 1)}
+    kinds = groupby(reconstructions, key=lambda one: type(one.choice))
+    return [
+        [
+            f"{kind.at} " if kind is Tolerance else None,
+            [element("a", one.choice.amount, href=places[one]) for one in some],
+            kind.unit,
+        ]
+        for kind, some in kinds
+    ]
+
+
 def _error_over_rate(name: str, reconstructions: list[Reconstruction], rows: list[list[Metrics]]) -> Markup:
-    order = np.argsort([float(one.rate) for one in reconstructions])
-    rates = np.array([float(one.rate) for one in reconstructions])[order]
+    rates = np.array([one.choice.size for one in reconstructions])
+    order = np.argsort(rates)
+    rates = rates[order]
     errors = {
         row.mode: np.array([next(r.rms_shell_m for r in rows[at] if r.mode == row.mode) for at in order]) * 1e3
         for row in rows[0]
@@ -340,7 +417,7 @@ def _error_over_rate(name: str, reconstructions: list[Reconstruction], rows: lis
         f"{name}-chart",
         "Error over rate",
         "RMS shell error of each mode at each rate of keys.",
-        [_curve(group, rates, errors[group[0]]) for group in identical_modes(reconstructions)],
+        [curve(group, rates, errors[group[0]]) for group in identical_modes(reconstructions)],
         _rate_axis(rates),
         axis_over("RMS shell error", "mm", np.concatenate(list(errors.values())), log=True),
         points=True,
@@ -354,22 +431,24 @@ def _rate_section(
     films: Mapping[tuple[str, str], Path],
     folder: Path,
 ) -> Markup:
-    row = rows[0]
+    row, choice = rows[0], reconstruction.choice
     charts = _errors_over_time(name, reconstruction)
     if films:
-        film = films.get((reconstruction.clip.name, reconstruction.rate))
+        film = films.get((reconstruction.clip.name, choice.name))
         charts = [_film(name, film, folder), element("div", charts)]
+    own_counts = len({row.keys for row in rows}) > 1
+    counted = "Each mode has keys of its own" if own_counts else f"{row.keys} keys"
+    sent = "" if own_counts else f", {row.bytes_per_s:.0f} bytes/s"
     return element(
         "section",
-        element("h3", f"{reconstruction.rate} keys/s"),
+        element("h3", choice.title),
         element(
             "p",
-            f"{row.keys} keys in {row.duration_s:.2f} s, {row.bytes_per_s:.0f} bytes/s; "
-            f"compared at {row.samples} samples",
+            f"{counted} in {row.duration_s:.2f} s{sent}; compared at {row.samples} samples",
             class_="note",
         ),
         element("div", charts, class_="pair"),
-        _numbers(f"{reconstruction.clip.name} at {reconstruction.rate} keys/s", rows),
+        _numbers(f"{reconstruction.clip.name} {choice.phrase}", rows, KEY_COLUMNS + COLUMNS if own_counts else COLUMNS),
         id=name,
         class_="rate",
     )
@@ -377,7 +456,7 @@ def _rate_section(
 
 def _film(name: str, film: Path | None, folder: Path) -> Markup:
     if film is None or not film.is_file():
-        return element("p", "There is no video for this rate.", class_="film note")
+        return element("p", "There is no video with these keys.", class_="film note")
     link = quote(Path(os.path.relpath(film, folder)).as_posix())
     return element(
         "div",
@@ -389,13 +468,23 @@ def _film(name: str, film: Path | None, folder: Path) -> Markup:
 
 def _errors_over_time(name: str, reconstruction: Reconstruction) -> list[Markup]:
     """The shell errors over the whole clip and, where that is too much to make out, over the segments at the worst."""
-    times, keys = reconstruction.times - reconstruction.times[0], reconstruction.keys - reconstruction.keys[0]
+    times = reconstruction.times - reconstruction.times[0]
     errors = {mode: some.shell * 1e3 for mode, some in reconstruction.errors.items()}
     groups = identical_modes([reconstruction])
+    keys = {mode: kept - reconstruction.samples.start for mode, kept in reconstruction.keys.items()}
+
+    def marks(samples: slice) -> list[Marks]:
+        def within(mode: str) -> np.ndarray:
+            return times[keys[mode][(keys[mode] >= samples.start) & (keys[mode] < samples.stop)]]
+
+        if reconstruction.choice.decimation == "uniform":
+            return [Marks(within(groups[0][0]))]
+        return [Marks(within(group[0]), colour_of(group[0])) for group in groups]
 
     def chart(suffix: str, title: str, samples: slice) -> Markup:
         shown = {mode: some[samples] for mode, some in errors.items()}
-        seconds = times[samples]
+        seconds, rows = times[samples], marks(samples)
+        errors_axis = axis_over("shell error", "mm", np.concatenate(list(shown.values())))
         # The larger errors behind, or they would cover the smaller ones.
         ordered = sorted(groups, key=lambda group: -shown[group[0]].mean())
         return element(
@@ -404,53 +493,58 @@ def _errors_over_time(name: str, reconstruction: Reconstruction) -> list[Markup]
                 f"{name}-{suffix}",
                 title,
                 "Shell error of each mode over time; strokes on the time axis mark the keys.",
-                [_curve(group, seconds, shown[group[0]]) for group in ordered],
+                [curve(group, seconds, shown[group[0]]) for group in ordered],
                 Axis("time since the first key", "s", float(seconds[0]), float(seconds[-1])),
-                axis_over("shell error", "mm", np.concatenate(list(shown.values()))),
-                marks=times[keys[(keys >= samples.start) & (keys < samples.stop)]],
+                with_rows_below(errors_axis, len(rows)) if len(rows) > 1 else errors_axis,
+                marks=rows,
             ),
             element("figcaption", title),
         )
 
     whole = chart("time", "Error over time, keys marked", slice(0, len(times)))
-    if len(keys) <= 2 * CLOSE_UP_SEGMENTS:
+    worst_mode = max(errors, key=lambda mode: errors[mode].max())
+    own = keys[worst_mode]
+    if len(own) <= 2 * CLOSE_UP_SEGMENTS:
         return [whole]
-    worst = int(np.max(np.stack(list(errors.values())), axis=0).argmax())
-    first = int(np.clip(np.searchsorted(keys, worst) - CLOSE_UP_SEGMENTS // 2, 0, len(keys) - 1 - CLOSE_UP_SEGMENTS))
-    close = slice(int(keys[first]), int(keys[first + CLOSE_UP_SEGMENTS]) + 1)
+    worst = int(errors[worst_mode].argmax())
+    first = int(np.clip(np.searchsorted(own, worst) - CLOSE_UP_SEGMENTS // 2, 0, len(own) - 1 - CLOSE_UP_SEGMENTS))
+    close = slice(int(own[first]), int(own[first + CLOSE_UP_SEGMENTS]) + 1)
     return [whole, chart("close", f"The {CLOSE_UP_SEGMENTS} segments around the largest error", close)]
 
 
-def _numbers(caption: str, rows: list[Metrics]) -> Markup:
-    head = [_heading("Mode", "text"), *(_heading(column.title, "number", column.unit) for column in COLUMNS)]
-    best = {column.metric: min(getattr(row, column.metric) for row in rows) for column in COLUMNS}
+def _numbers(caption: str, rows: list[Metrics], columns: Sequence[Column]) -> Markup:
+    head = [heading("Mode", "text"), *(heading(column.title, "number", column.unit) for column in columns)]
+    best = {column.metric: min(getattr(row, column.metric) for row in rows) for column in columns}
     body = [
         element(
             "tr",
-            _mode_cell(row.mode),
+            mode_cell(row.mode),
             [
-                _number_cell(
+                number_cell(
                     value := getattr(row, column.metric),
-                    _rounded(value * column.factor),
-                    best=len(rows) > 1 and _is_best(value, best[column.metric]),
+                    str(value) if isinstance(value, int) else rounded(value * column.factor),
+                    best=len(rows) > 1 and is_best(value, best[column.metric]),
                 )
-                for column in COLUMNS
+                for column in columns
             ],
         )
         for row in rows
     ]
-    return _table(caption, head, body)
+    return table(caption, head, body)
 
 
 # -- this run ---------------------------------------------------------------------------------------------------------
 
 
-def _settings_section(summary: Summary, settings: Settings) -> Markup:
+FACTS = {Uniform: "Rates", Budget: "Budgets of keys", Tolerance: "Tolerances"}
+
+
+def _settings_section(summaries: Sequence[Summary], settings: Settings) -> Markup:
     facts: list[tuple[str, Content]] = [
         ("Program", settings.program),
         ("Blender", settings.blender),
-        ("Rates", f"{listed(summary.rates)} keys/s"),
-        ("Modes", [[element("code", mode), " "] for mode in summary.modes]),
+        *((FACTS[summary.kind], f"{listed(summary.amounts)} {summary.kind.unit}".strip()) for summary in summaries),
+        ("Modes", [[element("code", mode), " "] for mode in summaries[0].modes]),
         ("Radius of the shell", f"{settings.radius:g} m"),
         *settings.details.items(),
         ("Command", element("code", settings.command)),
@@ -464,83 +558,20 @@ def _settings_section(summary: Summary, settings: Settings) -> Markup:
         element(
             "p",
             "All numbers, at full precision, are in metrics.csv beside this page; the keys and every in-between are in "
-            "the folders of the clips and rates.",
+            "the folders of the clips, one for each choice of keys.",
             class_="note",
         ),
         id="settings",
     )
 
 
-# -- parts ------------------------------------------------------------------------------------------------------------
-
-
-def _label(mode: str) -> str:
-    return MODES[mode].label
-
-
-def _curve(group: Sequence[str], x: np.ndarray, y: np.ndarray) -> Curve:
-    return Curve(tuple(map(_label, group)), x, y, colour_of(group[0]))
-
-
-def _swatch(mode: str) -> Markup:
-    return element("i", class_="swatch", style=f"--colour:{colour_of(mode)}")
-
-
-def _table(caption: str, head: list[Markup], body: list[Markup]) -> Markup:
-    table = element(
-        "table",
-        element("caption", caption),
-        element("thead", element("tr", head)),
-        element("tbody", body),
-        class_="numbers sortable",
-    )
-    return element("div", table, class_="scroll", role="region", tabindex=0, aria_label=caption)
-
-
-def _heading(title: str, kind: str, unit: str = "") -> Markup:
-    return element(
-        "th", element("span", title, element("small", f" {unit}") if unit else None), scope="col", class_=kind
-    )
-
-
-def _mode_cell(mode: str) -> Markup:
-    return element("th", _swatch(mode), _label(mode), scope="row", data_value=_label(mode))
-
-
-def _number_cell(value: float, shown: str, *, best: bool, tint: float | None = None) -> Markup:
-    """A number, marked where it is the best of its column; `tint` shades it by how far it is from 1."""
-    if not np.isfinite(value):
-        return element("td", "n/a", data_value="Infinity")
-    shade = None
-    if tint is not None and abs(tint - 1.0) >= 0.005:
-        shade = (
-            f"--tint:var({'--better' if tint < 1.0 else '--worse'});--share:{min(abs(tint - 1.0) * 120.0, 45.0):.0f}%"
-        )
-    mark = element("b", shown, element("span", " best", class_="spoken")) if best else shown
-    return element("td", mark, data_value=repr(float(value)), class_="best" if best else None, style=shade)
-
-
-def _is_best(value: float, best: float) -> bool:
-    """Equal to the best but for rounding: identical modes are best together."""
-    return bool(value <= best * (1.0 + 1e-6) + 1e-12)
-
-
-def _rounded(value: float) -> str:
-    """Three digits that count, without exponents where a table can do without."""
-    if value == 0.0 or abs(value) < 1e-6:
-        return "0"
-    if abs(value) < 1e-3:
-        return f"{value:.1e}"
-    return f"{value:.{max(2 - int(np.floor(np.log10(abs(value)))), 0)}f}"
-
-
 # -- videos -----------------------------------------------------------------------------------------------------------
 
 
-def _name_of(reconstructions: Sequence[Reconstruction], clip: str, rate: str) -> str:
+def _name_of(reconstructions: Sequence[Reconstruction], clip: str, choice: str) -> str:
     clips = list(dict.fromkeys(one.clip.name for one in reconstructions))
-    rates = [one.rate for one in reconstructions if one.clip.name == clip]
-    return f"clip-{clips.index(clip) + 1}-rate-{rates.index(rate) + 1}-film"
+    choices = [one.choice.name for one in reconstructions if one.clip.name == clip]
+    return f"clip-{clips.index(clip) + 1}-rate-{choices.index(choice) + 1}-film"
 
 
 def _write_film(stream: TextIO, name: str, film: Path) -> None:

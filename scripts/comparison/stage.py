@@ -17,8 +17,8 @@ from mathutils import Matrix
 from addon.motion.quaternions import rotate
 
 from . import captions, layout, palette
-from .clips import Reconstruction
 from .lanes import Cast, Lanes
+from .reconstructions import Reconstruction
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
 
@@ -82,7 +82,7 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
-    scene.name = f"{reconstruction.clip.name} {reconstruction.rate}"
+    scene.name = f"{reconstruction.clip.name} {reconstruction.choice.name}"
     timeline = Timeline.of(reconstruction, settings.fps, settings.slow_motion)
     motion = ShownMotion.of(reconstruction, timeline)
     mesh = load_subject(settings.subject)
@@ -104,6 +104,7 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
         errors=errors,
         largest_error=max(float(error.max()) for error in errors.values()),
         mesh=mesh,
+        notes=_notes(reconstruction),
         traced=layout.telling_point(motion.recording, outline),
     )
 
@@ -139,6 +140,15 @@ def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[st
     }
 
 
+def _notes(reconstruction: Reconstruction) -> dict[str, str]:
+    """Mode id to itself, or to its own number of keys where the modes have different ones."""
+    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items()}
+    if len(set(counts.values())) == 1:
+        return {mode: mode for mode in counts}
+    duration = float(np.ptp(reconstruction.times[[0, -1]]))
+    return {mode: f"{(count - 1) / duration:.1f} keys/s on average" for mode, count in counts.items()}
+
+
 def _make_frame(metres: float) -> bpy.types.Object:
     """The plane of the picture, behind everything that moves."""
     frame = bpy.data.objects.new("Frame", None)
@@ -164,7 +174,7 @@ def _make_header(
     name_width = captions.width_of(reconstruction.clip.name)
     size = min(0.046, 0.5 * (right - left) / name_width)
     put(captions.words("Clip", reconstruction.clip.name, size, lanes.ink), left, line)
-    rate = captions.words("Rate", f"{reconstruction.rate} keys/s", 0.034, lanes.faint)
+    rate = captions.words("Choice of keys", reconstruction.choice.title, 0.034, lanes.faint)
     put(rate, left + name_width * size + 0.03, line)
     timeline = cast.timeline
     ends = timeline.frames[[0, -1]]

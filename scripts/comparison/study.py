@@ -5,18 +5,25 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from addon.motion import decimate, interpolate, measure, repair
+import numpy as np
+
+from addon.motion import interpolate, measure, repair
 from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
 
-from .clips import Clip, Reconstruction
+from .choices import Choice, Uniform
+from .clips import Clip
+from .reconstructions import Reconstruction, identical_modes
 
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
 
-NOT_FOLDERS = {"metrics.csv", "report.html", *["con", "prn", "aux", "nul"]} | {
+NOT_FOLDERS = {"metrics.csv", "keys_needed.csv", "report.html", *["con", "prn", "aux", "nul"]} | {
     f"{device}{digit}" for device in ("com", "lpt") for digit in range(1, 10)
 }
 """Names that the output needs itself, or that Windows keeps for devices."""
+
+PROBE = 4
+"""Of so many samples one is a key where it is looked which modes are one motion."""
 
 
 def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]]:
@@ -78,14 +85,13 @@ def folder_name(wanted: str, taken: Iterable[str]) -> str:
     return safe
 
 
-def reconstruct(clip: Clip, rate: str, modes: Iterable[str], radius: float) -> Reconstruction | None:
-    """Keep `rate` keys a second of the clip, and fill in between them under every mode.
+def reconstruct(clip: Clip, choice: Choice, modes: Iterable[str], radius: float) -> Reconstruction | None:
+    """Choose keys of the clip for every mode, and fill in between them.
 
     Parameters
     ----------
     clip : Clip
-    rate : str
-        Keys a second, as the user wrote it.
+    choice : Choice
     modes : iterable of str
     radius : float
         Of the shell, in metres.
@@ -93,13 +99,35 @@ def reconstruct(clip: Clip, rate: str, modes: Iterable[str], radius: float) -> R
     Returns
     -------
     Reconstruction or None
-        None where the clip is too short for two keys at this rate.
+        None where the clip is too short for two keys.
+
+    Notes
+    -----
+    Modes that are one motion get one choice of keys, made for the first of them: choosing by the motion takes time,
+    and rounding must not make them look different.
     """
-    keys = decimate(clip.times, float(rate))
-    if len(keys) < 2:
+    modes = tuple(modes)
+    groups = [modes] if choice.decimation == "uniform" else same_motions(clip, modes, radius)
+    keys: dict[str, np.ndarray] = {}
+    for group in groups:
+        keys |= dict.fromkeys(group, choice.keys(clip, group[0], radius))
+    if min(map(len, keys.values())) < 2:
         return None
-    samples = slice(int(keys[0]), int(keys[-1]) + 1)
+    return fill_in(clip, choice, {mode: keys[mode] for mode in modes}, radius)
+
+
+def fill_in(clip: Clip, choice: Choice, keys: dict[str, np.ndarray], radius: float) -> Reconstruction:
+    """What each mode makes of its keys, at least two, which begin and end with the same samples."""
+    ends = next(iter(keys.values()))
+    samples = slice(int(ends[0]), int(ends[-1]) + 1)
     times, truth = clip.times[samples], clip.in_metres(clip.poses[samples])
-    poses = {mode: interpolate(clip.times[keys], clip.poses[keys], times, mode) for mode in modes}
+    poses = {mode: interpolate(clip.times[kept], clip.poses[kept], times, mode) for mode, kept in keys.items()}
     errors = {mode: measure(times, clip.in_metres(filled), truth, radius) for mode, filled in poses.items()}
-    return Reconstruction(clip, rate, keys, poses, errors)
+    return Reconstruction(clip, choice, keys, poses, errors)
+
+
+def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tuple[str, ...], ...]:
+    """The modes in groups that are one motion on this clip, seen with about every `PROBE`th sample as a key."""
+    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
+    probe = reconstruct(clip, Uniform(f"{max(rate, 1e-6):.6f}"), modes, radius)
+    return identical_modes([probe]) if probe else tuple((mode,) for mode in modes)

@@ -15,7 +15,7 @@ import numpy as np
 from addon.motion import Poses, interpolate
 from scripts.trajectories.axes import to_blender
 
-from .clips import Reconstruction
+from .reconstructions import Reconstruction
 
 PATH_RATE = 120.0
 """At least so many points of a path are drawn for a second of the film."""
@@ -77,11 +77,11 @@ class ShownMotion:
     modes: dict[str, Poses]
     """Mode id to poses."""
 
-    keys: Poses
-    """The poses that were kept, shape (k,)."""
+    keys: dict[str, Poses]
+    """Mode id to the poses that were kept, shape (k,)."""
 
-    key_frames: np.ndarray
-    """When they are, shape (k,)."""
+    key_frames: dict[str, np.ndarray]
+    """Mode id to when they are, shape (k,)."""
 
     centre: np.ndarray
     """The middle of the recording, which became the origin: in Blender's axes, shape (3,)."""
@@ -90,7 +90,8 @@ class ShownMotion:
     def of(cls, reconstruction: Reconstruction, timeline: Timeline) -> ShownMotion:
         """Every mode's own in-betweens, not those of the recording's sample times joined by lines."""
         clip, kept = reconstruction.clip, reconstruction.keys
-        key_times, keys = clip.times[kept], clip.poses[kept]
+        key_times = {mode: clip.times[keys] for mode, keys in kept.items()}
+        keys = {mode: clip.poses[of_mode] for mode, of_mode in kept.items()}
         times = timeline.times_of(timeline.fine_frames)
 
         def shown(poses: Poses) -> Poses:
@@ -101,10 +102,10 @@ class ShownMotion:
         return cls(
             recording=_around(centre, recording),
             modes={
-                mode: _around(centre, shown(interpolate(key_times, keys, times, mode))) for mode in reconstruction.poses
+                mode: _around(centre, shown(interpolate(key_times[mode], keys[mode], times, mode))) for mode in kept
             },
-            keys=_around(centre, shown(keys)),
-            key_frames=timeline.frames_of(key_times),
+            keys={mode: _around(centre, shown(poses)) for mode, poses in keys.items()},
+            key_frames={mode: timeline.frames_of(moments) for mode, moments in key_times.items()},
             centre=centre,
         )
 

@@ -17,7 +17,7 @@ import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
 from scipy.spatial.transform import Rotation
 
-from addon.motion import MODES, Poses, shell_error
+from addon.motion import MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
 from scripts.comparison.study import folder_name
 
@@ -26,7 +26,7 @@ RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
 
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
-    "rms_position_m,rms_rotation_deg,rms_velocity_m_s"
+    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m,keys_per_s"
 )
 SMALL = ["--resolution", "160x90", "--fps", "6"]
 
@@ -67,11 +67,32 @@ def short_clip(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def adaptive(short_clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output for one second of an asset, with evenly spaced and with adaptive keys."""
+    output = tmp_path_factory.mktemp("adaptive")
+    asked = ("--decimate", "adaptive", "--tolerance", "5mm, 0.02", "--rates", "10")
+    assert run(short_clip, "--no-video", "--output", output, *asked) == 0
+    return output
+
+
+@pytest.fixture(scope="module")
 def measured(tmp_path_factory) -> Path:
     """The output of the main job on the assets, without videos."""
     output = tmp_path_factory.mktemp("measured")
     assert run("--no-video", "--output", output, "--rates", "5,7.5,20") == 0
     return output
+
+
+def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """By SciPy: offsets of the origin (n, 3), turns in radians (n,) and shell errors (n,) between two tables."""
+    offset = poses_of(filled).positions - poses_of(truth).positions
+    turns = [Rotation.from_quat(poses_of(columns).quaternions, scalar_first=True) for columns in (filled, truth)]
+    arms = [0.1 * (turns[0].as_matrix() - turns[1].as_matrix())[:, :, axis] for axis in range(3)]
+    return {
+        "offset": offset,
+        "turn": (turns[1].inv() * turns[0]).magnitude(),
+        "shell": np.max([np.linalg.norm(offset + arm, axis=1) for arm in arms], axis=0),
+    }
 
 
 def test_there_is_a_row_for_every_clip_rate_and_mode(measured):
@@ -92,10 +113,8 @@ def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measure
         truth = {name: column[compared] for name, column in recording.items()}
         assert np.array_equal(filled["t"], truth["t"])
         assert np.isin(keys["t"], truth["t"]).all()
-        offset = poses_of(filled).positions - poses_of(truth).positions
-        turns = [Rotation.from_quat(poses_of(columns).quaternions, scalar_first=True) for columns in (filled, truth)]
-        arms = [0.1 * (turns[0].as_matrix() - turns[1].as_matrix())[:, :, axis] for axis in range(3)]
-        shell = np.max([np.linalg.norm(offset + arm, axis=1) for arm in arms], axis=0)
+        errors = errors_of(filled, truth)
+        offset, shell = errors["offset"], errors["shell"]
         drift = np.linalg.norm(np.diff(offset, axis=0), axis=1) / np.diff(truth["t"])
         expected = {
             "keys": len(keys["t"]),
@@ -106,11 +125,87 @@ def test_every_number_can_be_had_again_from_the_tables_and_the_recording(measure
             "p95_shell_m": np.percentile(shell, 95),
             "max_shell_m": shell.max(),
             "rms_position_m": np.sqrt(np.mean(np.sum(offset**2, axis=1))),
-            "rms_rotation_deg": np.degrees(np.sqrt(np.mean((turns[1].inv() * turns[0]).magnitude() ** 2))),
+            "rms_rotation_deg": np.degrees(np.sqrt(np.mean(errors["turn"] ** 2))),
             "rms_velocity_m_s": np.sqrt(np.mean(drift**2)),
+            "keys_per_s": (len(keys["t"]) - 1) / np.ptp(keys["t"]),
         }
         for name, value in expected.items():
             assert float(row[name]) == pytest.approx(value, rel=1e-6, abs=1e-9), (row["clip"], row["mode"], name)
+
+
+def test_adaptive_keys_are_samples_that_keep_each_mode_within_the_tolerance(adaptive, short_clip):
+    recording = table(short_clip)
+    rows = [row for row in rows_of(adaptive / "metrics.csv") if row["decimation"] == "adaptive"]
+    assert {(row["mode"], row["tolerance_m"]) for row in rows} == {
+        (mode, m) for mode in MODES for m in ("0.005", "0.02")
+    }
+    for row in rows:
+        folder = adaptive / "toss" / {"0.005": "tolerance-5mm", "0.02": "tolerance-0.02"}[row["tolerance_m"]]
+        keys, filled = table(folder / f"{row['mode']}.keys.csv"), table(folder / f"{row['mode']}.csv")
+        assert np.array_equal(filled["t"], recording["t"])
+        kept = np.isin(recording["t"], keys["t"])
+        assert kept.sum() == len(keys["t"]) == int(row["keys"]) < len(recording["t"])
+        for name in ("x", "y", "z"):
+            assert np.array_equal(keys[name], recording[name][kept])
+        again = interpolate(keys["t"], poses_of(keys), recording["t"], row["mode"])
+        assert shell_error(again, poses_of(filled)).max() < 1e-12
+        shell = errors_of(filled, recording)["shell"]
+        assert shell.max() <= float(row["tolerance_m"]) * (1.0 + 1e-9)
+        assert float(row["max_shell_m"]) == pytest.approx(shell.max(), rel=1e-9)
+        assert float(row["keys_per_s"]) == pytest.approx((len(keys["t"]) - 1) / np.ptp(recording["t"]))
+        assert row["rate_hz"] == ""
+
+
+def test_rates_beside_adaptive_keys_are_kept_evenly(adaptive):
+    assert sorted(path.name for path in (adaptive / "toss").iterdir()) == ["10", "tolerance-0.02", "tolerance-5mm"]
+    evenly = [row for row in rows_of(adaptive / "metrics.csv") if row["decimation"] == "uniform"]
+    assert {(row["rate_hz"], row["tolerance_m"], row["keys"]) for row in evenly} == {("10", "", "11")}
+    assert sorted(path.name for path in (adaptive / "toss" / "10").iterdir()) == sorted(
+        f"{name}.csv" for name in ("keys", *MODES)
+    )
+
+
+def test_the_keys_needed_reach_the_error_of_the_reference(adaptive, short_clip):
+    recording = table(short_clip)
+    rows = rows_of(adaptive / "keys_needed.csv")
+    assert {row["as_good_as_hz"] for row in rows} >= {"30", "20", "15", "12"}
+    for row in rows:
+        kept = decimate(recording["t"], float(row["as_good_as_hz"]))
+        covered = {name: column[: kept[-1] + 1] for name, column in recording.items()}
+        keys = {name: column[kept] for name, column in recording.items()}
+        filled = interpolate(keys["t"], poses_of(keys), covered["t"], "lerp_slerp")
+        columns = np.hstack((filled.positions, filled.quaternions)).T
+        shell = errors_of(dict(zip(("x", "y", "z", "qw", "qx", "qy", "qz"), columns, strict=True)), covered)["shell"]
+        wanted = np.sqrt(np.mean(shell**2))
+        assert float(row["wanted_rms_shell_m"]) == pytest.approx(wanted, rel=1e-9)
+        if row["keys"]:
+            assert float(row["rms_shell_m"]) <= wanted * (1.0 + 1e-9)
+            assert float(row["share"]) == pytest.approx(int(row["keys"]) / len(kept))
+    assert "Keys needed" in (adaptive / "report.html").read_text()
+
+
+def test_budgets_are_the_rates_where_neither_a_tolerance_nor_a_budget_is_given(short_clip, tmp_path):
+    asked = ("--no-video", "--output", tmp_path, "--modes", "lerp_slerp")
+    assert run(short_clip, *asked, "--decimate", "adaptive", "--rates", "10") == 0
+    assert sorted(path.name for path in (tmp_path / "toss").iterdir()) == ["10", "budget-10"]
+    evenly, adaptive = rows_of(tmp_path / "metrics.csv")
+    assert (evenly["keys"], evenly["rate_hz"]) == (adaptive["keys"], adaptive["rate_hz"]) == ("11", "10")
+    assert float(adaptive["rms_shell_m"]) < float(evenly["rms_shell_m"])
+
+
+def test_the_keys_needed_in_an_earlier_run_do_not_pass_for_those_of_this(short_clip, tmp_path):
+    (tmp_path / "keys_needed.csv").write_text("earlier")
+    assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "10") == 0
+    assert not (tmp_path / "keys_needed.csv").exists()
+
+
+def test_an_adaptive_choice_has_its_video_too(short_clip, tmp_path):
+    asked = ("--decimate", "adaptive", "--tolerance", "5mm", "--modes", "lerp_slerp,motor_spline")
+    assert run(short_clip, "--output", tmp_path, *asked, *SMALL) == 0
+    folder = tmp_path / "toss" / "tolerance-5mm"
+    assert (folder / "comparison.mp4").stat().st_size > 0
+    assert (folder / "comparison.blend").is_file()
+    assert 'href="toss/tolerance-5mm/comparison.mp4"' in (tmp_path / "report.html").read_text()
 
 
 def test_screws_are_pytransform3ds_between_the_written_keys(measured):
@@ -184,6 +279,14 @@ def test_what_is_repaired_is_said(short_clip, tmp_path, capsys):
         (["--resolution", "big"], "1280x720"),
         (["--fps", "0"], "1 to 240"),
         (["--axes", "maya"], "unity"),
+        (["--tolerance", "5mm"], "--tolerance is for keys that are chosen by the motion: add --decimate adaptive"),
+        (["--budget", "10"], "--budget is for keys that are chosen by the motion: add --decimate adaptive"),
+        (["--decimate", "adaptive", "--tolerance", "5mm", "--budget", "10"], "exclude one another"),
+        (["--decimate", "adaptive", "--tolerance", "5 inches"], "give a length such as 5mm"),
+        (["--decimate", "adaptive", "--tolerance", "0"], "give a length such as 5mm"),
+        (["--decimate", "adaptive", "--tolerance", ","], "give a length such as 5mm"),
+        (["--decimate", "adaptive", "--budget", "5mm"], "give numbers such as 5,7.5,10"),
+        (["--decimate", "cleverly"], "adaptive"),
     ],
 )
 def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
@@ -228,9 +331,17 @@ def test_clips_too_short_for_every_rate_end_with_code_2(short_clip, tmp_path, ca
     assert not (tmp_path / "report.html").exists()
 
 
+def test_clips_too_short_for_every_budget_are_told_the_option_to_raise(short_clip, tmp_path, capsys):
+    asked = ("--no-video", "--output", tmp_path, "--decimate", "adaptive", "--budget", "0.5")
+    assert run(short_clip, *asked) == 2
+    assert "give higher --budget" in capsys.readouterr().err
+
+
 def test_help_has_examples(capsys):
     assert exit_code("--help") == 0
-    assert "blender --background --python scripts/compare.py --" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "blender --background --python scripts/compare.py --" in said
+    assert "--decimate adaptive --tolerance 5mm" in said
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for another process")

@@ -74,6 +74,17 @@ function nearest(points, x) {
   return x - points[low][0] < points[high][0] - x ? low : high;
 }
 
+// Where a curve is at x, as drawn; undefined where it is not.
+function heightAt(points, x) {
+  const [first, last] = [points[0][0], points[points.length - 1][0]];
+  if (x < first || x > last) return undefined;
+  const after = points.findIndex((point) => point[0] >= x);
+  const [right, below] = points[after];
+  if (right === x) return below;
+  const [left, above] = points[after - 1];
+  return above + ((x - left) / (right - left)) * (below - above);
+}
+
 function prepare(chart) {
   const box = chart.querySelector("svg[viewBox]").viewBox.baseVal;
   const [xAxis, yAxis] = [axisFrom(chart.dataset.x), axisFrom(chart.dataset.y)];
@@ -103,7 +114,8 @@ function prepare(chart) {
     line.setAttribute("x1", `${share * 100}%`);
     line.setAttribute("x2", `${share * 100}%`);
     const rows = drawn
-      .map((curve) => ({ ...curve, y: curve.points[nearest(curve.points, xs[at])][1] }))
+      .map((curve) => ({ ...curve, y: heightAt(curve.points, xs[at]) }))
+      .filter((curve) => curve.y !== undefined)
       .sort((a, b) => a.y - b.y)
       .map((curve) => {
         const row = document.createElement("div");

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from addon.motion import MODES, Poses, decimate, interpolate, measure
-from scripts.comparison.clips import Clip, Reconstruction
+from scripts.comparison.choices import Uniform
+from scripts.comparison.clips import Clip
+from scripts.comparison.reconstructions import Reconstruction
 
 
 def swinging_clip(
@@ -28,4 +30,4 @@ def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(MOD
     times, truth = clip.times[samples], clip.poses[samples]
     poses = {mode: interpolate(clip.times[keys], clip.poses[keys], times, mode) for mode in modes}
     errors = {mode: measure(times, poses[mode], truth) for mode in modes}
-    return Reconstruction(clip, rate, keys, poses, errors)
+    return Reconstruction(clip, Uniform(rate), dict.fromkeys(modes, keys), poses, errors)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,11 +15,13 @@ from scripts.comparison.charts import (
     HEIGHT,
     Axis,
     Curve,
+    Marks,
     axis_over,
     line_chart,
     log_ticks,
     nice_ticks,
     thin,
+    with_rows_below,
 )
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -121,7 +124,7 @@ def test_thinning_keeps_the_ends_and_the_extremes_in_their_order(values: list[fl
 
 
 def test_keys_are_marked_on_the_axis_once_for_every_place() -> None:
-    chart = draw([curve()], marks=np.array([0.0, 2.5, 2.5001, 10.0]))
+    chart = draw([curve()], marks=[Marks(np.array([0.0, 2.5, 2.5001, 10.0]))])
     (marks,) = (path.get("d", "") for path in chart.iter(f"{SVG}path") if path.get("class") == "marks")
     assert [int(place) for place in re.findall(r"M(\d+)", marks)] == [0, GRID_X // 4, GRID_X]
 
@@ -175,3 +178,29 @@ def test_an_axis_has_room_for_whatever_comes(values: list[float], log: bool) -> 
     for value in values:
         if np.isfinite(value) and (value > 0.0 or not log):
             assert axis.low <= value <= axis.high
+
+
+def test_marks_of_several_kinds_stand_in_rows_below_the_curves_in_their_colours() -> None:
+    axis = with_rows_below(axis_over("error", "mm", np.array([0.0, 4.0])), 2)
+    chart = draw(
+        [curve(y=(0.0, 4.0, 0.0))], y=axis, marks=[Marks(np.array([0.0]), "#111111"), Marks(np.array([5.0]), "#222222")]
+    )
+    rows = [path for path in chart.iter(f"{SVG}path") if "marks" in path.get("class", "")]
+    spans = [[int(number) for number in re.fullmatch(r"M\d+ (\d+)v-(\d+)", row.get("d", "")).groups()] for row in rows]
+    (first, height), (second, _) = spans
+    assert [row.get("style") for row in rows] == ["--colour:#111111", "--colour:#222222"]
+    assert second < first - height
+    assert drawn_points(chart)[0][:, 1].max() < second - height
+    assert "-" not in "".join(node.text or "" for node in chart.iter(f"{SVG}text"))
+
+
+def test_a_dashed_curve_is_drawn_and_named_to_pointers_but_has_no_label_of_its_own() -> None:
+    companion = replace(curve("a, evenly"), dashed=True)
+    chart = draw([curve("a"), companion], points=True, listed=True)
+    assert [path.get("class") for path in chart.iter(f"{SVG}path") if "curve" in path.get("class", "")] == [
+        "curve",
+        "curve dashed",
+    ]
+    assert [span.text for span in chart.iter(f"{SVG}tspan")] == ["a"]
+    assert "a, evenly" in [title.text for title in chart.iter(f"{SVG}title")]
+    assert len([dots for dots in chart.iter(f"{SVG}g") if "dots" in dots.get("class", "")]) == 2

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scripts.comparison.findings import Summary, findings, identical_modes, summarise
+from scripts.comparison.choices import Budget, Tolerance, Uniform
+from scripts.comparison.findings import Summary, findings, summarise
 from scripts.comparison.metrics import measure_reconstruction
+from scripts.comparison.reconstructions import identical_modes
+from scripts.comparison.study import reconstruct as fill_by
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 LABELS = {"lerp_slerp": "Line", "dq_sclerp": "Screw", "pga_slerp": "Motor", "pga_lerp": "Blend"}
@@ -17,9 +20,13 @@ def summary(errors: object, modes: tuple[str, ...] = ("lerp_slerp", "dq_sclerp")
     errors = np.array(errors, dtype=float)
     return Summary(
         clips=tuple("abcdefgh"[: errors.shape[0]]),
-        rates=("5", "10", "20")[: errors.shape[1]],
         modes=modes,
-        **{"groups": tuple((mode,) for mode in modes), "errors": errors, **fields},
+        **{
+            "choices": tuple(Uniform(rate) for rate in ("5", "10", "20")[: errors.shape[1]]),
+            "groups": tuple((mode,) for mode in modes),
+            "errors": errors,
+            **fields,
+        },
     )
 
 
@@ -33,6 +40,7 @@ def test_the_modes_that_theory_calls_one_curve_are_found_to_be_one() -> None:
         ("lerp_slerp",),
         ("dq_sclerp", "pga_slerp", "cga_slerp"),
         ("pga_lerp", "cga_lerp"),
+        ("motor_spline",),
     )
 
 
@@ -47,11 +55,11 @@ def test_modes_that_part_on_a_single_clip_are_not_called_identical() -> None:
 def test_the_summary_holds_every_error_at_its_place() -> None:
     runs = [reconstruct(swinging_clip(name, seed=seed), rate) for seed, name in enumerate("ab") for rate in ("20", "5")]
     rows = [row for run in runs for row in measure_reconstruction(run)]
-    run = summarise(rows, identical_modes(runs))
+    (run,) = summarise([(run, measure_reconstruction(run)) for run in runs])
     assert run.clips == ("a", "b")
-    assert run.rates == ("5", "20")
+    assert run.amounts == ("5", "20")
     for row in rows:
-        clip, rate = run.clips.index(row.clip), run.rates.index(row.rate_hz)
+        clip, rate = run.clips.index(row.clip), run.amounts.index(row.rate_hz)
         assert run.of(row.mode)[clip, rate] == row.rms_shell_m
 
 
@@ -126,3 +134,28 @@ def test_identical_modes_are_found_in_recordings_of_any_unit() -> None:
     assert identical_modes([replace(run, errors=in_metres)]) == (("dq_sclerp", "pga_slerp"),)
     run.poses["pga_slerp"].positions[7] += 1e-3
     assert len(identical_modes([replace(run, errors=in_metres)])) == 2
+
+
+def test_where_a_tolerance_decides_the_number_of_keys_is_compared() -> None:
+    choices = (Tolerance("5mm"), Tolerance("2cm"))
+    text = said(summary([[[20.0, 10.0], [10.0, 4.0]], [[30.0, 15.0], [6.0, 6.0]]], choices=choices))
+    assert "the number of keys of Screw was 50 % lower within 5 mm and 37 % lower within 2 cm (geometric mean" in text
+    assert "Fewest keys within 5 mm: Screw on 2 of 2 clips." in text
+    assert "The largest gain over Line was that of Screw on a within 2 cm: a number of keys 60 % lower." in text
+    assert "error" not in text
+
+
+def test_with_a_budget_the_rates_are_said_to_be_averages() -> None:
+    text = said(summary([[[4.0, 2.0], [2.0, 1.0]]], choices=(Budget("5"), Budget("10"))))
+    assert "the error of Screw was 50 % lower at 5 and 50 % lower at 10 keys/s on average." in text
+    assert "paper" not in text
+
+
+def test_choices_of_different_kinds_are_summed_up_apart() -> None:
+    clip = swinging_clip(seconds=1.0)
+    choices = (Uniform("10"), Tolerance("1cm"), Uniform("5"))
+    runs = [fill_by(clip, choice, tuple(LABELS), 0.1) for choice in choices]
+    evenly, tolerated = summarise([(run, measure_reconstruction(run)) for run in runs])
+    assert evenly.choices == (Uniform("5"), Uniform("10"))
+    assert tolerated.choices == (Tolerance("1cm"),)
+    assert tolerated.errors[0, 0].tolist() == [row.keys_per_s for row in measure_reconstruction(runs[1])]

@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 
 from addon.motion import MODES, Errors, Poses
-from scripts.comparison.clips import Clip, Reconstruction
+from scripts.comparison.choices import Budget, Tolerance, Uniform
+from scripts.comparison.clips import Clip
 from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_poses, write_reconstruction
+from scripts.comparison.reconstructions import Reconstruction
+from scripts.comparison.study import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,"
-    "rms_shell_m,p95_shell_m,max_shell_m,rms_position_m,rms_rotation_deg,rms_velocity_m_s"
+    "rms_shell_m,p95_shell_m,max_shell_m,rms_position_m,rms_rotation_deg,rms_velocity_m_s,"
+    "decimation,tolerance_m,keys_per_s"
 )
 
 
@@ -41,7 +45,8 @@ def test_the_errors_are_statistics_of_the_samples_between_the_first_and_the_last
         velocity=np.array([2.0, 2.0, 2.0]),
     )
     clip = Clip("c", "c.csv", "blender", times, poses, ())
-    reconstruction = Reconstruction(clip, "5", np.array([0, 3]), {"lerp_slerp": poses[:4]}, {"lerp_slerp": errors})
+    keys = {"lerp_slerp": np.array([0, 3])}
+    reconstruction = Reconstruction(clip, Uniform("5"), keys, {"lerp_slerp": poses[:4]}, {"lerp_slerp": errors})
     (row,) = measure_reconstruction(reconstruction)
     assert (row.keys, row.samples) == (2, 4)
     assert row.duration_s == pytest.approx(0.4)
@@ -65,7 +70,7 @@ def test_bytes_are_counted_for_the_keys_that_were_there_and_not_for_the_rate_tha
 
 
 def test_a_single_key_is_refused_with_the_clip_and_the_rate() -> None:
-    single = replace(reconstruct(swinging_clip(), "10"), keys=np.array([0]))
+    single = replace(reconstruct(swinging_clip(), "10"), keys=dict.fromkeys(MODES, np.array([0])))
     with pytest.raises(ValueError, match="swing at 10 keys/s: 1 key has no in-betweens"):
         measure_reconstruction(single)
 
@@ -74,8 +79,10 @@ def test_metrics_read_back_exactly(tmp_path: Path) -> None:
     rows = measure_reconstruction(reconstruct(swinging_clip(), "10"))
     write_metrics(tmp_path / "metrics.csv", rows)
     for written, row in zip(read(tmp_path / "metrics.csv"), rows, strict=True):
-        for name in COLUMNS.split(",")[5:]:
+        for name in COLUMNS.split(",")[5:13]:
             assert float(written[name]) == getattr(row, name)
+        assert (written["decimation"], written["tolerance_m"]) == ("uniform", "")
+        assert float(written["keys_per_s"]) == row.keys_per_s == pytest.approx((row.keys - 1) / row.duration_s)
 
 
 def test_a_clip_name_with_a_comma_stays_one_field(tmp_path: Path) -> None:
@@ -107,6 +114,35 @@ def test_a_reconstruction_becomes_its_keys_and_a_table_for_every_mode(tmp_path: 
     write_reconstruction(tmp_path, reconstruction)
     assert {file.name for file in tmp_path.iterdir()} == {"keys.csv", *(f"{mode}.csv" for mode in MODES)}
     keys, filled = read(tmp_path / "keys.csv"), read(tmp_path / "pga_lerp.csv")
-    assert [float(row["t"]) for row in keys] == reconstruction.clip.times[reconstruction.keys].tolist()
+    assert [float(row["t"]) for row in keys] == reconstruction.clip.times[reconstruction.keys["pga_lerp"]].tolist()
     assert [float(row["qx"]) for row in filled] == reconstruction.poses["pga_lerp"].quaternions[:, 1].tolist()
     assert [float(row["t"]) for row in filled] == reconstruction.times.tolist()
+
+
+def test_adaptive_keys_are_told_with_how_they_were_chosen(tmp_path: Path) -> None:
+    clip = replace(swinging_clip(), metres_per_unit=0.1)
+    made = choose(clip, Tolerance("3mm"), MODES, 0.1)
+    write_metrics(tmp_path / "metrics.csv", measure_reconstruction(made))
+    for row in read(tmp_path / "metrics.csv"):
+        assert (row["rate_hz"], row["decimation"], float(row["tolerance_m"])) == ("", "adaptive", 0.003)
+        assert int(row["keys"]) == len(made.keys[row["mode"]])
+        assert float(row["keys_per_s"]) == pytest.approx((int(row["keys"]) - 1) / 3.0)
+        assert float(row["bytes_per_s"]) == pytest.approx(56.0 * float(row["keys_per_s"]))
+        assert float(row["max_shell_m"]) <= 0.003 * (1.0 + 1e-9)
+    (row, *_) = measure_reconstruction(choose(clip, Budget("7.5"), MODES, 0.1))
+    assert (row.rate_hz, row.decimation, row.tolerance_m) == ("7.5", "adaptive", None)
+
+
+def test_adaptive_keys_are_a_table_for_every_mode(tmp_path: Path) -> None:
+    made = choose(swinging_clip(), Tolerance("5mm"), ("lerp_slerp", "motor_spline"), 0.1)
+    write_reconstruction(tmp_path, made)
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        "lerp_slerp.csv",
+        "lerp_slerp.keys.csv",
+        "motor_spline.csv",
+        "motor_spline.keys.csv",
+    ]
+    for mode, keys in made.keys.items():
+        rows = read(tmp_path / f"{mode}.keys.csv")
+        assert [float(row["t"]) for row in rows] == made.clip.times[keys].tolist()
+        assert [float(row["qy"]) for row in rows] == made.clip.poses.quaternions[keys, 2].tolist()

@@ -5,6 +5,7 @@ import hashlib
 import html
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import datetime
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,9 +14,14 @@ import numpy as np
 import pytest
 
 from addon.motion import MODES
-from scripts.comparison.clips import Reconstruction
+from scripts.comparison.charts import GRID_X, GRID_Y
+from scripts.comparison.choices import Tolerance, Uniform
 from scripts.comparison.metrics import measure_reconstruction
+from scripts.comparison.needed import KeysNeeded, keys_needed
+from scripts.comparison.palette import colour_of
+from scripts.comparison.reconstructions import Reconstruction
 from scripts.comparison.report import COLUMNS, Settings, write_report
+from scripts.comparison.study import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 VOID = {"meta", "link", "br", "img", "input", "hr", "source"}
@@ -63,6 +69,14 @@ class Page(HTMLParser):
                 yield own, "".join(text)
 
 
+def assert_links_lead_somewhere(page: Page) -> list[str]:
+    ids = [own["id"] for _, own, _ in page.elements if "id" in own]
+    assert len(ids) == len(set(ids))
+    links = [own["href"] for own, _ in page.find("a")]
+    assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
+    return links
+
+
 def report(folder: Path, runs: list[Reconstruction], films: dict[tuple[str, str], Path] | None = None) -> Page:
     write_report(folder / "report.html", runs, films=films or {}, settings=SETTINGS)
     return Page(folder / "report.html")
@@ -89,11 +103,8 @@ def test_every_clip_rate_and_mode_has_its_place(page: Page) -> None:
 
 
 def test_ids_are_unique_and_every_link_within_the_page_leads_somewhere(page: Page) -> None:
-    ids = [own["id"] for _, own, _ in page.elements if "id" in own]
-    assert len(ids) == len(set(ids))
-    links = [own["href"] for own, _ in page.find("a")]
+    links = assert_links_lead_somewhere(page)
     assert "#clip-2-rate-3" in links
-    assert {link[1:] for link in links if link.startswith("#")} <= set(ids)
 
 
 def test_the_numbers_in_the_tables_are_those_of_the_metrics(page: Page, runs: list[Reconstruction]) -> None:
@@ -133,7 +144,7 @@ def test_identical_modes_share_a_line_and_the_line_bears_all_their_names(page: P
     joint = " = ".join(MODES[mode].label for mode in ("dq_sclerp", "pga_slerp", "cga_slerp"))
     curves = list(page.find("path", class_="curve"))
     assert joint in titles
-    assert len(curves) % 3 == 0
+    assert len(curves) % 4 == 0
     assert MODES["pga_slerp"].label not in titles
 
 
@@ -202,7 +213,7 @@ def test_a_rate_without_its_video_says_so_where_others_have_theirs(tmp_path: Pat
     film = tmp_path / "comparison.mp4"
     film.write_bytes(b"film")
     page = report(tmp_path, runs, {("reach", "5"): film, ("reach", "20"): tmp_path / "interrupted.mp4"})
-    assert page.source.count("There is no video for this rate.") == 5
+    assert page.source.count("There is no video with these keys.") == 5
     assert len(list(page.find("script", type="text/plain"))) == 1
 
 
@@ -242,3 +253,151 @@ def test_charts_describe_their_axes_in_plain_numbers(page: Page) -> None:
     for own, _ in charts:
         for axis in (own["data-x"], own["data-y"]):
             assert re.fullmatch(r"[-+\d.e]+ [-+\d.e]+ (log|linear) .*", axis)
+
+
+@pytest.fixture(scope="module")
+def adaptive(runs: list[Reconstruction], tmp_path_factory: pytest.TempPathFactory) -> tuple[Page, list[KeysNeeded]]:
+    """The report of a run with evenly spaced and adaptive keys."""
+    clips = [runs[0].clip, runs[3].clip]
+    choices = (Uniform("10"), Tolerance("5mm"), Tolerance("2cm"))
+    made = [choose(clip, choice, MODES, 0.1) for clip in clips for choice in choices]
+    needed = [keys_needed(clip, MODES, 0.1) for clip in clips]
+    path = tmp_path_factory.mktemp("adaptive") / "report.html"
+    write_report(path, made, films={}, settings=SETTINGS, needed=needed)
+    return Page(path), needed
+
+
+def table_of(page: Page, caption: str) -> list[list[str]]:
+    """The cells, row by row, of the table with this caption."""
+    start = next(place for place, (name, _, text) in enumerate(page.elements) if (name, *text) == ("caption", caption))
+    rows: list[list[str]] = []
+    for name, own, text in page.elements[start + 1 :]:
+        if name == "caption":
+            break
+        if name == "tr":
+            rows.append([])
+        if name == "td" or (name == "th" and own.get("scope") == "row"):
+            rows[-1].append("".join(text).replace("\u00a0", " ").removesuffix(" best"))
+    return [row for row in rows if row]
+
+
+def test_the_table_of_keys_has_a_number_and_a_share_for_every_motion(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, needed = adaptive
+    for clip in needed:
+        rows = table_of(page, f"{clip.clip}: keys needed to be as good as Vector + Quaternion")
+        assert [(row[0], row[1]) for row in rows] == [
+            (" = ".join(MODES[mode].label for mode in group), keys)
+            for group in clip.groups
+            for keys in ("evenly spaced", "adaptive")
+        ]
+        for place, row in enumerate(rows):
+            shares = clip.shares[place // 2, place % 2, :4] * 100.0
+            counts = clip.keys[place // 2, place % 2, :4]
+            assert row[2:] == [f"{count:.0f}{share:.0f} %" for count, share in zip(counts, shares, strict=True)]
+
+
+def test_over_all_clips_the_table_of_keys_has_geometric_means(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, needed = adaptive
+    rows = table_of(page, "Keys a second needed to be as good as Vector + Quaternion")
+    for place, row in enumerate(rows):
+        shares = np.sqrt(np.prod([clip.shares[place // 2, place % 2, :4] for clip in needed], axis=0))
+        rates = np.sqrt(np.prod([clip.keys_per_s[place // 2, place % 2, :4] for clip in needed], axis=0))
+        for cell, share, rate in zip(row[2:], shares, rates, strict=True):
+            number, percent = cell.split("/s")
+            assert float(number) == pytest.approx(rate, rel=0.006)
+            assert percent == f"{share * 100.0:.0f} %"
+
+
+def test_the_mode_that_did_with_the_fewest_keys_is_named(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, needed = adaptive
+    shares = np.sqrt(np.prod([clip.shares[:, :, :4] for clip in needed], axis=0))
+    sentences = [text.replace("\u00a0", " ") for _, text in page.find("li") if "was as good as" in text]
+    assert len(sentences) == 2
+    for sentence, decimation, keys in zip(sentences, (1, 0), ("adaptive", "evenly spaced"), strict=True):
+        best = needed[0].groups[int(np.prod(shares[:, decimation], axis=-1).argmin())]
+        first, second, third, last = (
+            f"{share * 100.0:.0f} %" for share in shares[needed[0].groups.index(best), decimation]
+        )
+        assert sentence == (
+            f"{MODES[best[0]].label} with {keys} keys was as good as Vector + Quaternion at 30, 20, 15 and 12 keys/s "
+            f"with {first}, {second}, {third} and {last} of the keys."
+        )
+
+
+def test_a_cell_says_where_an_error_is_not_reached_or_there_is_none(tmp_path: Path, runs: list[Reconstruction]) -> None:
+    whole = keys_needed(runs[0].clip, ("lerp_slerp", "motor_spline"), 0.1)
+    keys = whole.keys.copy()
+    keys[1, 0, 0], keys[:, :, 1] = np.inf, np.nan
+    write_report(tmp_path / "one.html", runs[:1], films={}, settings=SETTINGS, needed=[replace(whole, keys=keys)])
+    rows = table_of(Page(tmp_path / "one.html"), "reach: keys needed to be as good as Vector + Quaternion")
+    assert rows[2][2:4] == ["not reached", "n/a"]
+    write_report(
+        tmp_path / "two.html",
+        runs,
+        films={},
+        settings=SETTINGS,
+        needed=[replace(whole, keys=keys), replace(whole, clip="throw")],
+    )
+    rows = table_of(Page(tmp_path / "two.html"), "Keys a second needed to be as good as Vector + Quaternion")
+    assert rows[2][2].endswith("% on 1 of 2 clips")
+    assert "clips" not in rows[2][3]
+    assert "20/s (1 of 2 clips)" in [text for _, text in Page(tmp_path / "two.html").find("th", scope="col")]
+
+
+def test_the_curve_of_error_over_keys_runs_through_what_was_found(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, needed = adaptive
+    for clip, name in zip(needed, ("clip-1", "clip-2"), strict=True):
+        (chart,) = (
+            place
+            for place, (kind, own, _) in enumerate(page.elements)
+            if kind == "svg" and own.get("aria-labelledby", "").startswith(f"{name}-needed-title")
+        )
+        own = page.elements[chart][1]
+        low_x, high_x, low_y, high_y = (float(word) for axis in ("data-x", "data-y") for word in own[axis].split()[:2])
+        curves = [element for element in page.elements[chart:] if element[1].get("class", "").startswith("curve")]
+        for row, group in enumerate(clip.groups):
+            (_, dashed, title), (_, solid, _) = curves[2 * row : 2 * row + 2]
+            assert "".join(title) == " = ".join(MODES[mode].label for mode in group) + ", evenly spaced"
+            assert (dashed["class"], solid["class"]) == ("curve dashed", "curve")
+            for drawn, x, y in (
+                (dashed, clip.reference_keys_per_s, clip.uniform_errors[row]),
+                (solid, clip.keys_per_s[row, 1], clip.reached[row, 1]),
+            ):
+                steps = np.array(re.findall(r"-?\d+", drawn["d"]), dtype=int).reshape(-1, 2)
+                along, down = (np.cumsum(steps, axis=0) / (GRID_X, GRID_Y)).T
+                order = np.argsort(x)
+                np.testing.assert_allclose(low_x * (high_x / low_x) ** along, x[order], rtol=0.005)
+                np.testing.assert_allclose(low_y * (high_y / low_y) ** (1.0 - down), y[order] * 1e3, rtol=0.005)
+
+
+def test_modes_with_keys_of_their_own_have_their_numbers_and_marks(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, needed = adaptive
+    headings = [text for _, text in page.find("h3")]
+    assert headings.count("within 5 mm") == 2
+    made = choose(swinging_clip("reach", seed=1), Tolerance("5mm"), MODES, 0.1)
+    rows = table_of(page, "reach within 5 mm")
+    assert [row[1] for row in rows] == [str(len(keys)) for keys in made.keys.values()]
+    coloured = [own for _, own, _ in page.elements if own.get("class") == "marks coloured"]
+    assert {own["style"].removeprefix("--colour:") for own in coloured} == {
+        colour_of(group[0]) for group in needed[0].groups
+    }
+
+
+def test_the_lead_and_the_settings_tell_the_choices_apart(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, _ = adaptive
+    lead = next(text for _, text in page.find("p", class_="lead"))
+    assert "thinned to 10 keys a second, and to the fewest keys that keep a mode within 5 mm and 2 cm" in lead
+    facts = " ".join(text for _, text in page.find("dl", class_="facts"))
+    assert "Rates10 keys/s" in facts
+    assert "Tolerances5 mm and 2 cm" in facts
+
+
+def test_an_adaptive_report_is_sound(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
+    page, _ = adaptive
+    assert "#needed" in assert_links_lead_somewhere(page)
+    test_charts_describe_their_axes_in_plain_numbers(page)
+
+
+def test_a_run_without_adaptive_keys_does_not_speak_of_the_keys_needed(page: Page) -> None:
+    assert "Keys needed" not in page.source
+    assert "#needed" not in page.source

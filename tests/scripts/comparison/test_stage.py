@@ -12,9 +12,11 @@ from addon.animation import channelbag_of, read_poses
 from addon.motion import MODES, Poses, interpolate
 from addon.motion.quaternions import angle_between, conjugate, multiply, rotate
 from scripts.comparison import layout
+from scripts.comparison.choices import Tolerance
 from scripts.comparison.clips import Clip
 from scripts.comparison.nodes import input_path
 from scripts.comparison.stage import StageSettings, build_stage
+from scripts.comparison.study import reconstruct as choose
 from scripts.comparison.subject import vertices_of
 from scripts.comparison.timeline import Timeline
 from scripts.trajectories.axes import to_blender
@@ -51,11 +53,12 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     reconstruction = reconstruct(clip, "5")
     scene = build_stage(reconstruction, SETTINGS)
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
-    times, kept = timeline.times_of(timeline.frames), reconstruction.keys
+    times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
     for mode in MODES:
         lane = bpy.data.objects[f"Lane {mode}"]
         turn = np.array(lane.matrix_world.to_quaternion())
+        kept = reconstruction.keys[mode]
         shown = {
             mode: interpolate(clip.times[kept], clip.poses[kept], times, mode),
             f"{mode} recording": interpolate(clip.times, clip.poses, times, "dq_sclerp"),
@@ -101,7 +104,7 @@ CLIPS = {
 
 
 @pytest.mark.parametrize("clip", CLIPS)
-@pytest.mark.parametrize("modes", [TWO, tuple(MODES)], ids=["two", "six"])
+@pytest.mark.parametrize("modes", [TWO, tuple(MODES)], ids=["two", "all"])
 def test_everything_that_moves_stays_within_its_own_card(clip, modes):
     scene = build_stage(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
     aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
@@ -192,7 +195,7 @@ def test_keys_are_marked_where_the_modes_meet_the_recording():
     reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
     scene = build_stage(reconstruction, SETTINGS)
     keys = bpy.data.objects["dq_sclerp keys"]
-    assert len(keys.data.vertices) == len(reconstruction.keys)
+    assert len(keys.data.vertices) == len(reconstruction.keys["dq_sclerp"])
     scene.frame_set(scene.frame_end)
     radius = 0.02 * bpy.data.objects["Frame"].scale.x
     world = np.array(keys.matrix_world)
@@ -247,3 +250,33 @@ def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
 def test_settings_that_make_no_film_are_refused(wrong, said):
     with pytest.raises(ValueError, match=said):
         StageSettings(**wrong)
+
+
+def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counted_in_its_caption():
+    reconstruction = choose(swinging_clip(seconds=1.0), Tolerance("5mm"), ("lerp_slerp", "motor_spline"), 0.1)
+    scene = build_stage(reconstruction, SETTINGS)
+    assert scene.name == "swing tolerance-5mm"
+    assert bpy.data.curves["Choice of keys"].body == "within 5 mm"
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    assert len(reconstruction.keys["motor_spline"]) < len(reconstruction.keys["lerp_slerp"])
+    for mode, keys in reconstruction.keys.items():
+        marks = bpy.data.objects[f"{mode} keys"].data
+        frames = np.empty(len(marks.vertices), dtype=np.float32)
+        marks.attributes["frame"].data.foreach_get("value", frames)
+        assert np.allclose(frames, timeline.frames_of(reconstruction.clip.times[keys]), atol=1e-4)
+        caption = " ".join(bpy.data.curves[f"{mode} id"].body.split())
+        assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s on average"
+
+
+@pytest.mark.parametrize("modes", [TWO, tuple(MODES)], ids=["two", "all"])
+@pytest.mark.parametrize("clip", [1.0, (0.0, 0.0, 3.0)], ids=["as recorded", "up and down"])
+def test_the_count_of_keys_does_not_run_into_the_error(modes, clip):
+    build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), SETTINGS)
+    for mode in modes:
+        count, number = bpy.data.objects[f"{mode} id"], bpy.data.objects[f"{mode} error"]
+        corners = np.array([count.matrix_local @ Vector(corner) for corner in count.bound_box])
+        label = bpy.data.objects[f"{mode} label"]
+        assert corners[:, 1].max() < min((label.matrix_local @ Vector(corner)).y for corner in label.bound_box)
+        digits = 4 * 0.5 * number.scale.x
+        beside, above = number.location.x - digits, number.location.y + 0.75 * number.scale.y
+        assert corners[:, 0].max() < beside or corners[:, 1].min() > above

@@ -39,11 +39,12 @@ def test_every_mode_has_its_own_in_betweens_and_meets_the_keys(swing):
     motion = ShownMotion.of(swing, timeline)
     clip, times = swing.clip, timeline.times_of(timeline.fine_frames)
     for mode, poses in motion.modes.items():
-        wanted = interpolate(clip.times[swing.keys], clip.poses[swing.keys], times, mode)
+        kept = swing.keys[mode]
+        wanted = interpolate(clip.times[kept], clip.poses[kept], times, mode)
         assert np.allclose(poses.positions + motion.centre, wanted.positions, atol=1e-12)
         assert np.allclose(poses.quaternions, wanted.quaternions, atol=1e-12)
-    assert np.allclose(timeline.times_of(motion.key_frames), clip.times[swing.keys])
-    assert np.allclose(motion.keys.positions + motion.centre, clip.poses[swing.keys].positions)
+        assert np.allclose(timeline.times_of(motion.key_frames[mode]), clip.times[kept])
+        assert np.allclose(motion.keys[mode].positions + motion.centre, clip.poses[kept].positions)
 
 
 def test_a_recording_far_from_its_origin_is_shown_around_it(swing):

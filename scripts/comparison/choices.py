@@ -1,0 +1,173 @@
+"""Choices of keys: which samples of a clip a mode may keep, evenly in time or wherever the motion needs them.
+
+A clip under a choice is a `Reconstruction`, whatever the choice: that names the folder, and says itself in captions,
+in the report and in `metrics.csv`. Amounts stay as the user wrote them. Tolerances are lengths with a unit, or in the
+unit of the recording.
+"""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from addon.motion import decimate, reduce_keys
+
+from .clips import Clip
+
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Units of a tolerance, and their lengths."""
+
+NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
+"""What amounts are made of: names of folders as well."""
+
+
+@dataclass(frozen=True)
+class Choice(ABC):
+    """A way to choose keys, and how much of it is wanted."""
+
+    written: str
+    """The amount as the user wrote it: "7.5", "5mm"."""
+
+    decimation: ClassVar[str]
+    """What metrics.csv calls it: "uniform" or "adaptive"."""
+
+    at: ClassVar[str] = "at"
+    """The word that leads to the amount in a sentence."""
+
+    unit: ClassVar[str] = "keys/s"
+    """What follows the amounts, if anything."""
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(NUMBER, self.written, re.ASCII) or float(self.written) <= 0.0:
+            raise ValueError(f"{self.written!r} is no rate; give numbers such as 5,7.5,10")
+
+    @abstractmethod
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        """The samples of the clip that are kept under a mode, rising, shape (k,).
+
+        The radius of the shell is in metres. Fewer than two keys where the clip is too short.
+        """
+
+    @property
+    def name(self) -> str:
+        """Unique among the choices of a run, and safe as the name of a folder."""
+        return self.written
+
+    @property
+    def amount(self) -> str:
+        """What was written, as prose has it."""
+        return self.written
+
+    @property
+    def title(self) -> str:
+        """The amount with its unit, as a heading."""
+        return f"{self.amount} {self.unit}"
+
+    @property
+    def phrase(self) -> str:
+        """The same in a sentence: "at 10 keys/s"."""
+        return f"{self.at} {self.title}"
+
+    @property
+    def rate(self) -> str:
+        """The keys a second that were asked for, as written; empty where none were."""
+        return self.written
+
+    def tolerance(self, clip: Clip) -> float | None:
+        """The largest shell error that is allowed, in metres; None where nothing is said of it."""
+        return None
+
+    @property
+    def size(self) -> float:
+        """What choices of one kind are sorted by."""
+        return float(self.written)
+
+
+class Uniform(Choice):
+    """So many keys a second, evenly in time: the same for all modes."""
+
+    decimation = "uniform"
+
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        return decimate(clip.times, float(self.written))
+
+
+class Budget(Choice):
+    """So many keys a second on average, where they make the RMS shell error of a mode smallest."""
+
+    decimation = "adaptive"
+    unit = "keys/s on average"
+
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        duration = float(clip.times[-1] - clip.times[0])
+        # As many as a sender at that rate has ticks: the allowance is for rounding, as in 2.0 * 0.5.
+        count = int(duration * float(self.written) + 1e-9) + 1
+        if count < 2:
+            return np.array([0])
+        return _reduced(clip, mode, radius, budget=min(count, len(clip.times)), rms=True)
+
+    @property
+    def name(self) -> str:
+        return f"budget-{self.written}"
+
+
+class Tolerance(Choice):
+    """The fewest keys with which the shell error of a mode stays within a length at every sample."""
+
+    decimation = "adaptive"
+    at = "within"
+    unit = ""
+
+    def __post_init__(self) -> None:
+        self._parts()
+
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        return _reduced(clip, mode, radius, tolerance=self.tolerance(clip) / clip.metres_per_unit)
+
+    @property
+    def name(self) -> str:
+        return f"tolerance-{self.written}"
+
+    @property
+    def amount(self) -> str:
+        number, unit = self._parts()
+        return f"{number} {unit or ('unit' if number == '1' else 'units') + ' of the recording'}"
+
+    @property
+    def title(self) -> str:
+        return f"within {self.amount}"
+
+    @property
+    def phrase(self) -> str:
+        return self.title
+
+    @property
+    def rate(self) -> str:
+        return ""
+
+    def tolerance(self, clip: Clip) -> float:
+        number, unit = self._parts()
+        return float(number) * (METRES[unit] if unit else clip.metres_per_unit)
+
+    @property
+    def size(self) -> float:
+        number, unit = self._parts()
+        return float(number) * METRES.get(unit, 1.0)
+
+    def _parts(self) -> tuple[str, str]:
+        """The number and the unit, which may be empty."""
+        found = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
+        if not found or float(found[1]) <= 0.0:
+            raise ValueError(
+                f"{self.written!r} is no tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in "
+                "the unit of the recording"
+            )
+        return found[1], found[2] or ""
+
+
+def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np.ndarray:
+    return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)

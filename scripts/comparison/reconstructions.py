@@ -1,0 +1,75 @@
+"""Reconstructions: what each mode makes of the few keys that are kept of a clip, and how far off that is.
+
+Times and poses are the clip's, errors are in metres (`clips`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from addon.motion import Errors, Poses, shell_error
+
+from .choices import Choice
+from .clips import Clip
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """A clip under one choice of keys: the keys that each mode kept, and what it filled in between them.
+
+    All modes begin and end with the same samples.
+    """
+
+    clip: Clip
+
+    choice: Choice
+    """How the keys were chosen."""
+
+    keys: dict[str, np.ndarray]
+    """Mode id to the samples that were kept, rising indices into the clip, shape (k,)."""
+
+    poses: dict[str, Poses]
+    """Mode id to the poses at `times`."""
+
+    errors: dict[str, Errors]
+    """Mode id to the errors against the clip at `times`."""
+
+    @property
+    def samples(self) -> slice:
+        """The samples of the clip between the first and the last key, both included."""
+        keys = next(iter(self.keys.values()))
+        return slice(int(keys[0]), int(keys[-1]) + 1)
+
+    @property
+    def times(self) -> np.ndarray:
+        """The times of `samples`."""
+        return self.clip.times[self.samples]
+
+
+def identical_modes(reconstructions: Sequence[Reconstruction]) -> tuple[tuple[str, ...], ...]:
+    """The modes in groups that gave the same poses in all of these reconstructions.
+
+    The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
+    Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
+    """
+    groups: list[list[str]] = []
+    for mode in dict.fromkeys(mode for reconstruction in reconstructions for mode in reconstruction.poses):
+        for group in groups:
+            if all(_same(reconstruction, group[0], mode) for reconstruction in reconstructions):
+                group.append(mode)
+                break
+        else:
+            groups.append([mode])
+    return tuple(map(tuple, groups))
+
+
+def _same(reconstruction: Reconstruction, first: str, second: str) -> bool:
+    if first not in reconstruction.poses or second not in reconstruction.poses:
+        return False
+    poses, others = (reconstruction.clip.in_metres(reconstruction.poses[mode]) for mode in (first, second))
+    rounding = 1e-12 * (1.0 + np.abs(poses.positions).max())
+    apart = shell_error(poses, others).max()
+    return bool(apart <= 1e-6 * reconstruction.errors[first].shell.max() + rounding)

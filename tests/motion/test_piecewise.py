@@ -1,0 +1,54 @@
+"""Piecewise functions: both ways to put them together agree, wherever the samples are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from addon.motion import MODES, Poses, in_betweens
+from addon.motion.piecewise import blocks, combine, is_dense, multiply
+from tests.motion.cases import random_quaternions
+
+
+@settings(deadline=None)
+@given(st.lists(st.sampled_from((0, 1, 7, 8, 130, 400)), min_size=1, max_size=8), st.integers(1, 5), st.integers(1, 4))
+def test_products_are_what_each_sample_gives(counts, rows, functions):
+    random = np.random.default_rng(len(counts))
+    counts = np.array(counts)
+    coefficients = random.normal(size=(rows, functions, len(counts)))
+    values = random.normal(size=(functions, counts.sum()))
+    expected = np.einsum("kbn,bn->kn", coefficients.repeat(counts, axis=2), values)
+    found = np.full((2, rows, counts.sum()), np.nan)
+    combine(coefficients, values, counts, found[0])
+    multiply(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), values, counts, found[1])
+    np.testing.assert_allclose(found, np.stack((expected, expected)), rtol=0, atol=1e-12)
+
+
+def test_long_runs_are_dense_and_single_samples_are_not():
+    assert is_dense(np.full(10, 200))
+    assert not is_dense(np.ones(1000, dtype=int))
+
+
+@pytest.mark.parametrize("size", [1, 10, 1000])
+def test_blocks_cover_everything_once(size):
+    bounds = np.array((0, 0, 5, 5, 40, 41, 41))
+    pieces, samples = zip(*blocks(bounds, size), strict=True)
+    assert [some.start for some in pieces] == [0, *(some.stop for some in pieces[:-1])]
+    assert [some.start for some in samples] == [0, *(some.stop for some in samples[:-1])]
+    assert (pieces[-1].stop, samples[-1].stop) == (6, 41)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_segment_without_samples_may_lie_between_long_ones(mode):
+    random = np.random.default_rng(2)
+    keys = Poses(random.normal(size=(4, 3)), random_quaternions(random, 4))
+    u = np.linspace(0.0, 1.0, 50_000)
+    both = in_betweens(np.arange(4.0), keys, [50_000, 0, 50_000], np.concatenate((u, u)), mode)
+    for place, some in ((0, slice(0, 50_000)), (2, slice(50_000, None))):
+        counts = np.zeros(3, dtype=int)
+        counts[place] = 50_000
+        alone = in_betweens(np.arange(4.0), keys, counts, u, mode)
+        np.testing.assert_allclose(both[some].positions, alone.positions, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(both[some].quaternions, alone.quaternions, rtol=0, atol=1e-12)

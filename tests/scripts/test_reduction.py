@@ -1,0 +1,94 @@
+"""The figures of reduced keys and of Blender's Decimate are those of what Blender shows."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.motion import shell_error
+from scripts import reduction
+from scripts.trajectories import TrajectoryError
+
+TOLERANCE, RADIUS = 0.005, 0.1
+
+
+@pytest.fixture
+def live():
+    animation.register()
+    yield
+    animation.unregister()
+
+
+@pytest.fixture(scope="module")
+def clip() -> reduction.Recording:
+    """The first two seconds of a clip."""
+    whole = reduction.read(reduction.ASSETS / "reach.csv", 30.0)
+    return reduction.Recording(whole.name, whole.frames[:60], whole.poses[:60])
+
+
+@pytest.mark.parametrize("rotation_mode", reduction.ROTATION_MODES)
+def test_each_row_has_what_it_was_asked_for(live, clip, rotation_mode):
+    reduced, same_keys, same_frames, as_good = reduction.measure(clip, rotation_mode, TOLERANCE, RADIUS)
+    channels = 7 if rotation_mode == "QUATERNION" else 6
+    assert reduced.largest <= TOLERANCE * (1.0 + 1e-5)
+    assert reduced.numbers == reduced.frames * (1 + channels) == reduced.keys * (1 + channels)
+    assert same_keys.keys == pytest.approx(reduced.keys, abs=1.0)
+    assert same_frames.frames <= reduced.frames
+    assert same_frames.largest > reduced.largest
+    assert as_good.largest <= reduced.largest
+    assert as_good.numbers == round(6 * channels * as_good.keys)
+
+
+def test_decimated_curves_are_measured_in_the_scene(live, clip):
+    obj = reduction.import_recording(clip, "QUATERNION")
+    reduction.decimate(obj, mode="RATIO", factor=0.8)
+    shown = animation.read_poses(obj, clip.frames)
+    one = reduction.outcome(obj, "", clip, clip.poses, RADIUS)
+    assert one.largest == pytest.approx(shell_error(shown, clip.poses, RADIUS).max())
+    assert {len(fcurve.keyframe_points) for fcurve in animation.channelbag_of(obj).fcurves} == {round(one.keys)}
+    assert one.keys < 0.3 * len(clip.frames)
+
+
+def test_an_imported_recording_shows_its_poses(live, clip):
+    obj = reduction.import_recording(clip, "XYZ")
+    assert shell_error(animation.read_poses(obj, clip.frames), clip.poses, RADIUS).max() < 1e-6
+
+
+def test_the_page_names_what_was_measured(live, clip, monkeypatch, tmp_path):
+    monkeypatch.setattr(reduction, "files", lambda _folder: [reduction.ASSETS / "reach.csv"])
+    monkeypatch.setattr(reduction, "read", lambda _path, _rate: clip)
+    monkeypatch.setattr(reduction, "ROTATION_MODES", ("XYZ",))
+    animation.unregister()
+    try:
+        assert reduction.main(["--output", str(tmp_path / "reduction.md")]) == 0
+    finally:
+        animation.register()
+    page = (tmp_path / "reduction.md").read_text(encoding="utf-8")
+    assert bpy.app.version_string in page
+    assert "| reach, 60 frames | Reduce Keys to Poses |" in page
+    rows = [line for line in page.splitlines() if line.startswith("| as ")]
+    assert [row.split("|")[2].strip() for row in rows] == ["1", "1", "1"]
+
+
+def test_means_are_geometric():
+    def outcome(how, largest):
+        return reduction.Outcome(how, 10.0, 10, 80, largest, 1.0)
+
+    outcomes = [
+        [outcome("Reduce Keys to Poses", 1.0), outcome("Decimate, as many keys", ratio)] for ratio in (2.0, 8.0)
+    ]
+    assert list(reduction.summary(outcomes))[2] == "| as many keys | 2 | 1.00 | 1.00 | 1.00 | 4.00 | 1.00 |"
+
+
+def test_a_recording_of_too_few_poses_is_refused(tmp_path):
+    path = tmp_path / "still.csv"
+    path.write_text("t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,1\n", encoding="utf-8")
+    with pytest.raises(TrajectoryError, match=r"still\.csv: 1 usable poses are left"):
+        reduction.read(path, 60.0)
+
+
+def test_all_clips_of_the_project_are_measured():
+    assert [path.name for path in reduction.files(None)] == ["pivot.csv", "reach.csv", "screw.csv", "throw.csv"]
+    assert np.all(np.diff(reduction.read(reduction.ASSETS / "pivot.csv", 60.0).frames) == 1.0)
