@@ -1,11 +1,15 @@
-"""Make the pictures of these pages: stills of the comparison's own scene.
+"""Make the pictures of these pages: stills of the comparison's own scene, and a film of it.
 
 python docs/make_pictures.py
 """
 
 from __future__ import annotations
 
+import shutil
 import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -14,26 +18,50 @@ DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
 from addon.motion import MODES
+from scripts import compare
 from scripts.comparison.choices import Uniform
 from scripts.comparison.stage import StageSettings, build_stage
 from scripts.comparison.study import read_clips, reconstruct
 
-STILLS = {"comparison.png": ("screw", "5", 2.7)}
-"""Picture to clip of the assets, keys a second, and the moment in seconds."""
+SMOOTH = ("lerp_slerp", "dq_sclerp", "motor_spline")
+
+
+@dataclass(frozen=True)
+class Still:
+    """A moment of an asset, in seconds, kept at so many keys a second."""
+
+    asset: str
+    rate: str
+    moment: float
+    modes: Sequence[str]
+    resolution: tuple[int, int]
+    subject: str
+
+
+STILLS = {
+    "comparison.png": Still("screw", "5", 2.7, tuple(MODES), (1280, 720), "drill"),
+    "smooth.png": Still("reach", "8", 3.32, SMOOTH, (1280, 480), "controller"),
+}
 
 
 def main() -> None:
-    """Render every still anew."""
-    settings = StageSettings(resolution=(1280, 720), antialiasing="8")
-    for picture, (asset, rate, moment) in STILLS.items():
-        (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{asset}.csv")], "blender")
-        scene = build_stage(reconstruct(clip, Uniform(rate), MODES, radius=0.1), settings)
+    """Render everything anew."""
+    for picture, still in STILLS.items():
+        settings = StageSettings(resolution=still.resolution, antialiasing="8", subject=still.subject)
+        (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{still.asset}.csv")], "blender")
+        scene = build_stage(reconstruct(clip, Uniform(still.rate), still.modes, radius=0.1), settings)
         if hasattr(scene.render.image_settings, "media_type"):
             scene.render.image_settings.media_type = "IMAGE"
         scene.render.image_settings.file_format = "PNG"
         scene.render.filepath = str(DOCS / picture)
-        scene.frame_set(1 + round(moment * settings.fps))
+        scene.frame_set(1 + round(still.moment * settings.fps))
         bpy.ops.render.render(write_still=True)
+    still = STILLS["smooth.png"]
+    with tempfile.TemporaryDirectory() as folder:
+        options = ["--rates", still.rate, "--modes", ",".join(still.modes), "--object", still.subject]
+        options += ["--resolution", "960x360", "--slow-motion", "2", "--output", folder]
+        compare.main([str(DOCS.parent / "assets" / f"{still.asset}.csv"), *options])
+        shutil.copy(Path(folder) / still.asset / still.rate / "comparison.mp4", DOCS / "smooth.mp4")
 
 
 if __name__ == "__main__":

@@ -176,11 +176,15 @@ class Lanes:
         number_size = min(0.046, number_size)
         self._put(captions.words(f"{mode} label", label, label_size, self.ink), left, label_line)
         note = self.cast.notes[mode]
-        if self.note_width * id_size > room - (0.0 if cell.beside else NUMBER_WIDTH * number_size):
+        taken = self.note_width * id_size + (0.0 if cell.beside else NUMBER_WIDTH * number_size)
+        if taken > room:
             note = captions.in_two_lines(note)
         if "\n" in note:
             id_size *= 0.8
             id_line += id_size
+        elif taken > room:
+            # What cannot be broken shrinks, and the number with it.
+            id_size, number_size = id_size * room / taken, number_size * room / taken
         self._put(captions.words(f"{mode} id", note, id_size, self.faint), left, id_line)
         self._put(captions.words(f"{mode} unit", "mm", 0.6 * number_size, self.faint, "RIGHT"), right, line)
         number = captions.readout(
