@@ -7,7 +7,7 @@ the original stays in the file, for `restore_keys`. Frames are those of the Acti
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass, replace
 
 import bpy
@@ -67,6 +67,8 @@ class _Fewer:
     key_frames: np.ndarray
     """The same with frames of keys that a scale keeps, shape (n,)."""
 
+    keeps_scale: bool
+
     largest_error: float
 
 
@@ -100,16 +102,19 @@ def reduce_keys_of(
     """
     if mode not in MODES:
         raise Refused(f"{obj.name}: there is no mode {mode!r}; the modes are {', '.join(MODES)}")
-    if not tolerance > 0.0:
-        raise Refused(f"{obj.name}: the tolerance has to be above zero, not {tolerance:g}")
+    if not 0.0 < tolerance < math.inf:
+        raise Refused(f"{obj.name}: the tolerance has to be a number above zero, not {tolerance:g}")
     refuse_tweak_mode(obj)
     radius = radius_of(obj) if radius is None else radius
-    slots = [(slot, curves_in(slot.channelbag)) for slot in slots_of([obj])]
-    readings = [(slot, read(slot, curves)) for slot, curves in slots]
+    readings = [(slot, read(slot, curves_in(slot.channelbag))) for slot in slots_of([obj])]
     readings = [(slot, source) for slot, source in readings if source.channels]
     if not readings:
-        raise Refused(_why_nothing_is_keyed(obj, [path for _, curves in slots for path, _ in curves]))
-    fewer = [_fewer_keys(obj, slot, source, mode, tolerance, radius) for slot, source in readings]
+        raise Refused(_why_nothing_is_there(obj, 0))
+    found = [_fewer_keys(obj, slot, source, mode, tolerance, radius) for slot, source in readings]
+    fewer = [one for one in found if len(one.key_frames) < one.before]
+    if not fewer:
+        before, keeps_scale = sum(one.before for one in found), any(one.keeps_scale for one in found)
+        raise Refused(_why_no_fewer(obj, before, keeps_scale=keeps_scale))
     with live.paused():
         for one in fewer:
             _write(obj, one, mode)
@@ -193,7 +198,7 @@ def _size(matrix: object) -> float:
 def _fewer_keys(
     obj: bpy.types.Object, slot: Slot, source: Source, mode: str, tolerance: float, radius: float
 ) -> _Fewer:
-    """The keys that one slot needs. `Refused` where it needs as many as it has."""
+    """The keys that one slot needs, which may be as many as it has."""
     before, frames = _keys_in(source), _samples(source)
     # What goes on outside of the keys, by cycles or at a slope, has to stay as well.
     around = np.arange(source.frame_range[0], source.frame_range[1] + 1.0)
@@ -217,16 +222,14 @@ def _fewer_keys(
                 "channels constant extrapolation and no cycles, or cycles that all have the same range"
             )
         chosen = np.union1d(chosen, more)
-    key_frames = _keys_in(fewer)
-    if len(key_frames) >= len(before):
-        raise Refused(_why_no_fewer(obj, len(before), keeps_scale=SCALE in source.keyed and 7 not in values))
     paths = _paths(Transformable.of(obj))
     return _Fewer(
         slot,
         len(before),
         frames[chosen],
         {paths[row]: column[chosen] for row, column in values.items()},
-        key_frames,
+        _keys_in(fewer),
+        SCALE in source.keyed and ROWS[SCALE].start not in values,
         float(error.max()) * unit,
     )
 
@@ -373,7 +376,7 @@ def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) 
 
 def _why_no_fewer(obj: bpy.types.Object, count: int, *, keeps_scale: bool) -> str:
     if count <= 2:
-        return f"{obj.name} has {count} key{'s' * (count != 1)}: there is nothing to reduce"
+        return _why_nothing_is_there(obj, count)
     if keeps_scale:
         return (
             f"{obj.name} keeps its {count} keys: its scale changes differently along its axes, which is no part of a "
@@ -382,29 +385,30 @@ def _why_no_fewer(obj: bpy.types.Object, count: int, *, keeps_scale: bool) -> st
     return f"{obj.name} needs its {count} keys to stay within the tolerance: allow a larger one"
 
 
-def _why_nothing_is_keyed(obj: bpy.types.Object, paths: Sequence[str]) -> str:
-    """Why an object has no keys to reduce, and how it gets some."""
-    nothing = f"{obj.name} has no keys of location, rotation or scale"
+def _why_nothing_is_there(obj: bpy.types.Object, count: int) -> str:
+    """What moves an object that has hardly a key, and how that becomes keys."""
+    has = f"{obj.name} has {count or 'no'} key{'s' * (count != 1)} of location, rotation or scale"
     constraints = {constraint.type for constraint in obj.constraints if constraint.enabled}
     if obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
-        return f"{nothing}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)"
+        return f"{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)"
     if constraints & SOLVED:
         return (
-            f"{nothing}, a camera solution moves it: turn that into keys first "
+            f"{has}, a camera solution moves it: turn that into keys first "
             "(Object Constraint Properties, Constraint to F-Curve)"
         )
-    if constraints or any(path.startswith(("location", "rotation", "scale")) for path in _driven(obj)):
+    if constraints or _is_driven(obj):
         return (
-            f"{nothing}, constraints or drivers move it: bake them first "
+            f"{has}, constraints or drivers move it: bake them first "
             "(Object > Animation > Bake Action, with Visual Keying)"
         )
-    if any(path.startswith("pose.bones") for path in paths):
+    if any(path.startswith("pose.bones") for slot in slots_of([obj]) for path, _ in curves_in(slot.channelbag)):
         return (
-            f"{nothing}, its bones have: let an empty copy the transforms of a bone, bake the empty "
+            f"{has}, its bones have: let an empty copy the transforms of a bone, bake the empty "
             "(Object > Animation > Bake Action, with Visual Keying), and reduce that"
         )
-    return f"{nothing}: there is nothing to reduce"
+    return f"{has}: there is nothing to reduce"
 
 
-def _driven(obj: bpy.types.Object) -> list[str]:
-    return [] if obj.animation_data is None else [driver.data_path for driver in obj.animation_data.drivers]
+def _is_driven(obj: bpy.types.Object) -> bool:
+    drivers = obj.animation_data.drivers if obj.animation_data else ()
+    return any(driver.data_path.startswith(("location", "rotation", "scale")) for driver in drivers)

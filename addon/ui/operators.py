@@ -17,6 +17,7 @@ from ..animation.originals import BAKED, REDUCED
 from ..animation.properties import MODE_ITEMS
 from ..animation.reducing import metres_per_unit
 from .preferences import DEFAULT_MODE, default_mode
+from .rows import labelled
 from .targets import SCOPES, SELECTED, WHOLE, frames_meant, objects_for, scope_for
 from .wording import DESCRIPTIONS, LABELS, length, listed, reduction_told
 
@@ -237,7 +238,10 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
 
     tolerance: FloatProperty(
         name="Tolerance",
-        description="How far the surface of the object may be off on any frame. One millimetre where nothing is asked",
+        description=(
+            "How far off any of three points of the object may be on any frame, at the radius from its origin along "
+            "its axes. A millimetre to begin with"
+        ),
         default=0.001,
         min=1e-6,
         soft_max=1.0,
@@ -248,7 +252,7 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
     radius: FloatProperty(
         name="Radius",
         description=(
-            "How far that surface is from the origin: the larger, the more a rotation counts. "
+            "How far out the object is held to the tolerance: the larger, the more a rotation counts. "
             "At 0 each object has the size of its own bounding box"
         ),
         default=0.0,
@@ -274,7 +278,10 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
             layout.prop(self, name)
         for obj in objects_for(context)[:MOST_TOLD]:
             if (reduction := animation.reduction_of(obj)) is not None:
-                layout.label(text=f"{obj.name}: {reduction_told(context.scene, reduction)}", icon="INFO")
+                error = length(context.scene, reduction.largest_error, precision=3)
+                labelled(layout, obj.name).label(
+                    text=f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}, {error} off"
+                )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = objects_for(context)

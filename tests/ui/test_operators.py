@@ -6,8 +6,20 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import MODE_IDS, is_baked, key_frames, modes_of, set_enabled
+from addon.animation import (
+    MODE_IDS,
+    bake_poses,
+    is_baked,
+    is_reduced,
+    key_frames,
+    modes_of,
+    read_poses,
+    reduction_of,
+    set_enabled,
+)
+from addon.motion import Poses, interpolate, shell_error
 from addon.ui.operators import CLASSES
+from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
 operators = bpy.ops.rigid_motion
@@ -131,13 +143,17 @@ def test_without_a_selection_the_active_object_is_meant(tool):
     assert tool.rigid_motion.mode == "dq_sclerp"
 
 
-@pytest.mark.parametrize("name", ["set_mode", "clear", "bake", "unbake"])
+REASONS = {
+    "unbake": "None of these objects is baked",
+    **dict.fromkeys(("restore_keys", "let_keys_go"), "The keys of these objects are not reduced"),
+}
+
+
+@pytest.mark.parametrize("name", ["set_mode", "clear", "bake", "unbake", "reduce_keys", "restore_keys", "let_keys_go"])
 def test_without_any_object_an_operator_says_why_not(extension, name):
     operator = getattr(operators, name)
     assert not operator.poll()
-    with pytest.raises(
-        RuntimeError, match="None of these objects is baked" if name == "unbake" else "Select an object"
-    ):
+    with pytest.raises(RuntimeError, match=REASONS.get(name, "Select an object")):
         operator()
 
 
@@ -202,6 +218,114 @@ def test_a_range_that_ends_before_its_start_is_refused(tool):
 def test_an_object_without_a_mode_has_nothing_to_bake(tool):
     with pytest.raises(RuntimeError, match="Tool has no rigid in-betweens to bake"):
         operators.bake()
+
+
+def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
+    """A selected, active object with a key on every frame of a wild motion about a metre wide, times a size."""
+    random = np.random.default_rng(3)
+    keys = Poses(size * random.normal(size=(9, 3)), random.normal(size=(9, 4)))
+    frames = np.arange(1.0, 252.0)
+    obj = new_object(name)
+    bake_poses(obj, frames, interpolate(np.linspace(1.0, 251.0, 9), keys, frames, "motor_spline"))
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    return obj
+
+
+def test_reducing_says_what_became_of_the_keys(extension, capfd):
+    obj = recorded()
+    assert operators.reduce_keys(tolerance=0.02, radius=0.5) == {"FINISHED"}
+    reduction = reduction_of(obj)
+    assert reduction.before == 251
+    assert reduction.after == len(key_frames(obj)) < 60
+    said = capfd.readouterr().out
+    assert f"Tool: 251 keys became {reduction.after}, largest error " in said
+    assert set(modes_of(obj, key_frames(obj))) == {"motor_spline"}
+
+
+def test_all_selected_objects_are_reduced_and_one_that_cannot_be_is_named(extension, capfd):
+    obj, other = recorded(), recorded("Other")
+    keyed("Sparse")
+    assert operators.reduce_keys(tolerance=0.02) == {"FINISHED"}
+    assert is_reduced(obj)
+    assert is_reduced(other)
+    assert "Sparse needs its 4 keys to stay within the tolerance: allow a larger one" in capfd.readouterr().out
+
+
+def test_where_no_key_can_be_spared_nothing_has_changed(tool):
+    before = values(tool)
+    with pytest.raises(RuntimeError, match="Tool needs its 4 keys"):
+        operators.reduce_keys()
+    assert values(tool) == before
+    assert not is_reduced(tool)
+
+
+def test_the_tolerance_is_a_millimetre_in_any_unit(extension):
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    obj = recorded(size=100.0)
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    operators.reduce_keys(radius=10.0)
+    error = shell_error(read_poses(obj, frames), truth, 10.0).max()
+    assert 0.02 < error < 0.1 * 1.001
+
+
+def test_each_object_has_the_radius_of_its_own_size(extension):
+    frames = np.arange(1.0, 252.0)
+    sizes = {"Small": 0.01, "Large": 3.0}
+    truths = {}
+    for name, size in sizes.items():
+        obj = recorded(name)
+        obj.empty_display_size = size
+        truths[name] = read_poses(obj, frames)
+    operators.reduce_keys(tolerance=0.02)
+    for name, size in sizes.items():
+        obj = bpy.data.objects[name]
+        assert shell_error(read_poses(obj, frames), truths[name], size).max() <= 0.02001
+    assert len(key_frames(bpy.data.objects["Large"])) > len(key_frames(bpy.data.objects["Small"]))
+
+
+def test_reducing_is_one_step_to_undo_and_to_redo(extension):
+    obj = recorded()
+    before = values(obj)
+    bpy.ops.ed.undo_push(message="recording")
+    operators.reduce_keys(tolerance=0.02)
+    bpy.ops.ed.undo_push(message="reduction")
+    after = values(obj)
+    assert after != before
+    bpy.ops.ed.undo()
+    assert values(bpy.data.objects["Tool"]) == before
+    assert [action.name for action in bpy.data.actions] == ["ToolAction"]
+    bpy.ops.ed.redo()
+    assert values(bpy.data.objects["Tool"]) == after
+    assert is_reduced(bpy.data.objects["Tool"])
+
+
+def test_reduced_keys_are_restored_or_the_others_let_go(extension):
+    obj = recorded()
+    before = values(obj)
+    operators.reduce_keys(tolerance=0.02)
+    assert operators.restore_keys() == {"FINISHED"}
+    assert values(obj) == before
+    assert not operators.restore_keys.poll()
+    operators.reduce_keys(tolerance=0.02)
+    reduced = values(obj)
+    assert operators.let_keys_go() == {"FINISHED"}
+    assert values(obj) == reduced
+    assert not operators.restore_keys.poll()
+    assert not operators.let_keys_go.poll()
+    assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]
+
+
+def test_reduced_keys_that_were_baked_since_come_back_after_un_baking(extension):
+    obj = recorded()
+    operators.reduce_keys(tolerance=0.02)
+    operators.bake()
+    with pytest.raises(RuntimeError, match="Tool was baked since it was reduced: Un-Bake first"):
+        operators.restore_keys()
+    operators.unbake()
+    operators.restore_keys()
+    assert len(key_frames(obj)) == 251
 
 
 def test_refreshing_makes_up_for_edits_that_were_not_followed(tool):

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from math import radians
 
+import bpy
 import pytest
 
+from addon.animation import Reduction
 from addon.animation.describing import SegmentFacts
-from addon.ui.wording import cautions, degrees, listed, wrapped
+from addon.ui.wording import cautions, degrees, length, listed, reduction_told, wrapped
 
 PLAIN = SegmentFacts(
     first=1.0,
@@ -66,3 +68,19 @@ def test_a_word_that_is_too_long_has_a_line_of_its_own():
 
 def test_no_text_has_no_lines():
     assert wrapped("", lambda line: True) == []
+
+
+@pytest.mark.parametrize(
+    ("system", "scale", "said"),
+    [("METRIC", 1.0, "0.93 mm"), ("METRIC", 0.01, "9.3 µm"), ("NONE", 1.0, "0.00093"), ("IMPERIAL", 1.0, "36.6 thou")],
+)
+def test_a_reduction_is_told_in_the_units_of_the_scene(empty_file, system, scale, said):
+    settings = bpy.context.scene.unit_settings
+    settings.system, settings.scale_length = system, scale
+    reduction = Reduction(before=251, after=18, largest_error=0.00093)
+    assert reduction_told(bpy.context.scene, reduction) == f"251 keys became 18, largest error {said}"
+
+
+def test_lengths_are_told_in_the_units_of_the_scene(empty_file):
+    bpy.context.scene.unit_settings.scale_length = 0.1
+    assert length(bpy.context.scene, 20.0) == "2 m"

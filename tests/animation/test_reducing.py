@@ -1,0 +1,591 @@
+"""Reduced keys, read back from the evaluated scene, keep to their tolerance; and what was there before comes back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import (
+    MODE_IDS,
+    Refused,
+    bake,
+    bake_poses,
+    is_baked,
+    is_reduced,
+    key_frames,
+    let_keys_go,
+    modes_of,
+    radius_of,
+    read_poses,
+    reduce_keys_of,
+    reduction_of,
+    restore_keys,
+    set_mode,
+    unbake,
+    write_channel,
+)
+from addon.motion import MODES, Poses, interpolate, repair, shell_error
+from scripts.trajectories import read_trajectories
+from tests.animation.oracle import curves_of, rotation_path, snapshot
+from tests.animation.scenes import give_own_deltas, key, new_object
+
+ASSETS = Path(__file__).resolve().parents[2] / "assets"
+RADIUS = 0.1
+TOLERANCE = 0.005
+
+
+def motion(name: str = "reach", rate: float = 30.0) -> tuple[np.ndarray, Poses]:
+    """One of the clips in assets/, imported with a pose on every frame."""
+    trajectory = read_trajectories(str(ASSETS / f"{name}.csv")).trajectories[0]
+    times, poses, _ = repair(trajectory.times, trajectory.poses)
+    frames = np.arange(np.floor((times[-1] - times[0]) * rate) + 1.0)
+    return 1.0 + frames, interpolate(times - times[0], poses, frames / rate, "lerp_slerp")
+
+
+def recorded(name: str = "reach", rotation_mode: str = "QUATERNION", obj: bpy.types.Object | None = None):
+    """An object that moves as recorded."""
+    obj = obj or new_object(rotation_mode=rotation_mode)
+    bake_poses(obj, *motion(name))
+    return obj
+
+
+def off(obj: bpy.types.Object, frames: np.ndarray, truth: Poses, radius: float = RADIUS) -> float:
+    """The largest shell error of what Blender shows on these frames."""
+    return float(shell_error(read_poses(obj, frames), truth, radius).max())
+
+
+def keys_of(obj: bpy.types.Object, path: str, index: int = 0) -> list[float]:
+    return [point.co.x for point in curves_of(obj)[path, index].keyframe_points]
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ", "ZXY"])
+@pytest.mark.parametrize("name", ["reach", "pivot", "throw", "screw"])
+def test_few_keys_show_the_recording_within_the_tolerance_on_every_frame(live_file, name, rotation_mode):
+    obj = recorded(name, rotation_mode)
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    error = off(obj, frames, truth)
+    assert error <= TOLERANCE * (1.0 + 1e-5)
+    assert reduction.largest_error == pytest.approx(error, abs=1e-6)
+    assert (reduction.before, reduction.after) == (len(frames), len(key_frames(obj)))
+    assert reduction.after < 0.5 * reduction.before
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_every_mode_gets_the_keys_that_it_needs(live_file, mode):
+    obj = recorded()
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    set_mode(obj, "cga_lerp", frames[::5])
+    reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
+    assert keys_of(obj, "rigid_motion.mode") == key_frames(obj).tolist()
+    assert set(modes_of(obj, key_frames(obj))) == {mode}
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+
+
+def test_the_keys_are_those_of_the_mode_and_too_few_for_another(live_file):
+    obj = recorded()
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    for other in ("lerp_slerp", "dq_sclerp", "BLENDER"):
+        set_mode(obj, other)
+        assert off(obj, frames, truth) > 1.5 * TOLERANCE
+
+
+def test_all_channels_have_keys_on_the_same_frames_with_what_was_recorded_there(live_file):
+    obj = recorded()
+    frames, poses = motion()
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    kept = key_frames(obj)
+    assert np.isin(kept, frames).all()
+    assert kept[[0, -1]].tolist() == frames[[0, -1]].tolist()
+    for (path, index), fcurve in curves_of(obj).items():
+        if not path.startswith("delta_"):
+            assert keys_of(obj, path, index) == kept.tolist()
+        if path in ("location", "rotation_quaternion"):
+            assert {point.interpolation for point in fcurve.keyframe_points} == {"LINEAR"}
+    at_keys = read_poses(obj, kept)
+    assert np.abs(at_keys.positions - poses.positions[np.isin(frames, kept)]).max() < 1e-6
+
+
+def test_a_larger_tolerance_needs_fewer_keys_and_a_larger_radius_more(live_file):
+    def count(tolerance, radius):
+        return reduce_keys_of(recorded(obj=new_object()), "motor_spline", tolerance, radius).after
+
+    assert count(0.02, RADIUS) < count(TOLERANCE, RADIUS) < count(0.001, RADIUS)
+    assert count(TOLERANCE, 1.0) > count(TOLERANCE, RADIUS)
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YZX"])
+def test_delta_transforms_of_its_own_stay_in_force_and_come_back(live_file, rotation_mode):
+    obj = new_object(rotation_mode=rotation_mode)
+    give_own_deltas(obj)
+    obj.delta_scale = (1.0, 1.0, 1.0)
+    recorded(obj=obj)
+    own = [tuple(value) for value in (obj.delta_location, obj.delta_rotation_euler, obj.delta_rotation_quaternion)]
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+    restore_keys(obj)
+    assert off(obj, frames, truth) < 1e-6
+    assert own == [
+        tuple(value) for value in (obj.delta_location, obj.delta_rotation_euler, obj.delta_rotation_quaternion)
+    ]
+
+
+def test_the_tolerance_is_one_of_the_scene_also_under_a_parent_in_other_units(live_file):
+    frames, poses = motion()
+    alone, below, root = recorded(), new_object("Below"), new_object("Root")
+    root.scale, root.rotation_euler = (0.01, 0.01, 0.01), (1.0, 2.0, 3.0)
+    root.location = (1.0, 2.0, 3.0)
+    below.parent = root
+    bake_poses(below, frames, Poses(100.0 * poses.positions, poses.quaternions))
+    below.scale = (100.0, 100.0, 100.0)
+    truth = read_poses(below, frames)
+    # To the last digit they are not the same numbers: of equally good keys one or two may be others.
+    reductions = [reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS) for obj in (alone, below)]
+    assert abs(reductions[0].after - reductions[1].after) <= 2
+    error = off(below, frames, truth)
+    assert error <= TOLERANCE * (1.0 + 1e-4)
+    assert reductions[1].largest_error == pytest.approx(error, rel=1e-3)
+
+
+def test_a_constraint_on_top_of_the_keys_stays(live_file):
+    obj = recorded()
+    obj.constraints.new("COPY_LOCATION").target = new_object("Target")
+    obj.constraints[0].use_offset = True
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
+def test_all_that_was_there_comes_back_to_the_last_handle(live_file, rotation_mode):
+    obj = key(new_object(rotation_mode=rotation_mode), np.arange(1.0, 120.0, 3.0), scale="uneven")
+    obj["weight"] = 1.0
+    write_channel(obj, '["weight"]', np.arange(1.0, 60.0), np.arange(59.0), interpolation="BOUNCE")
+    recorded(obj=obj)
+    curves_of(obj)["location", 2].mute = True
+    set_mode(obj, "pga_lerp", [11.0])
+    action, before, frames = obj.animation_data.action, snapshot(obj), np.arange(-3.0, 130.0)
+    truth = read_poses(obj, frames)
+    with pytest.raises(Refused):
+        reduce_keys_of(obj, "motor_spline", 1e-6, RADIUS)
+    assert snapshot(obj) == before
+    assert list(bpy.data.actions) == [action]
+    reduce_keys_of(obj, "motor_spline", 0.3, RADIUS)
+    assert snapshot(obj) != before
+    restore_keys(obj)
+    assert obj.animation_data.action == action
+    assert snapshot(obj) == before
+    assert list(bpy.data.actions) == [action]
+    assert off(obj, frames, truth) < 1e-6
+
+
+def test_other_channels_keep_their_keys(live_file):
+    obj = recorded()
+    obj["weight"] = 1.0
+    write_channel(obj, '["weight"]', np.arange(1.0, 60.0), np.arange(59.0), interpolation="BOUNCE")
+    write_channel(obj, "hide_render", np.arange(1.0, 60.0, 7.0), np.arange(9.0) % 2, interpolation="CONSTANT")
+    write_channel(obj, "color", np.arange(1.0, 60.0), np.ones((59, 4)))
+    others = {name: value for name, value in snapshot(obj).items() if name[0] in ('["weight"]', "hide_render", "color")}
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    assert len(others) == 6
+    assert others.items() <= snapshot(obj).items()
+
+
+def test_channels_that_are_keyed_on_different_frames_are_read_as_they_play(live_file):
+    obj = new_object()
+    frames, poses = motion("pivot")
+    bake_poses(obj, frames, poses)
+    write_channel(obj, "location", frames[::2] + 0.25, poses.positions[::2], interpolation="BEZIER")
+    write_channel(obj, "rotation_quaternion", frames[5:-9:3], poses.quaternions[5:-9:3])
+    truth = read_poses(obj, frames)
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+    assert reduction.before == len(np.union1d(frames[::2] + 0.25, frames[5:-9:3]))
+    assert keys_of(obj, "location") == keys_of(obj, "rotation_quaternion")
+
+
+@pytest.mark.parametrize("keyed", ["location", "rotation"])
+def test_what_has_no_keys_gets_none(live_file, keyed):
+    obj = recorded()
+    obj.location = (1.0, 2.0, 3.0)
+    path = "location" if keyed == "rotation" else rotation_path(obj)
+    channelbag = obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot)
+    for name, fcurve in list(curves_of(obj).items()):
+        if name[0] == path or name == ("location", 1):
+            channelbag.fcurves.remove(fcurve)
+    wanted = set(curves_of(obj))
+    frames = np.arange(1.0, key_frames(obj)[-1] + 1.0)
+    truth = read_poses(obj, frames)
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+    found = {name for name in curves_of(obj) if not name[0].startswith("delta_")}
+    assert found == wanted | {("rigid_motion.mode", 0)}
+
+
+def test_an_even_scale_is_part_of_the_pose(live_file):
+    obj = recorded()
+    frames = key_frames(obj)
+    sizes = np.exp(np.sin(0.1 * frames))
+    write_channel(obj, "scale", frames, np.repeat(sizes[:, None], 3, axis=1))
+    truth = read_poses(obj, frames)
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    size = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).scale).mean()
+    assert off(obj, frames, truth, RADIUS / size) <= TOLERANCE * (1.0 + 1e-4)
+    assert keys_of(obj, "scale") == key_frames(obj).tolist()
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 1.0), (2.0, 2.0, 2.0), (1.0, 2.0, 0.5), (-1.0, 1.0, 1.0)], ids=str)
+def test_a_scale_that_only_stands_there_on_every_frame_goes_with_the_keys(live_file, scale):
+    obj = recorded()
+    frames = key_frames(obj)
+    write_channel(obj, "scale", frames, np.repeat(np.array((scale,)), len(frames), axis=0))
+    before = [np.array(matrix) for matrix in worlds(obj, frames)]
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert keys_of(obj, "scale") == keys_of(obj, "location")
+    assert reduction.after < 0.5 * reduction.before
+    moved = [np.array(matrix)[:3, 3] for matrix in worlds(obj, frames)]
+    assert max(np.linalg.norm(a - b[:3, 3]) for a, b in zip(moved, before, strict=True)) <= TOLERANCE * (1.0 + 1e-5)
+
+
+def worlds(obj: bpy.types.Object, frames: np.ndarray):
+    for frame in frames.tolist():
+        bpy.context.scene.frame_set(int(frame))
+        yield obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.copy()
+
+
+def test_a_scale_that_differs_from_axis_to_axis_keeps_its_keys_and_the_motion_keeps_to_the_tolerance(live_file):
+    obj = recorded()
+    frames = key_frames(obj)
+    write_channel(
+        obj, "scale", frames[[0, 50, 90]], np.array(((1, 1, 1), (1, 2, 0.5), (1, 1, 3))), interpolation="SINE"
+    )
+    scales = {name: value for name, value in snapshot(obj).items() if name[0] == "scale"}
+    truth = np.array([matrix.translation for matrix in worlds(obj, frames)])
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert scales.items() <= snapshot(obj).items()
+    shown = np.array([matrix.translation for matrix in worlds(obj, frames)])
+    assert np.linalg.norm(shown - truth, axis=1).max() <= TOLERANCE * (1.0 + 1e-5)
+    assert reduction.after == len(key_frames(obj)) < reduction.before
+
+
+def test_cycles_go_on_as_before(live_file):
+    obj = new_object()
+    frames, poses = motion("screw")
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 500
+    bake_poses(obj, frames + 170.0, poses)
+    for fcurve in curves_of(obj).values():
+        fcurve.modifiers.new("CYCLES")
+    seen = np.arange(0.0, 501.0)
+    truth = read_poses(obj, seen)
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert reduction.after < 0.5 * reduction.before
+    assert off(obj, seen, truth) <= TOLERANCE * (1.0 + 1e-5)
+
+
+def test_cycles_that_fewer_keys_would_change_are_refused(live_file):
+    obj = recorded()
+    path = curves_of(obj)["location", 0]
+    while len(path.keyframe_points) > 60:
+        path.keyframe_points.remove(path.keyframe_points[-1])
+    path.modifiers.new("CYCLES")
+    before = snapshot(obj)
+    with pytest.raises(Refused, match=r"Tool goes on outside of its keys.*constant extrapolation"):
+        reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert snapshot(obj) == before
+
+
+def test_what_is_live_already_is_reduced_as_it_is_seen(live_file):
+    obj = recorded()
+    frames = key_frames(obj)
+    fine = reduce_keys_of(obj, "motor_spline", 0.002, RADIUS)
+    truth = read_poses(obj, frames)
+    coarse = reduce_keys_of(obj, "dq_sclerp", 0.02, RADIUS)
+    assert coarse.before == fine.after
+    assert coarse.after < coarse.before
+    assert off(obj, frames, truth) <= 0.02 * (1.0 + 1e-5)
+
+
+def test_another_object_with_the_same_action_keeps_its_keys(live_file):
+    obj, other = recorded(), new_object("Other")
+    other.animation_data_create().action = obj.animation_data.action
+    other.animation_data.action_slot = obj.animation_data.action_slot
+    before = snapshot(other)
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    assert snapshot(other) == before
+    assert snapshot(obj) != before
+    restore_keys(obj)
+    assert obj.animation_data.action == other.animation_data.action
+
+
+def test_a_strip_shows_the_reduced_keys_and_then_its_own_again(live_file):
+    obj = recorded()
+    action = obj.animation_data.action
+    obj.animation_data.action = None
+    strip = obj.animation_data.nla_tracks.new().strips.new("Strip", 31, action)
+    frames = np.arange(31.0, strip.frame_end + 1.0)
+    truth = read_poses(obj, frames)
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert strip.action != action
+    assert reduction.after < 0.5 * reduction.before
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+    restore_keys(obj)
+    assert strip.action == action
+    assert off(obj, frames, truth) < 1e-6
+
+
+def test_of_several_strips_those_are_reduced_that_can_be(live_file):
+    obj = recorded()
+    dense = obj.animation_data.action
+    obj.animation_data.action = None
+    sparse = key(obj, [1.0, 9.0, 17.0]).animation_data.action
+    obj.animation_data.action = None
+    track = obj.animation_data.nla_tracks.new()
+    strips = [track.strips.new("Dense", 1, dense), track.strips.new("Sparse", 301, sparse)]
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert reduction.before == len(motion()[0])
+    assert [strip.action in (dense, sparse) for strip in strips] == [False, True]
+
+
+def test_a_motion_that_blender_baked_is_reduced(live_file):
+    leader, obj = recorded(), new_object("Follower", "XYZ")
+    obj.constraints.new("COPY_TRANSFORMS").target = leader
+    frames = key_frames(leader)
+    truth = read_poses(obj, frames)
+    with pytest.raises(Refused, match=r"Follower has no keys.*Bake Action, with Visual Keying"):
+        reduce_keys_of(obj)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.nla.bake(
+        frame_start=1,
+        frame_end=int(frames[-1]),
+        visual_keying=True,
+        clear_constraints=True,
+        only_selected=False,
+        bake_types={"OBJECT"},
+    )
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-3)
+    assert reduction.after < 0.5 * reduction.before
+
+
+def test_the_file_keeps_the_dense_keys_until_they_are_let_go(live_file, tmp_path):
+    obj = recorded()
+    before = snapshot(obj)
+    reduction = reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    reopen(tmp_path / "kept.blend")
+    assert reduction_of(bpy.data.objects["Tool"]).after == reduction.after
+    restore_keys(bpy.data.objects["Tool"])
+    assert snapshot(bpy.data.objects["Tool"]) == before
+
+    obj = bpy.data.objects["Tool"]
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    reduced = snapshot(obj)
+    let_keys_go(obj)
+    reopen(tmp_path / "let_go.blend")
+    obj = bpy.data.objects["Tool"]
+    assert not is_reduced(obj)
+    assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]
+    assert snapshot(obj) == reduced
+    assert reduction_of(obj).after == reduction.after
+    with pytest.raises(Refused, match="Tool is not reduced, or has another Action by now"):
+        restore_keys(obj)
+
+
+def reopen(path: Path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+
+
+def test_an_action_that_something_else_needs_stays_when_it_is_let_go(live_file):
+    obj = recorded()
+    action = obj.animation_data.action
+    action.use_fake_user = True
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    let_keys_go(obj)
+    assert action in list(bpy.data.actions)
+
+
+def test_what_was_done_last_is_taken_back_first(live_file):
+    obj = recorded()
+    dense = snapshot(obj)
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    reduced = snapshot(obj)
+    bake(obj)
+    with pytest.raises(Refused, match="Tool was baked since it was reduced: Un-Bake first"):
+        restore_keys(obj)
+    baked = snapshot(obj)
+    reduce_keys_of(obj, "dq_sclerp", TOLERANCE, RADIUS)
+    with pytest.raises(Refused, match="Tool was reduced since it was baked: Restore Keys first"):
+        unbake(obj)
+    restore_keys(obj)
+    assert (snapshot(obj), is_baked(obj), is_reduced(obj)) == (baked, True, False)
+    unbake(obj)
+    assert (snapshot(obj), is_baked(obj), is_reduced(obj)) == (reduced, False, True)
+    restore_keys(obj)
+    assert (snapshot(obj), is_baked(obj), is_reduced(obj)) == (dense, False, False)
+    assert len(bpy.data.actions) == 1
+
+
+def test_letting_go_of_baked_keys_leaves_the_way_back_to_what_was_baked(live_file):
+    obj = key(new_object(), np.arange(1.0, 100.0, 20.0))
+    set_mode(obj, "dq_sclerp")
+    before = snapshot(obj)
+    bake(obj)
+    reduce_keys_of(obj, "lerp_slerp", 0.1, RADIUS)
+    let_keys_go(obj)
+    assert len(bpy.data.actions) == 2
+    unbake(obj)
+    assert snapshot(obj) == before
+
+
+def test_an_action_that_was_put_in_the_place_of_reduced_keys_is_not_replaced(live_file):
+    obj = recorded()
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    obj.animation_data.action = bpy.data.actions.new("Mine")
+    assert reduction_of(obj) is None
+    with pytest.raises(Refused, match="Tool is not reduced, or has another Action by now"):
+        restore_keys(obj)
+    assert obj.animation_data.action.name == "Mine"
+
+
+def moved_by_a_simulation():
+    mesh = bpy.data.meshes.new("Stone")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [], [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
+    obj = new_object(data=mesh)
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    bpy.ops.rigidbody.object_add(type="ACTIVE")
+    return obj
+
+
+def with_(change):
+    def make():
+        obj = recorded()
+        change(obj)
+        return obj
+
+    return make
+
+
+def driven(obj):
+    obj.driver_add("location", 2)
+    return obj
+
+
+def tweak(obj):
+    action = obj.animation_data.action
+    obj.animation_data.action = None
+    track = obj.animation_data.nla_tracks.new()
+    track.strips.new("Strip", 1, action)
+    track.select = True
+    obj.animation_data.nla_tracks.active = track
+    obj.animation_data.use_tweak_mode = True
+
+
+def moved_by_bones():
+    obj = new_object(data=bpy.data.armatures.new("Rig"))
+    write_channel(obj, 'pose.bones["Hand"].location', np.arange(1.0, 9.0), np.zeros((8, 3)))
+    return obj
+
+
+def solved():
+    obj = new_object(data=bpy.data.cameras.new("Camera"))
+    obj.constraints.new("CAMERA_SOLVER")
+    return obj
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (new_object, "Tool has no keys of location, rotation or scale: there is nothing to reduce"),
+        (moved_by_a_simulation, r"Tool has no keys.*Object > Rigid Body > Bake to Keyframes"),
+        (lambda: key(moved_by_a_simulation(), [1.0]), r"Tool has 1 key of.*a simulation moves it"),
+        (lambda: driven(new_object()), r"Tool has no keys.*drivers move it"),
+        (moved_by_bones, r"Tool has no keys.*its bones have"),
+        (solved, r"Tool has no keys.*Constraint to F-Curve"),
+        (with_(driven), r"Tool: Location Z is driven"),
+        (with_(tweak), r"Tool: leave the strip that is being edited first"),
+        (with_(lambda obj: setattr(obj, "rotation_mode", "AXIS_ANGLE")), r"Tool turns by axis and angle"),
+        (with_(lambda obj: curves_of(obj)["location", 1].modifiers.new("NOISE")), r"Tool: Location Y has a modifier"),
+        (with_(lambda obj: curves_of(obj)["location", 1].convert_to_samples(1, 50)), r"Samples to Keys"),
+        (lambda: key(new_object(), [1.0]), "Tool has 1 key of location, rotation or scale: there is nothing to reduce"),
+        (
+            lambda: key(new_object(), [1.0, 9.0]),
+            "Tool has 2 keys of location, rotation or scale: there is nothing to reduce",
+        ),
+        (lambda: key(new_object(), [1.0, 5.0, 9.0]), "Tool needs its 3 keys to stay within the tolerance"),
+        (lambda: key(new_object(), np.arange(1.0, 30.0), scale="uneven"), r"its scale changes differently"),
+    ],
+)
+def test_where_nothing_can_be_reduced_it_says_why_and_the_way_out_and_changes_nothing(live_file, make, message):
+    obj = make()
+    before, actions = snapshot(obj), list(bpy.data.actions)
+    with pytest.raises(Refused, match=message):
+        reduce_keys_of(obj)
+    assert snapshot(obj) == before
+    assert list(bpy.data.actions) == actions
+    assert not len(obj.rigid_motion.bakes)
+    assert reduction_of(obj) is None
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_tolerance_that_is_none_is_refused(live_file, tolerance):
+    with pytest.raises(Refused, match="Tool: the tolerance has to be a number above zero"):
+        reduce_keys_of(recorded(), tolerance=tolerance)
+
+
+def test_blenders_own_in_betweens_are_no_mode_to_reduce_for(live_file):
+    assert MODE_IDS[0] == "BLENDER"
+    with pytest.raises(Refused, match="Tool: there is no mode 'BLENDER'"):
+        reduce_keys_of(recorded(), "BLENDER")
+
+
+def test_linked_keys_are_refused(live_file, tmp_path):
+    recorded()
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {bpy.data.objects["Tool"]})
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, here):
+        here.objects = ["Tool"]
+    bpy.context.scene.collection.objects.link(here.objects[0])
+    with pytest.raises(Refused, match="Tool is linked from another file: make it local first"):
+        reduce_keys_of(bpy.data.objects["Tool"])
+
+
+def box(obj_size: float) -> bpy.types.Mesh:
+    mesh = bpy.data.meshes.new("Box")
+    mesh.from_pydata([(0, 0, 0), (obj_size, 2 * obj_size, 2 * obj_size)], [(0, 1)], [])
+    return mesh
+
+
+def test_the_radius_is_how_far_an_object_reaches_from_its_origin(live_file):
+    obj = new_object(data=box(1.0))
+    assert radius_of(obj) == pytest.approx(3.0)
+    obj.scale = (2.0, 2.0, 2.0)
+    root = new_object("Root")
+    root.scale = (3.0, 3.0, 3.0)
+    obj.parent = root
+    assert radius_of(obj) == pytest.approx(18.0)
+
+
+def test_empties_and_cameras_are_as_large_as_they_are_drawn(live_file):
+    empty, camera = new_object("Empty"), new_object("Camera", data=bpy.data.cameras.new("Camera"))
+    empty.empty_display_size, camera.data.display_size = 0.25, 0.5
+    empty.scale = (2.0, 2.0, 2.0)
+    assert (radius_of(empty), radius_of(camera)) == (pytest.approx(0.5), pytest.approx(0.5))
+
+
+def test_what_has_no_size_counts_as_ten_centimetres(live_file):
+    light = new_object("Lamp", data=bpy.data.lights.new("Lamp", "POINT"))
+    assert radius_of(light) == pytest.approx(0.1)
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    assert radius_of(light) == pytest.approx(10.0)

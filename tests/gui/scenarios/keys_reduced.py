@@ -1,0 +1,92 @@
+"""A recording reduced to few keys by a button, with another tolerance in the redo panel, undone, and restored."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from addon.motion import Poses, interpolate
+from tests.animation.oracle import curves_of, shown_worlds
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+
+FRAMES = np.arange(1.0, 252.0)
+CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]).T
+
+REDO_ROWS = 44
+"""Pixels from the top of the redo panel to the middle of its first row."""
+
+
+def cube() -> bpy.types.Object:
+    """The default cube, asked for anew each time: undo replaces it."""
+    return bpy.data.objects["Cube"]
+
+
+def keys() -> int:
+    return len(curves_of(cube())["location", 0].keyframe_points)
+
+
+def off(truth: np.ndarray) -> float:
+    """How far any corner of the cube is off on any frame: by less than twice the error at three points as far out."""
+    moved = (shown_worlds([cube()], FRAMES)[0] - truth) @ CORNERS
+    return float(np.linalg.norm(moved[:, :3], axis=1).max())
+
+
+def record() -> None:
+    """A key on every frame of the cube, as imported motion capture has it."""
+    random = np.random.default_rng(3)
+    poses = Poses(random.normal(size=(9, 3)), random.normal(size=(9, 4)))
+    moved = interpolate(np.linspace(1.0, 251.0, 9), poses, FRAMES, "motor_spline")
+    obj = cube()
+    obj.rotation_mode = "QUATERNION"
+    for frame, position, quaternion in zip(FRAMES, moved.positions, moved.quaternions, strict=True):
+        obj.location, obj.rotation_quaternion = position, quaternion
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_quaternion", frame=frame)
+    bpy.ops.ed.undo_push(message="Recording")
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator presses the button, asks for more, takes it back, does it again by the menu, and restores."""
+    hand.window.workspace = bpy.data.workspaces["Animation"]
+    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    view = hand.area("VIEW_3D")
+    record()
+    truth = shown_worlds([cube()], FRAMES)[0]
+    yield from hand.open_sidebar(view, "Animation")
+    before = yield from hand.picture("dense")
+
+    button = yield from hand.find_button(view, "UI", "rigid_motion.reduce_keys")
+    yield from hand.click(button)
+    yield from hand.wait_until(lambda: keys() < 251, "the button reduces")
+    fine = keys()
+    assert off(truth) < 0.002
+    after = yield from hand.picture("reduced")
+    assert (before != after).any()
+
+    redo = places.region(view, "HUD")
+    yield from hand.click(places.centre(redo))
+    yield from hand.wait_until(lambda: redo.height > 100, "the redo panel unfolds")
+    yield from hand.picture("redo-panel", places.box(view))
+    yield from hand.hover((redo.x + 3 * redo.width // 4, redo.y + redo.height - REDO_ROWS))
+    yield from hand.press("RET")
+    yield from hand.press("A", ctrl=True)
+    yield from hand.type("0.1")
+    yield from hand.press("RET")
+    yield from hand.wait_until(lambda: keys() < fine, "a larger tolerance in the redo panel leaves fewer keys")
+    assert 0.01 < off(truth) < 0.2
+    yield from hand.picture("larger-tolerance")
+
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("Z", ctrl=True)
+    assert keys() == 251, "one step takes all of it back"
+    assert off(truth) < 1e-5
+    yield from hand.open_menu(view, "VIEW3D_MT_object")
+    yield from hand.choose("Reduce Keys to Poses")
+    yield from hand.wait_until(lambda: keys() < 251, "the menu reduces")
+    yield from hand.open_menu(view, "VIEW3D_MT_object")
+    yield from hand.picture("menu")
+    yield from hand.choose("Restore Keys")
+    yield from hand.wait_until(lambda: keys() == 251, "Restore Keys gives them back")
+    assert off(truth) < 1e-5
+    yield from hand.picture("restored")
