@@ -126,9 +126,9 @@ def test_it_does_better_than_even_keys_and_than_greedy_insertion():
     assert len(keys) < 0.85 * len(greedy(times, poses, 0.03))
 
 
-def test_shaking_spares_keys():
+def test_beginning_anew_spares_keys():
     times, poses = wandering(600, 5)
-    few, fewer = (reduce_keys(times, poses, tolerance=0.01, shakes=shakes) for shakes in (0, 8))
+    few, fewer = (reduce_keys(times, poses, tolerance=0.03, tries=tries) for tries in (0, 2))
     assert len(fewer) < len(few)
 
 
@@ -218,7 +218,7 @@ def test_half_the_keys_do_for_the_error_of_vector_and_quaternion(recordings, rat
         even = decimate(times, rate)
         times, poses = times[: even[-1] + 1], poses[: even[-1] + 1]
         error = float(np.sqrt(np.mean(shell_errors(times, poses, even, "lerp_slerp") ** 2)))
-        keys = reduce_keys(times, poses, "motor_spline", error, RADIUS, rms=True, shakes=0)
+        keys = reduce_keys(times, poses, "motor_spline", error, RADIUS, rms=True, tries=0)
         assert np.sqrt(np.mean(shell_errors(times, poses, keys, "motor_spline") ** 2)) <= error * (1.0 + 1e-9)
         shares.append(len(keys) / len(even))
     assert np.exp(np.mean(np.log(shares))) <= most
