@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import bpy
@@ -12,8 +13,25 @@ from scripts.build_extension import build
 
 EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 
+STATUS = pytest.StashKey[int]()
+"""How the session ended."""
+
 RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "data" / "recordings"
 """Other people's recordings, which are not part of the project and may be missing."""
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Blender 4.5's module can wait forever while it is taken down, long after the last test: leave without that."""
+    status = config.stash.get(STATUS, None)
+    if bpy.app.version < (5, 0) and status is not None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    session.config.stash[STATUS] = int(exitstatus)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
