@@ -42,6 +42,7 @@ except ImportError:
 
 from addon.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from addon.motion.quaternions import align_signs, multiply
+from scripts.publishing import publish
 
 ENOUGH = 4.0
 """Seconds after which one way of computing a case has been measured well enough."""
@@ -324,9 +325,7 @@ def main(arguments: list[str] | None = None) -> int:
         lines += report(case, race(ways(case), options.rounds))
     print("key reduction ...", file=sys.stderr, flush=True)
     lines += reductions((900, 1000, 10_000, options.count))
-    print("\n".join(lines))
-    if options.output:
-        options.output.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+    publish(lines, options.output)
     return 0
 
 

@@ -27,6 +27,7 @@ from bpy_extras import anim_utils
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from addon import animation
+from scripts.publishing import publish
 
 MODE = "dq_sclerp"
 
@@ -252,9 +253,7 @@ def main(arguments: list[str] | None = None) -> int:
             *rows(objects, options.rounds),
             "",
         ]
-    print("\n".join(lines))
-    if options.output:
-        options.output.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+    publish(lines, options.output)
     return 0
 
 

@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from addon import animation
 from addon.motion import Poses, interpolate, repair, shell_error
 from addon.motion.measures import rms
+from scripts.publishing import publish
 from scripts.trajectories import TrajectoryError, read_trajectories
 from scripts.trajectories.reading import FORMATS
 
@@ -238,9 +239,7 @@ def main(arguments: list[str] | None = None) -> int:
             lines += report(recordings, rotation_mode, options.tolerance, options.radius)
     finally:
         animation.unregister()
-    print("\n".join(lines))
-    if options.output:
-        options.output.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+    publish(lines, options.output)
     return 0
 
 

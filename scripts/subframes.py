@@ -33,6 +33,7 @@ from addon.motion import MODES, Poses, shell_error
 from addon.motion.eulers import eulers_from_quaternions
 from addon.motion.measures import rms
 from addon.motion.quaternions import align_signs, angle_between, multiply
+from scripts.publishing import publish
 
 SEGMENTS = 24
 
@@ -176,9 +177,7 @@ def main(arguments: list[str] | None = None) -> int:
             lines += table(motion, options.radius)
     finally:
         animation.unregister()
-    print("\n".join(lines))
-    if options.output:
-        options.output.write_text("\n".join(lines), encoding="utf-8", newline="\n")
+    publish(lines, options.output)
     return 0
 
 

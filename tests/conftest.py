@@ -10,14 +10,12 @@ import bpy
 import pytest
 
 from scripts.build_extension import build
+from tests.recordings import RECORDINGS
 
 EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 
 STATUS = pytest.StashKey[int]()
 """How the session ended."""
-
-RECORDINGS = Path(__file__).resolve().parents[2] / "shared" / "data" / "recordings"
-"""Other people's recordings, which are not part of the project and may be missing."""
 
 
 @pytest.hookimpl(trylast=True)

@@ -1,6 +1,6 @@
 """Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
-slots       what moves an object, and by which F-curves refusals    why not, and the way out
+slots       what moves an object, by which F-curves     refusals    why not, and the way out
 reading     what is keyed, from Blender's data          sources     the same as arrays
 fcurves     F-curves in NumPy                           easings     Blender's easings
 inbetweens  from sources to delta transforms            filling     writing those

@@ -13,7 +13,7 @@ from ..motion import Poses
 from ..motion.eulers import ORDERS, eulers_from_quaternions
 from ..motion.quaternions import align_signs, conjugate, multiply
 from . import live
-from .channels import write_channel
+from .channels import code_of, write_channel
 from .inbetweens import InBetweens, in_betweens
 from .mode_keys import set_mode_in
 from .originals import BAKED, has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
@@ -220,10 +220,10 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     new = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in FIELDS.items()}
     own = np.flatnonzero(~(before | behind))
     places = np.abs(frames[:, None] - at[own]).argmin(axis=0)
-    _set_code(new, "type", "GENERATED")
+    new["type"][:] = code_of("type", "GENERATED")
     for name, numbers in new.items():
         numbers[places] = old[name][own]
-    _set_code(new, "interpolation", "LINEAR")
+    new["interpolation"][:] = code_of("interpolation", "LINEAR")
     points = np.stack((frames, values), axis=1).astype(np.float32)
     at_end = own[places == len(frames) - 1]
     if behind.any() and len(at_end):
@@ -235,8 +235,7 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
         new[side] = handles
     new["co"] = points
     for name in ("handle_left_type", "handle_right_type"):
-        code = bpy.types.Keyframe.bl_rna.properties[name].enum_items["FREE"].value
-        new[name][[0, -1]] = code
+        new[name][[0, -1]] = code_of(name, "FREE")
     keys.clear()
     keys.add(int(before.sum() + len(frames) + behind.sum()))
     for name, numbers in new.items():
@@ -244,7 +243,3 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     for modifier in list(fcurve.modifiers):
         fcurve.modifiers.remove(modifier)
     fcurve.update()
-
-
-def _set_code(fields: dict[str, np.ndarray], name: str, value: str) -> None:
-    fields[name][:] = bpy.types.Keyframe.bl_rna.properties[name].enum_items[value].value

@@ -58,7 +58,6 @@ def write_channel(
     """
     channelbag = channelbag_of(animated)
     fcurves = channelbag.fcurves
-    kind = bpy.types.Keyframe.bl_rna.properties
     points = np.empty((len(frames), 2), dtype=np.float32)
     points[:, 0] = frames
     for index, column in enumerate(np.asarray(values).reshape(len(frames), -1).T):
@@ -72,9 +71,13 @@ def write_channel(
         keys.add(len(frames))
         keys.foreach_set("co", points.ravel())
         for name, value in (("interpolation", interpolation), ("type", key_type)):
-            code = kind[name].enum_items[value].value
-            keys.foreach_set(name, np.full(len(frames), code, dtype=np.int32))
+            keys.foreach_set(name, np.full(len(frames), code_of(name, value), dtype=np.int32))
         fcurve.update()
+
+
+def code_of(name: str, value: str) -> int:
+    """The number that stands for a value of one of the enumerations of `bpy.types.Keyframe`."""
+    return bpy.types.Keyframe.bl_rna.properties[name].enum_items[value].value
 
 
 def read_poses(obj: bpy.types.Object, frames: np.ndarray) -> Poses:

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..motion.eulers import quaternions_from_eulers
-from .fcurves import Keys, cycled
+from .fcurves import cycled
 from .filling import recorded
 from .mode_keys import active_slot
 from .sources import MODE_IDS, SAME_FRAME, Source
@@ -96,16 +96,12 @@ def is_up_to_date(obj: bpy.types.Object, source: Source) -> bool:
 
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:
     """What the channels have at both ends of a segment, shape (10, 2), as seen from within it where cycles jump."""
-    return source.values_at(ends if _cyclic(source) is None else ends + np.array((MOMENT, -MOMENT)))
-
-
-def _cyclic(source: Source) -> Keys | None:
-    return next((keys for keys in source.curves if keys.cycles is not None), None)
+    return source.values_at(ends if source.cyclic is None else ends + np.array((MOMENT, -MOMENT)))
 
 
 def _deciding_key(source: Source, start: float) -> float:
     """The key that a segment's mode hangs on."""
-    cyclic = _cyclic(source)
+    cyclic = source.cyclic
     if cyclic is None:
         return float(start)
     moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]

@@ -11,7 +11,7 @@ import numpy as np
 from . import live
 from .reading import mode_of, read
 from .slots import GROUP, MODE_PATH, WIDTHS, Curves, Refused, Slot, Transformable, curves_in, slots_of
-from .sources import MODE_IDS, SAME_FRAME, UNKNOWN, Source
+from .sources import MODE_IDS, SAME_FRAME, UNKNOWN, Source, distinct
 
 
 def active_slot(obj: bpy.types.Object) -> Slot | None:
@@ -57,7 +57,7 @@ def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
                 keys.foreach_get("select_control_point", chosen)
             found.append(points[::2][chosen])
     frames = np.unique(np.concatenate(found)).astype(np.float64) if found else np.empty(0)
-    return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+    return distinct(frames)
 
 
 def _modes_in(obj: bpy.types.Object, curves: Curves, frames: np.ndarray) -> list[int]:

@@ -16,6 +16,7 @@ import numpy as np
 from ..motion import MODES, Poses, reduce_keys, shell_error
 from . import live
 from .bake import channel_values
+from .channels import code_of
 from .fcurves import LINEAR, Keys
 from .inbetweens import in_betweens
 from .mode_keys import set_mode_in
@@ -31,7 +32,7 @@ from .originals import (
 )
 from .reading import read
 from .slots import MODE_PATH, WIDTHS, Refused, Slot, Transformable, curves_in, slots_of
-from .sources import MODE_IDS, ROWS, SAME_FRAME, SCALE, Source
+from .sources import MODE_IDS, ROWS, SAME_FRAME, SCALE, Source, distinct
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far the object gets."""
@@ -199,7 +200,7 @@ def _fewer_keys(
     obj: bpy.types.Object, slot: Slot, source: Source, mode: str, tolerance: float, radius: float
 ) -> _Fewer:
     """The keys that one slot needs, which may be as many as it has."""
-    before, frames = _keys_in(source), _samples(source)
+    before, frames = distinct(source.keyed_frames), _samples(source)
     # What goes on outside of the keys, by cycles or at a slope, has to stay as well.
     around = np.arange(source.frame_range[0], source.frame_range[1] + 1.0)
     around = around[(around < frames[0]) | (around > frames[-1])]
@@ -228,7 +229,7 @@ def _fewer_keys(
         len(before),
         frames[chosen],
         {paths[row]: column[chosen] for row, column in values.items()},
-        _keys_in(fewer),
+        distinct(fewer.keyed_frames),
         SCALE in source.keyed and ROWS[SCALE].start not in values,
         float(error.max()) * unit,
     )
@@ -270,15 +271,9 @@ def _worst(chosen: np.ndarray, error: np.ndarray, allowed: float) -> np.ndarray:
     return furthest[error[furthest] > allowed]
 
 
-def _keys_in(source: Source) -> np.ndarray:
-    """The frames of a source's own keys, those together that are one to Blender, shape (n,)."""
-    frames = source.keyed_frames
-    return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
-
-
 def _samples(source: Source) -> np.ndarray:
     """Where the recording is looked at: on its keys, and on whole frames where those are further apart."""
-    keys = _keys_in(source)
+    keys = distinct(source.keyed_frames)
     whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]) + 1.0)
     place = np.clip(np.searchsorted(keys, whole), 1, max(len(keys) - 1, 1))
     before, behind = keys[place - 1], keys[np.minimum(place, len(keys) - 1)]
@@ -363,13 +358,12 @@ def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) 
     keys.clear()
     keys.add(len(frames))
     keys.foreach_set("co", np.stack((frames, values), axis=1).astype(np.float32).ravel())
-    kinds = bpy.types.Keyframe.bl_rna.properties
     for name, value in (
         ("interpolation", "LINEAR"),
         ("handle_left_type", "AUTO_CLAMPED"),
         ("handle_right_type", "AUTO_CLAMPED"),
     ):
-        keys.foreach_set(name, np.full(len(frames), kinds[name].enum_items[value].value, np.int32))
+        keys.foreach_set(name, np.full(len(frames), code_of(name, value), np.int32))
     fcurve.mute = False
     fcurve.update()
 

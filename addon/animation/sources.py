@@ -33,6 +33,11 @@ SAME_FRAME = 0.01
 """Keys closer than this are one key to Blender, and here."""
 
 
+def distinct(frames: np.ndarray) -> np.ndarray:
+    """Rising frames of keys, those that are one key to Blender once."""
+    return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """The keys of one slot, and the values that what it does not key rests at."""
@@ -80,7 +85,7 @@ class Source:
     @property
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
-        return len(self.channels) == 1 and self._cyclic is None
+        return len(self.channels) == 1 and self.cyclic is None
 
     @cached_property
     def keyed_frames(self) -> np.ndarray:
@@ -93,21 +98,21 @@ class Source:
         if self.is_together:
             return self.curves[0].times
         times = [keys.times for keys in self.curves]
-        if self._cyclic is not None:
+        if self.cyclic is not None:
             # A whole round more on both sides, for the span may begin and end in the middle of a segment.
             margin = max(own[-1] - own[0] for own in times)
             first = min(self.span[0], *(own[0] for own in times)) - margin
             last = max(self.span[1], *(own[-1] for own in times)) + margin
             times = [cyclic_times(keys, keys.times, first, last) for keys in self.curves]
         frames = np.unique(np.concatenate(times))
-        return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+        return distinct(frames)
 
     @cached_property
     def modes(self) -> np.ndarray:
         """The mode of each segment, as `MODE_IDS` counts them, shape (n - 1,)."""
         # A moment into the segment; in a copy that runs backwards that is a moment before its original's end.
         starts = self.key_frames[:-1] + SAME_FRAME
-        return self.modes_at(starts if self._cyclic is None else cycled(self._cyclic, starts)[0])
+        return self.modes_at(starts if self.cyclic is None else cycled(self.cyclic, starts)[0])
 
     def modes_at(self, frames: np.ndarray) -> np.ndarray:
         """The modes at these frames, as `MODE_IDS` counts them: each key of the mode channel holds until the next."""
@@ -180,6 +185,6 @@ class Source:
         return float(self.key_frames[0]) if before else -np.inf, float(self.key_frames[-1]) if after else np.inf
 
     @cached_property
-    def _cyclic(self) -> Keys | None:
+    def cyclic(self) -> Keys | None:
         """The first of the channels that repeat."""
         return next((keys for keys in self.curves if keys.cycles is not None), None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 
@@ -32,9 +34,19 @@ def conjugate(q: np.ndarray) -> np.ndarray:
 
 
 def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points of shape (..., 3) turned by unit quaternions of shape (..., 4)."""
-    turned = 2.0 * np.cross(q[..., 1:], points)
-    return points + q[..., :1] * turned + np.cross(q[..., 1:], turned)
+    """Points of shape (..., 3) turned by unit quaternions of shape (..., 4). A view, components apart in memory."""
+    w, *xyz = np.moveaxis(q, -1, 0)
+    points = np.moveaxis(points, -1, 0)
+    across = 2.0 * cross(xyz, points)
+    turned = w * across + cross(xyz, across)
+    for axis in range(3):
+        turned[axis] += points[axis]
+    return np.moveaxis(turned, 0, -1)
+
+
+def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
+    """The vector product of vectors (3, ...), components first."""
+    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
 def normalise(q: np.ndarray) -> np.ndarray:

@@ -251,9 +251,8 @@ class _Reduction:
             windows[:, 1 + 2 * reach] += step
             cost, peak = self._look(windows, slice(reach, 2 + 3 * reach))
             rise = cost.sum(axis=1) - self._around(keys.cost, inner)
-            good = np.flatnonzero((rise < -1e-4 * keys.cost.mean()) & (peak.max(axis=1) <= max(tolerance, 0.0)))
-            if self.power == 2:
-                good = np.flatnonzero(rise < -1e-4 * keys.cost.mean())
+            allowed = (self.power == 2) | (peak.max(axis=1) <= tolerance)
+            good = np.flatnonzero((rise < -1e-4 * keys.cost.mean()) & allowed)
             chosen = good[np.argsort(rise[good], kind="stable")]
             picked = _apart(inner[chosen], self.apart, len(places))
             rows = np.searchsorted(inner, picked)

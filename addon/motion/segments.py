@@ -24,7 +24,7 @@ import numpy as np
 from . import twists
 from .piecewise import BLOCK, blocks, combine, is_dense, multiply
 from .poses import Poses
-from .quaternions import align_signs
+from .quaternions import align_signs, cross, rotate
 from .quaternions import multiply as product
 
 STILL = 1e-12
@@ -125,9 +125,9 @@ class Segments:
         Where nothing turns there is no axis: n is zero, and the whole chord is across.
         """
         (mw, *m), (dw, *d) = self.middle, self.difference
-        n = mw * np.stack(d) - dw * np.stack(m) - twists.cross(d, m)
+        n = mw * np.stack(d) - dw * np.stack(m) - cross(d, m)
         along = n * np.einsum("ks,ks->s", n, self.chord)
-        return along, self.chord - along, twists.cross(n, self.chord)
+        return along, self.chord - along, cross(n, self.chord)
 
 
 Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, "np.ndarray | None"]]
@@ -341,9 +341,7 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
     added = np.empty((len(bends) if len(out) > 7 else 6, s.size))
     combine(bends[: len(added)], functions, counts, added)
     turns, advances = twists.exponential(added[:6])
-    w, xyz = out[3], out[4:7]
-    across = 2.0 * twists.cross(xyz, advances)
-    out[:3] += advances + w * across + twists.cross(xyz, across)
+    out[:3] += rotate(out[3:7].T, advances.T).T
     out[3:7] = product(out[3:7].T, turns.T).T
     if len(out) > 7:
         out[7] *= np.exp(added[6])

@@ -9,11 +9,9 @@ Source: Murray, Li and Sastry, "A Mathematical Introduction to Robotic Manipulat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from .quaternions import conjugate, multiply, rotate
+from .quaternions import conjugate, cross, multiply, rotate
 
 SERIES_BELOW = 0.03
 """Below this angle power series serve, whose next terms are below 1e-16."""
@@ -71,8 +69,3 @@ def between(
     """The twists (6, n) from poses to others in a unit of time: positions (n, 3), quaternions (n, 4)."""
     back = conjugate(first)
     return logarithm(multiply(back, second).T, rotate(back, second_positions - first_positions).T)
-
-
-def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-    """The vector product of vectors (3, n)."""
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))

@@ -198,32 +198,41 @@ def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:
     return scene.frame_start, scene.frame_end
 
 
-def _objects_with(context: bpy.types.Context, kind: str) -> list[bpy.types.Object]:
-    """Those that had other keys before, which are still in the file."""
-    return [
-        obj
-        for obj in objects_for(context)
-        if any(note.kind == kind and note.original is not None for note in obj.rigid_motion.bakes)
-    ]
+class _OnChanged(_OnObjects):
+    """Operators on objects whose keys were baked or reduced, while what they had before is still in the file."""
 
+    kind: ClassVar[str]
+    missing: ClassVar[str]
+    """Why there is nothing to do."""
 
-class RIGID_MOTION_OT_unbake(_OnObjects, bpy.types.Operator):
-    bl_idname = "rigid_motion.unbake"
-    bl_label = "Un-Bake"
-    bl_description = "Give baked objects the Actions back that they had before, with their own keys and modes"
+    @classmethod
+    def objects_of(cls, context: bpy.types.Context) -> list[bpy.types.Object]:
+        return [
+            obj
+            for obj in objects_for(context)
+            if any(note.kind == cls.kind and note.original is not None for note in obj.rigid_motion.bakes)
+        ]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _objects_with(context, BAKED):
+        if cls.objects_of(context):
             return True
-        cls.poll_message_set("None of these objects is baked")
+        cls.poll_message_set(cls.missing)
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self.act(_objects_with(context, BAKED), self._unbake)
+        return self.act(self.objects_of(context), self.on_one)
+
+
+class RIGID_MOTION_OT_unbake(_OnChanged, bpy.types.Operator):
+    bl_idname = "rigid_motion.unbake"
+    bl_label = "Un-Bake"
+    bl_description = "Give baked objects the Actions back that they had before, with their own keys and modes"
+    kind = BAKED
+    missing = "None of these objects is baked"
 
     @staticmethod
-    def _unbake(obj: bpy.types.Object) -> str:
+    def on_one(obj: bpy.types.Object) -> str:
         animation.unbake(obj)
         return "back to the keys from before baking"
 
@@ -296,50 +305,33 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
         return reduction_told(scene, reduction)
 
 
-class RIGID_MOTION_OT_restore_keys(_OnObjects, bpy.types.Operator):
+class RIGID_MOTION_OT_restore_keys(_OnChanged, bpy.types.Operator):
     bl_idname = "rigid_motion.restore_keys"
     bl_label = "Restore Keys"
     bl_description = "Give reduced objects all the keys back that they had before, to the last handle"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _poll_reduced(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self.act(_objects_with(context, REDUCED), self._restore)
+    kind = REDUCED
+    missing = "The keys of these objects are not reduced"
 
     @staticmethod
-    def _restore(obj: bpy.types.Object) -> str:
+    def on_one(obj: bpy.types.Object) -> str:
         animation.restore_keys(obj)
         return "back to the keys from before they were reduced"
 
 
-class RIGID_MOTION_OT_let_keys_go(_OnObjects, bpy.types.Operator):
+class RIGID_MOTION_OT_let_keys_go(_OnChanged, bpy.types.Operator):
     bl_idname = "rigid_motion.let_keys_go"
     bl_label = "Let Dense Keys Go"
     bl_description = (
         "Remove the keys from the file that Restore Keys would give back, once the reduced ones are good. "
         "The reduced keys stay as they are"
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _poll_reduced(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        return self.act(_objects_with(context, REDUCED), self._let_go)
+    kind = REDUCED
+    missing = "The keys of these objects are not reduced"
 
     @staticmethod
-    def _let_go(obj: bpy.types.Object) -> str:
+    def on_one(obj: bpy.types.Object) -> str:
         animation.let_keys_go(obj)
         return "the keys from before they were reduced are gone"
-
-
-def _poll_reduced(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    if _objects_with(context, REDUCED):
-        return True
-    operator.poll_message_set("The keys of these objects are not reduced")
-    return False
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):

@@ -20,7 +20,7 @@ from addon.motion import MODES, Poses, in_betweens, interpolate
 from addon.motion.quaternions import multiply, normalise
 
 MODE_IDS = ("BLENDER", *MODES)
-SMOOTH = {name for name, mode in MODES.items() if mode.behind or mode.ahead}
+SMOOTH = {name for name, mode in MODES.items() if mode.is_smooth}
 WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 KEY_FIELDS = (
     *("interpolation", "easing", "back", "amplitude", "period", "type"),

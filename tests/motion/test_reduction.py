@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,9 +11,9 @@ from addon.motion import MODES, Poses, decimate, interpolate, reduce_keys, repai
 from addon.motion.quaternions import align_signs, normalise
 from scripts.trajectories import read_trajectories
 from tests.motion.test_twists import pose_matrix
+from tests.recordings import RECORDINGS
 
 RADIUS = 0.1
-RECORDINGS = Path(__file__).parents[3] / "shared" / "data" / "recordings"
 HANDS = (
     *("aframe_head.csv", "aframe_left.csv", "aframe_right.csv"),
     *("broad_fast_rotation.csv", "freiburg1_xyz.tum"),

@@ -20,9 +20,9 @@ from scipy.spatial.transform import Rotation
 from addon.motion import MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
 from scripts.comparison.study import folder_name
+from tests.recordings import RECORDINGS
 
 ROOT = Path(__file__).resolve().parents[2]
-RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
 
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"

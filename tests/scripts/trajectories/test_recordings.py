@@ -7,9 +7,9 @@ import pytest
 
 from addon.motion.quaternions import angle_between
 from scripts.trajectories import read_trajectories
+from tests.recordings import RECORDINGS
 
-FOLDER = Path(__file__).parents[4] / "shared" / "data" / "recordings"
-FILES = sorted(path for path in FOLDER.glob("*") if path.suffix != ".md")
+FILES = sorted(path for path in RECORDINGS.glob("*") if path.suffix != ".md")
 
 pytestmark = pytest.mark.recordings
 
@@ -40,6 +40,6 @@ def test_every_recording_is_read_whole(path: Path) -> None:
     ],
 )
 def test_no_sample_is_lost(name: str, samples: int) -> None:
-    if not (FOLDER / name).exists():
+    if not (RECORDINGS / name).exists():
         pytest.skip(f"no {name}")
-    assert len(read_trajectories(str(FOLDER / name)).trajectories[0].times) == samples
+    assert len(read_trajectories(str(RECORDINGS / name)).trajectories[0].times) == samples
