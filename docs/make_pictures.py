@@ -17,7 +17,7 @@ import bpy
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES
 from scripts import compare
 from scripts.comparison.choices import Uniform
 from scripts.comparison.stage import StageSettings, build_stage
@@ -39,7 +39,7 @@ class Still:
 
 
 STILLS = {
-    "comparison.png": Still("screw", "5", 2.7, tuple(MODES), (1280, 720), "drill"),
+    "comparison.png": Still("screw", "5", 2.7, tuple(KEYFRAME_MODES), (1280, 720), "drill"),
     "smooth.png": Still("reach", "8", 3.32, SMOOTH, (1280, 480), "controller"),
 }
 

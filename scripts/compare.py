@@ -28,7 +28,7 @@ except ImportError as error:
     print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
     sys.exit(2)
 
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES, MODES
 from scripts.comparison import needed
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.clips import Clip
@@ -91,7 +91,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--rates", type=_amounts(Uniform), metavar="HZ,...", help=f"keys a second that are kept ({RATES})"
     )
     parser.add_argument(
-        "--modes", type=_modes, default=",".join(MODES), metavar="MODE,...", help="what fills them in (%(default)s)"
+        "--modes",
+        type=_modes,
+        default=",".join(KEYFRAME_MODES),
+        metavar="MODE,...",
+        help="what fills them in (%(default)s)",
     )
     parser.add_argument(
         "--output", type=Path, default=ROOT / "renders" / "comparison", help="folder to write to (renders/comparison)"

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from addon import animation
 from addon.animation.inbetweens import in_betweens
 from addon.animation.mode_keys import source_of
-from addon.motion import MODES, Poses, shell_error
+from addon.motion import KEYFRAME_MODES, Poses, shell_error
 from addon.motion.eulers import eulers_from_quaternions
 from addon.motion.measures import rms
 from addon.motion.quaternions import align_signs, angle_between, multiply
@@ -144,7 +144,7 @@ def table(motion: Motion, radius: float) -> Iterator[str]:
     yield ""
     yield "| mode | turned by | live, mm | RMS, mm | degrees | baked every 0.25, mm | degrees | baked every frame, mm |"
     yield "|---|---|---:|---:|---:|---:|---:|---:|"
-    for mode in MODES:
+    for mode in KEYFRAME_MODES:
         for rotation_mode in ROTATION_MODES:
             live, finely, whole = measure(motion, mode, rotation_mode, radius)
             yield (

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..motion import MODES, Poses
+from ..motion import KEYFRAME_MODES, Poses
 from ..motion import in_betweens as segment_poses
 from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
 from ..motion.piecewise import blocks, combine
@@ -32,7 +32,7 @@ BLOCK = 16384
 """Samples worked on at once: few enough for the processor's caches."""
 
 
-SMOOTH = [number for number, mode in enumerate(MODE_IDS) if number and MODES[mode].is_smooth]
+SMOOTH = [number for number, mode in enumerate(MODE_IDS) if number and KEYFRAME_MODES[mode].is_smooth]
 """The codes of modes for which the keys around a segment count."""
 
 
@@ -240,7 +240,7 @@ class _Ends:
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,)."""
-        if MODES[mode].is_smooth:
+        if KEYFRAME_MODES[mode].is_smooth:
             times, keys = self.around[0][some], self.around[1][some]
             nothing = np.zeros_like(counts)
             return segment_poses(times, keys, np.stack((nothing, counts, nothing), axis=1), progress, mode)

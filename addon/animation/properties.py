@@ -17,13 +17,13 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..motion import MODES
+from ..motion import KEYFRAME_MODES
 from . import live
 from .originals import BAKED, REDUCED
 
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
-    *((name, mode.label, mode.description, number) for number, (name, mode) in enumerate(MODES.items(), 1)),
+    *((name, mode.label, mode.description, number) for number, (name, mode) in enumerate(KEYFRAME_MODES.items(), 1)),
 ]
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..motion import MODES, Poses, reduce_keys, shell_error
+from ..motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from . import live
 from .bake import channel_values
 from .channels import code_of
@@ -86,7 +86,7 @@ def reduce_keys_of(
     ----------
     obj : bpy.types.Object
     mode : str
-        What fills in between the keys, one of `addon.motion.MODES`. It is keyed with them.
+        What fills in between the keys, one of `addon.motion.KEYFRAME_MODES`. It is keyed with them.
     tolerance : float
         The largest shell error on any frame, in the scene's units.
     radius : float, optional
@@ -101,8 +101,8 @@ def reduce_keys_of(
     Refused
         Where there are no keys, or no fewer will do, or rigid motion cannot act on them. Nothing is changed then.
     """
-    if mode not in MODES:
-        raise Refused(f"{obj.name}: there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    if mode not in KEYFRAME_MODES:
+        raise Refused(f"{obj.name}: there is no mode {mode!r}; the modes are {', '.join(KEYFRAME_MODES)}")
     if not 0.0 < tolerance < math.inf:
         raise Refused(f"{obj.name}: the tolerance has to be a number above zero, not {tolerance:g}")
     refuse_tweak_mode(obj)

@@ -3,22 +3,26 @@
 No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and times keep the units they come in.
 """
 
+from .best_of import best_modes, interpolate_by_segments
 from .decimation import decimate
 from .measures import Errors, measure, rms, shell_error
-from .modes import MODES, Mode, in_betweens, interpolate
+from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate
 from .poses import Poses
 from .reduction import reduce_keys
 from .repair import Repair, repair
 
 __all__ = [
+    "KEYFRAME_MODES",
     "MODES",
     "Errors",
     "Mode",
     "Poses",
     "Repair",
+    "best_modes",
     "decimate",
     "in_betweens",
     "interpolate",
+    "interpolate_by_segments",
     "measure",
     "reduce_keys",
     "repair",

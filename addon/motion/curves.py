@@ -14,6 +14,7 @@ its advance along the axis.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -72,26 +73,54 @@ def motor_lerp(segments: Segments) -> Curves:
 def motor_spline(segments: Segments) -> Curves:
     """A screw from key to key, bent so that its twist goes on through every key.
 
+    A key has the twist of the parabola through it and its neighbours, the outermost ones that of their segment, and
+    none where the body rests before or after.
+    """
+
+    def at_keys(twists, before, after, rests):
+        inner = (after * twists[..., :-1] + before * twists[..., 1:]) / (before + after)
+        inner[:, rests[:, :-1] | rests[:, 1:]] = 0.0
+        return np.concatenate((twists[..., :1], inner, twists[..., -1:]), axis=-1)
+
+    return _bent(segments, at_keys)
+
+
+def motor_spline_causal(segments: Segments) -> Curves:
+    """The same for streams, from no key after the segment.
+
+    A key has the twist of the screw that led to it, and half of what the parabola through it and the two keys before it
+    would add to that: all of it overshoots. A rest is kept, although nothing told of it when the body arrived there.
+    """
+
+    def at_keys(twists, before, after, rests):
+        inner = twists[..., 1:] + 0.5 * after / (before + after) * (twists[..., 1:] - twists[..., :-1])
+        inner[:, rests[:, 1:]] = 0.0
+        return np.concatenate((twists[..., :1], twists[..., :1], inner), axis=-1)
+
+    return _bent(segments, at_keys)
+
+
+def _bent(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
+    """A screw from key to key, bent so that the body has certain twists at the keys.
+
     Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
 
         M exp(u r) exp(u (1 - u)^2 (w - r) - u^2 (1 - u) (w' - r))
 
     Each factor is a function of twists in the body's own axes, so that neither the axes of the world nor those of the
-    body matter; run backwards, it is the same motion. A key has the twist of the parabola through it and its
-    neighbours, the outermost ones that of their segment, and none where the body rests before or after.
+    body matter. Where twists at keys do not tell before from after, it is the same motion backwards.
+
+    `at_keys` makes the twists at the n + 1 keys (7, objects, n + 1) from those of the screws of n segments, from how
+    long the segments but the last and those but the first take, and from where the body rests (objects, n).
     """
     count = segments.keys.shape[-1] - 1
     screws = segments.screws.reshape(7, -1, count)
     duration = (2.0 / segments.rate).reshape(-1, count)
     rests = segments.is_still.reshape(-1, count)
-    twists = screws / duration
-    at_keys = np.empty((*screws.shape[:2], count + 1))
-    at_keys[..., 0], at_keys[..., -1] = twists[..., 0], twists[..., -1]
-    before, after = duration[:, :-1], duration[:, 1:]
-    at_keys[..., 1:-1] = (after * twists[..., :-1] + before * twists[..., 1:]) / (before + after)
-    at_keys[..., 1:-1][:, rests[:, :-1] | rests[:, 1:]] = 0.0
-    bends = np.stack((at_keys[..., :-1] * duration - screws, at_keys[..., 1:] * duration - screws), axis=1)
-    return replace(screw(segments), bends=bends.reshape(7, 2, -1))
+    twists = at_keys(screws / duration, duration[:, :-1], duration[:, 1:], rests)
+    ends = np.stack((twists[..., :-1], twists[..., 1:]), axis=1) * duration - screws[:, None]
+    ends[..., rests] = 0.0
+    return replace(screw(segments), bends=ends.reshape(7, 2, -1))
 
 
 def similarity_slerp(segments: Segments) -> Curves:

@@ -36,6 +36,9 @@ class Mode:
     ahead: int = 0
     """How many keys after a segment have a say in it: a stream has to wait for them."""
 
+    for_streams: bool = False
+    """Whether it does without what better modes know of the keys to come. Among keyframes it has no place."""
+
     @property
     def is_smooth(self) -> bool:
         """Whether it leaves a segment as it arrived from the one before, and needs the keys around for it."""
@@ -87,7 +90,18 @@ MODES: dict[str, Mode] = {
         behind=1,
         ahead=1,
     ),
+    "motor_spline_causal": Mode(
+        "Smooth Screw for Streams",
+        "Screws that flow into one another as far as that can be without knowing what comes after the next key",
+        curves.motor_spline_causal,
+        pga.pga_slerp,
+        behind=2,
+        for_streams=True,
+    ),
 }
+
+KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if not mode.for_streams}
+"""The modes for keys that are all known from the beginning."""
 
 
 def interpolate(

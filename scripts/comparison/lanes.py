@@ -13,10 +13,11 @@ import numpy as np
 from mathutils import Matrix
 
 from addon.animation import bake_poses, write_channel
-from addon.motion import MODES, Poses
+from addon.motion import Poses
 
 from . import captions, layout, palette, trails
 from .materials import ink, surface
+from .modes import label_of
 from .nodes import apply_group
 from .subject import shrink, tinted_slots, vertices_of
 from .timeline import ShownMotion, Timeline
@@ -212,11 +213,6 @@ class Lanes:
 
     def _put(self, obj: bpy.types.Object, x: float, y: float, lift: int = 2) -> None:
         captions.put(obj, self.frame, self.collection, x, y, lift)
-
-
-def label_of(mode: str) -> str:
-    """What a mode is called on the stage."""
-    return MODES[mode].label if mode in MODES else mode
 
 
 def _paint(obj: bpy.types.Object, slots: list[int] | range, material: bpy.types.Material) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,10 +19,14 @@ from addon.motion import Poses
 from addon.motion.measures import rms
 
 from .files import write_text
+from .modes import BEST_OF
 from .reconstructions import Reconstruction
 
 BYTES_PER_KEY = 7 * 8
 """A position and a quaternion, as doubles: what the paper sends for an update."""
+
+BYTES_PER_MODE = 1
+"""What a key has in addition where every segment has a mode of its own."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
 
     Notes
     -----
-    `bytes_per_s` is (keys - 1) / duration times 56 bytes. A recording that is thinned to 10 keys a second keeps fewer
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes, and one more for the mode under `best_of`. A recording that is thinned to 10 keys a second keeps fewer
     where it has gaps or is slow itself, and it is what would be sent that counts. The first key is not counted, since
     a stretch of the motion costs the key at its end: keys exactly a tenth of a second apart are 560 bytes a second for
     any length of the clip.
@@ -96,7 +100,7 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
                 keys=keys,
                 samples=len(times),
                 duration_s=duration,
-                bytes_per_s=(keys - 1) / duration * BYTES_PER_KEY,
+                bytes_per_s=(keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
                 rms_shell_m=rms(errors.shell),
                 p95_shell_m=float(np.percentile(errors.shell, 95.0)),
                 max_shell_m=float(np.max(errors.shell)),
@@ -120,7 +124,7 @@ def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
     write_text(path, table.getvalue())
 
 
-def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
+def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
     """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
 
     Parameters
@@ -128,6 +132,8 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
     path : Path
     times : array, shape (n,)
     poses : Poses, shape (n,)
+    modes : sequence of str, n - 1 of them, optional
+        Of the segments that the poses begin, for a last column, `mode`. The last pose begins none.
     """
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
@@ -135,19 +141,26 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses) -> None:
         columns.append(poses.scales)
         header += ",s"
     lines = [",".join(map(repr, row)) for row in np.stack(columns, axis=-1).tolist()]
+    if modes:
+        header += ",mode"
+        lines = [f"{line},{mode}" for line, mode in zip(lines, (*modes, ""), strict=True)]
     write_text(path, "\n".join([header, *lines, ""]))
 
 
 def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:
     """Write a `MODE.csv` for every mode into `folder`, and the keys.
 
-    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each.
+    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
+    of `best_of` are in a table of their own in any case, with the mode of each segment.
     """
     clip = reconstruction.clip
     for mode, poses in reconstruction.poses.items():
         write_poses(folder / f"{mode}.csv", reconstruction.times, poses)
-    tables = {f"{mode}.keys.csv": keys for mode, keys in reconstruction.keys.items()}
+    tables = {f"{mode}.keys.csv": keys for mode, keys in reconstruction.keys.items() if mode != BEST_OF}
     if reconstruction.choice.decimation == "uniform":
         tables = {"keys.csv": next(iter(tables.values()))}
     for name, keys in tables.items():
         write_poses(folder / name, clip.times[keys], clip.poses[keys])
+    if BEST_OF in reconstruction.keys:
+        keys, modes = reconstruction.keys[BEST_OF], reconstruction.segment_modes
+        write_poses(folder / f"{BEST_OF}.keys.csv", clip.times[keys], clip.poses[keys], modes)

@@ -17,10 +17,12 @@ MODE_COLOURS: dict[str, str] = {
     "cga_lerp": "#CC79A7",
     "cga_slerp": "#4C72E0",
     "motor_spline": "#88BB66",
+    "motor_spline_causal": "#F0E442",
+    "best_of": "#963CFF",
 }
 """Mode id to colour."""
 
-OTHER_COLOURS = ("#F0E442", "#B3B3B3", "#A98467", "#B7E4C7")
+OTHER_COLOURS = ("#B3B3B3", "#A98467", "#B7E4C7")
 """For modes that have no colour of their own yet."""
 
 BACKGROUND = "#14171C"

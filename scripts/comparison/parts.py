@@ -6,16 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from addon.motion import MODES
-
 from .charts import Curve
 from .markup import Content, Markup, element
+from .modes import label_of as label
 from .palette import colour_of
-
-
-def label(mode: str) -> str:
-    """What a mode is called."""
-    return MODES[mode].label
 
 
 def curve(group: Sequence[str], x: np.ndarray, y: np.ndarray) -> Curve:

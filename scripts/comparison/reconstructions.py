@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from addon.motion import Errors, Poses, shell_error
+from addon.motion import Errors, Poses, interpolate, interpolate_by_segments, shell_error
 
 from .choices import Choice
 from .clips import Clip
+from .modes import BEST_OF
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,9 @@ class Reconstruction:
     errors: dict[str, Errors]
     """Mode id to the errors against the clip at `times`."""
 
+    segment_modes: tuple[str, ...] = ()
+    """The mode of each segment under `best_of`, k - 1 of them; none where the run does without."""
+
     @property
     def samples(self) -> slice:
         """The samples of the clip between the first and the last key, both included."""
@@ -47,6 +51,13 @@ class Reconstruction:
     def times(self) -> np.ndarray:
         """The times of `samples`."""
         return self.clip.times[self.samples]
+
+    def filled_in(self, mode: str, times: np.ndarray) -> Poses:
+        """What a mode makes of its keys at any times."""
+        key_times, keys = self.clip.times[self.keys[mode]], self.clip.poses[self.keys[mode]]
+        if mode == BEST_OF:
+            return interpolate_by_segments(key_times, keys, times, self.segment_modes)
+        return interpolate(key_times, keys, times, mode)
 
 
 def identical_modes(reconstructions: Sequence[Reconstruction]) -> tuple[tuple[str, ...], ...]:

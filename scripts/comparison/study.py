@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from addon.motion import interpolate, measure, repair
+from addon.motion import best_modes, interpolate, interpolate_by_segments, measure, repair, rms
 from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
 
 from .choices import Choice, Uniform
 from .clips import Clip
+from .modes import BEST_OF, single_modes
 from .reconstructions import Reconstruction, identical_modes
 
 LONGEST_NAME = 80
@@ -85,14 +87,15 @@ def folder_name(wanted: str, taken: Iterable[str]) -> str:
     return safe
 
 
-def reconstruct(clip: Clip, choice: Choice, modes: Iterable[str], radius: float) -> Reconstruction | None:
+def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float) -> Reconstruction | None:
     """Choose keys of the clip for every mode, and fill in between them.
 
     Parameters
     ----------
     clip : Clip
     choice : Choice
-    modes : iterable of str
+    modes : sequence of str
+        Of `addon.motion.MODES`, and `BEST_OF` of them.
     radius : float
         Of the shell, in metres.
 
@@ -106,14 +109,35 @@ def reconstruct(clip: Clip, choice: Choice, modes: Iterable[str], radius: float)
     Modes that are one motion get one choice of keys, made for the first of them: choosing by the motion takes time,
     and rounding must not make them look different.
     """
-    modes = tuple(modes)
+    with_best, modes = BEST_OF in modes, single_modes(modes)
     groups = [modes] if choice.decimation == "uniform" else same_motions(clip, modes, radius)
     keys: dict[str, np.ndarray] = {}
     for group in groups:
         keys |= dict.fromkeys(group, choice.keys(clip, group[0], radius))
     if min(map(len, keys.values())) < 2:
         return None
-    return fill_in(clip, choice, {mode: keys[mode] for mode in modes}, radius)
+    made = fill_in(clip, choice, {mode: keys[mode] for mode in modes}, radius)
+    return with_best_of(made, radius) if with_best else made
+
+
+def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
+    """The same with `BEST_OF` its modes, which has the keys of the best of them: the fewest, then the least error."""
+    clip, modes = made.clip, tuple(made.keys)
+    kept = made.keys[min(modes, key=lambda mode: (len(made.keys[mode]), rms(made.errors[mode].shell)))]
+    tolerance = made.choice.tolerance(clip)
+    unit = clip.metres_per_unit
+    chosen = best_modes(
+        clip.times, clip.poses, kept, modes, radius / unit, None if tolerance is None else tolerance / unit
+    )
+    poses = interpolate_by_segments(clip.times[kept], clip.poses[kept], made.times, chosen)
+    errors = measure(made.times, clip.in_metres(poses), clip.in_metres(clip.poses[made.samples]), radius)
+    return replace(
+        made,
+        keys=made.keys | {BEST_OF: kept},
+        poses=made.poses | {BEST_OF: poses},
+        errors=made.errors | {BEST_OF: errors},
+        segment_modes=chosen,
+    )
 
 
 def fill_in(clip: Clip, choice: Choice, keys: dict[str, np.ndarray], radius: float) -> Reconstruction:

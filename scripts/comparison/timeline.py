@@ -102,7 +102,7 @@ class ShownMotion:
         return cls(
             recording=_around(centre, recording),
             modes={
-                mode: _around(centre, shown(interpolate(key_times[mode], keys[mode], times, mode))) for mode in kept
+                mode: _around(centre, shown(reconstruction.filled_in(mode, times))) for mode in kept
             },
             keys={mode: _around(centre, shown(poses)) for mode, poses in keys.items()},
             key_frames={mode: timeline.frames_of(moments) for mode, moments in key_times.items()},

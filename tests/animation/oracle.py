@@ -16,11 +16,11 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Euler, Quaternion
 
-from addon.motion import MODES, Poses, in_betweens, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate
 from addon.motion.quaternions import multiply, normalise
 
-MODE_IDS = ("BLENDER", *MODES)
-SMOOTH = {name for name, mode in MODES.items() if mode.is_smooth}
+MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
+SMOOTH = {name for name, mode in KEYFRAME_MODES.items() if mode.is_smooth}
 WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 KEY_FIELDS = (
     *("interpolation", "easing", "back", "amplitude", "period", "type"),

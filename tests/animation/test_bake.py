@@ -8,7 +8,7 @@ import pytest
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from addon.animation import bake, bake_poses, read_poses, set_mode, write_channel
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from addon.motion.eulers import ORDERS
 from addon.motion.quaternions import angle_between, multiply, rotate
 from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds
@@ -56,7 +56,7 @@ def assert_read_back(obj: bpy.types.Object, frames: np.ndarray, poses: Poses) ->
         assert np.abs(read.scales / poses.scales - 1.0).max() < 1e-5
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 @pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
 def test_every_mode_arrives_in_the_evaluated_scene_on_every_frame(empty, mode, scaled):
     random = np.random.default_rng(3)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from addon.animation import problem_of, refresh, set_mode, write_channel
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, curves_of, key_frames, rotation_path, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas, random_values
 
@@ -49,7 +49,7 @@ def test_every_kind_of_object_moves(live_file, kind):
     assert_shown([obj], PLAYED)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 @pytest.mark.parametrize("order", ["QUATERNION", "ZYX"])
 def test_keys_off_whole_frames_are_gone_through_on_the_frames_between(live_file, mode, order):
     obj = key(new_object("Tool", order), (0.37, 9.5, 9.9, 10.2, 30.75), scale="even")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from addon.animation import set_mode, write_channel
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.oracle import (
     curves_of,
     expected_bases,
@@ -110,7 +110,12 @@ def test_cycles_repeat_the_rigid_motion_on_both_sides(live_file, before, after, 
 
 @pytest.mark.parametrize(
     ("mode", "kind"),
-    [(mode, kind) for mode in MODES for kind in CYCLES[1:3] if kind == "REPEAT" or not MODES[mode].is_smooth],
+    [
+        (mode, kind)
+        for mode in KEYFRAME_MODES
+        for kind in CYCLES[1:3]
+        if kind == "REPEAT" or not KEYFRAME_MODES[mode].is_smooth
+    ],
 )
 @pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
 def test_cycles_repeat_every_mode_with_the_easing_of_its_keys(live_file, mode, kind, order):

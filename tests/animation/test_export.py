@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from addon.animation import refresh, set_mode
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, expected_worlds, matrices, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 
@@ -94,7 +94,7 @@ def assert_near(found: np.ndarray, wanted: np.ndarray) -> None:
 def test_a_sampled_gltf_file_has_every_mode_on_every_frame(exporter, tmp_path, animation_mode):
     parent = key(new_object("Arm", "YXZ"), seed=77)
     objects, owns = [], {}
-    for seed, mode in enumerate(MODES):
+    for seed, mode in enumerate(KEYFRAME_MODES):
         for order in ("QUATERNION", "ZXY"):
             obj = new_object(f"{mode} {order}", order)
             if seed % 2:

@@ -8,7 +8,7 @@ import pytest
 
 from addon import animation
 from addon.animation import MODE_IDS, Refused, key_frames, modes_of, problem_of, read_poses, set_mode
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from addon.motion.eulers import ORDERS
 from addon.motion.quaternions import angle_between, multiply, rotate
 
@@ -73,7 +73,7 @@ def assert_fresh(obj, mode: str, frames: np.ndarray = FRAMES) -> None:
     assert_same(read_poses(obj, frames), interpolate(at, read_poses(obj, at), frames, mode))
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", *ORDERS])
 def test_every_mode_and_rotation_order_arrives_on_every_frame(scene, mode, rotation_mode):
     obj = keyed(rotation_mode=rotation_mode)

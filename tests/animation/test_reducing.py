@@ -27,7 +27,7 @@ from addon.animation import (
     unbake,
     write_channel,
 )
-from addon.motion import MODES, Poses, interpolate, repair, shell_error
+from addon.motion import KEYFRAME_MODES, Poses, interpolate, repair, shell_error
 from scripts.trajectories import read_trajectories
 from tests.animation.oracle import curves_of, rotation_path, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
@@ -75,7 +75,7 @@ def test_few_keys_show_the_recording_within_the_tolerance_on_every_frame(live_fi
     assert reduction.after < 0.5 * reduction.before
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_every_mode_gets_the_keys_that_it_needs(live_file, mode):
     obj = recorded()
     frames = key_frames(obj)

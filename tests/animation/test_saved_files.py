@@ -16,7 +16,7 @@ import pytest
 
 from addon import animation
 from addon.animation import is_baked, modes_of, refresh, set_enabled, set_mode
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES
 from tests.animation.oracle import Own, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 
@@ -83,7 +83,7 @@ def every_mode_and_kind() -> tuple[list[bpy.types.Object], dict[str, Own]]:
     """An object for each mode, rotation order and kind of trouble, and the delta transforms of their own."""
     objects, owns = [], {}
     parent = key(new_object("Arm", "XYZ"), (1.0, 30.0), seed=99)
-    for seed, (mode, order) in enumerate((mode, order) for mode in MODES for order in ORDERS):
+    for seed, (mode, order) in enumerate((mode, order) for mode in KEYFRAME_MODES for order in ORDERS):
         obj = new_object(f"{mode} {order}", order)
         scale = (None, "even", "uneven")[seed % 3]
         if seed % 2:

@@ -17,7 +17,7 @@ import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
 from scipy.spatial.transform import Rotation
 
-from addon.motion import MODES, Poses, decimate, interpolate, shell_error
+from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
 from scripts.comparison.study import folder_name
 from tests.recordings import RECORDINGS
@@ -99,7 +99,7 @@ def test_there_is_a_row_for_every_clip_rate_and_mode(measured):
     assert (measured / "metrics.csv").read_text().splitlines()[0] == COLUMNS
     rows = rows_of(measured / "metrics.csv")
     clips = [path.stem for path in sorted((ROOT / "assets").glob("*.csv"))]
-    wanted = {(clip, rate, mode) for clip in clips for rate in ("5", "7.5", "20") for mode in MODES}
+    wanted = {(clip, rate, mode) for clip in clips for rate in ("5", "7.5", "20") for mode in KEYFRAME_MODES}
     assert {(row["clip"], row["rate_hz"], row["mode"]) for row in rows} == wanted
     assert len(rows) == len(wanted)
 
@@ -137,7 +137,7 @@ def test_adaptive_keys_are_samples_that_keep_each_mode_within_the_tolerance(adap
     recording = table(short_clip)
     rows = [row for row in rows_of(adaptive / "metrics.csv") if row["decimation"] == "adaptive"]
     assert {(row["mode"], row["tolerance_m"]) for row in rows} == {
-        (mode, m) for mode in MODES for m in ("0.005", "0.02")
+        (mode, m) for mode in KEYFRAME_MODES for m in ("0.005", "0.02")
     }
     for row in rows:
         folder = adaptive / "toss" / {"0.005": "tolerance-5mm", "0.02": "tolerance-0.02"}[row["tolerance_m"]]
@@ -161,7 +161,7 @@ def test_rates_beside_adaptive_keys_are_kept_evenly(adaptive):
     evenly = [row for row in rows_of(adaptive / "metrics.csv") if row["decimation"] == "uniform"]
     assert {(row["rate_hz"], row["tolerance_m"], row["keys"]) for row in evenly} == {("10", "", "11")}
     assert sorted(path.name for path in (adaptive / "toss" / "10").iterdir()) == sorted(
-        f"{name}.csv" for name in ("keys", *MODES)
+        f"{name}.csv" for name in ("keys", *KEYFRAME_MODES)
     )
 
 
@@ -221,7 +221,7 @@ def test_screws_are_pytransform3ds_between_the_written_keys(measured):
 def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_clip, tmp_path, capsys):
     assert run(short_clip, "--output", tmp_path, "--rates", "10", *SMALL) == 0
     written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
-    tables = {f"toss/10/{name}.csv" for name in ("keys", *MODES)}
+    tables = {f"toss/10/{name}.csv" for name in ("keys", *KEYFRAME_MODES)}
     assert written == tables | {"metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend"}
     assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
 

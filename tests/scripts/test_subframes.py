@@ -8,7 +8,7 @@ import pytest
 from addon import animation
 from addon.animation.inbetweens import in_betweens
 from addon.animation.mode_keys import source_of
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES
 from scripts import subframes
 from scripts.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
 
@@ -31,7 +31,7 @@ def live(motion, mode="dq_sclerp", rotation_mode="QUATERNION", fractions=QUARTER
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_a_brisk_motion_is_within_two_millimetres_between_frames_and_exact_on_them(live_file, mode, rotation_mode):
     found = live(BRISK, mode, rotation_mode)
     assert 1e-4 < found.largest < 2e-3
@@ -57,4 +57,6 @@ def test_the_page_has_a_row_for_every_mode_and_motion(empty_file, tmp_path, monk
     assert subframes.main(["--output", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert text.startswith("# Between whole frames")
-    assert [text.count(f"| `{mode}` |") for mode in MODES] == [2 * len(subframes.MOTIONS)] * len(MODES)
+    assert [text.count(f"| `{mode}` |") for mode in KEYFRAME_MODES] == [2 * len(subframes.MOTIONS)] * len(
+        KEYFRAME_MODES
+    )

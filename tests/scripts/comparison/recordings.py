@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.motion import MODES, Poses, decimate, interpolate, measure
+from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure
 from scripts.comparison.choices import Uniform
 from scripts.comparison.clips import Clip
 from scripts.comparison.reconstructions import Reconstruction
@@ -23,7 +23,7 @@ def swinging_clip(
     return Clip(name, f"{name}.csv", "blender", times, poses, repairs)
 
 
-def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(MODES)) -> Reconstruction:
+def reconstruct(clip: Clip, rate: str = "10", modes: tuple[str, ...] = tuple(KEYFRAME_MODES)) -> Reconstruction:
     """The clip thinned to `rate`, filled in again by the real modes and measured."""
     keys = decimate(clip.times, float(rate))
     samples = slice(int(keys[0]), int(keys[-1]) + 1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.clips import Clip
 from scripts.comparison.study import reconstruct
@@ -23,7 +23,7 @@ def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -
     return np.linalg.norm(ends[0] - ends[1], axis=1).max(axis=1)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 @pytest.mark.parametrize("written", ["2mm", "0.5cm", "0.03m", "0.01"])
 def test_adaptive_keys_keep_to_the_tolerance(written: str, mode: str) -> None:
     clip = swinging_clip(seconds=1.5)
@@ -67,13 +67,13 @@ def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(
 
 @pytest.mark.parametrize("choice", [Uniform("0.2"), Budget("0.2")])
 def test_a_clip_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
-    assert reconstruct(swinging_clip(), choice, MODES, 0.1) is None
+    assert reconstruct(swinging_clip(), choice, KEYFRAME_MODES, 0.1) is None
 
 
 def test_a_reconstruction_keeps_the_keys_of_each_mode_apart_but_those_of_one_motion_together() -> None:
     clip = swinging_clip()
-    made = reconstruct(clip, Tolerance("5mm"), MODES, 0.1)
-    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == tuple(MODES)
+    made = reconstruct(clip, Tolerance("5mm"), KEYFRAME_MODES, 0.1)
+    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == tuple(KEYFRAME_MODES)
     assert np.array_equal(made.keys["dq_sclerp"], made.keys["cga_slerp"])
     assert len(made.keys["motor_spline"]) < len(made.keys["dq_sclerp"])
     for mode, keys in made.keys.items():
@@ -84,7 +84,7 @@ def test_a_reconstruction_keeps_the_keys_of_each_mode_apart_but_those_of_one_mot
 def test_recordings_of_a_few_samples_have_adaptive_keys_too(samples: int) -> None:
     clip = swinging_clip()
     few = replace(clip, times=clip.times[::20][:samples], poses=clip.poses[::20][:samples])
-    made = reconstruct(few, Tolerance("1mm"), MODES, 0.1)
+    made = reconstruct(few, Tolerance("1mm"), KEYFRAME_MODES, 0.1)
     assert max(errors.shell.max() for errors in made.errors.values()) <= 1e-3
 
 

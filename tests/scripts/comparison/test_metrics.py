@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Errors, Poses
+from addon.motion import KEYFRAME_MODES, Errors, Poses
 from scripts.comparison.choices import Budget, Tolerance, Uniform
 from scripts.comparison.clips import Clip
 from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_poses, write_reconstruction
@@ -31,7 +31,7 @@ def test_the_columns_of_metrics_csv_are_those_promised_and_every_mode_has_its_ro
     write_metrics(tmp_path / "metrics.csv", measure_reconstruction(reconstruct(swinging_clip(), "7.5")))
     assert (tmp_path / "metrics.csv").read_text().splitlines()[0] == COLUMNS
     assert [(row["clip"], row["mode"], row["rate_hz"]) for row in read(tmp_path / "metrics.csv")] == [
-        ("swing", mode, "7.5") for mode in MODES
+        ("swing", mode, "7.5") for mode in KEYFRAME_MODES
     ]
 
 
@@ -70,7 +70,7 @@ def test_bytes_are_counted_for_the_keys_that_were_there_and_not_for_the_rate_tha
 
 
 def test_a_single_key_is_refused_with_the_clip_and_the_rate() -> None:
-    single = replace(reconstruct(swinging_clip(), "10"), keys=dict.fromkeys(MODES, np.array([0])))
+    single = replace(reconstruct(swinging_clip(), "10"), keys=dict.fromkeys(KEYFRAME_MODES, np.array([0])))
     with pytest.raises(ValueError, match="swing at 10 keys/s: 1 key has no in-betweens"):
         measure_reconstruction(single)
 
@@ -112,7 +112,7 @@ def test_scales_are_a_last_column_where_poses_have_them(tmp_path: Path) -> None:
 def test_a_reconstruction_becomes_its_keys_and_a_table_for_every_mode(tmp_path: Path) -> None:
     reconstruction = reconstruct(swinging_clip(), "10")
     write_reconstruction(tmp_path, reconstruction)
-    assert {file.name for file in tmp_path.iterdir()} == {"keys.csv", *(f"{mode}.csv" for mode in MODES)}
+    assert {file.name for file in tmp_path.iterdir()} == {"keys.csv", *(f"{mode}.csv" for mode in KEYFRAME_MODES)}
     keys, filled = read(tmp_path / "keys.csv"), read(tmp_path / "pga_lerp.csv")
     assert [float(row["t"]) for row in keys] == reconstruction.clip.times[reconstruction.keys["pga_lerp"]].tolist()
     assert [float(row["qx"]) for row in filled] == reconstruction.poses["pga_lerp"].quaternions[:, 1].tolist()
@@ -121,7 +121,7 @@ def test_a_reconstruction_becomes_its_keys_and_a_table_for_every_mode(tmp_path: 
 
 def test_adaptive_keys_are_told_with_how_they_were_chosen(tmp_path: Path) -> None:
     clip = replace(swinging_clip(), metres_per_unit=0.1)
-    made = choose(clip, Tolerance("3mm"), MODES, 0.1)
+    made = choose(clip, Tolerance("3mm"), KEYFRAME_MODES, 0.1)
     write_metrics(tmp_path / "metrics.csv", measure_reconstruction(made))
     for row in read(tmp_path / "metrics.csv"):
         assert (row["rate_hz"], row["decimation"], float(row["tolerance_m"])) == ("", "adaptive", 0.003)
@@ -129,7 +129,7 @@ def test_adaptive_keys_are_told_with_how_they_were_chosen(tmp_path: Path) -> Non
         assert float(row["keys_per_s"]) == pytest.approx((int(row["keys"]) - 1) / 3.0)
         assert float(row["bytes_per_s"]) == pytest.approx(56.0 * float(row["keys_per_s"]))
         assert float(row["max_shell_m"]) <= 0.003 * (1.0 + 1e-9)
-    (row, *_) = measure_reconstruction(choose(clip, Budget("7.5"), MODES, 0.1))
+    (row, *_) = measure_reconstruction(choose(clip, Budget("7.5"), KEYFRAME_MODES, 0.1))
     assert (row.rate_hz, row.decimation, row.tolerance_m) == ("7.5", "adaptive", None)
 
 

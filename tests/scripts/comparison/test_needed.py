@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Poses, decimate, reduce_keys
+from addon.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
 from scripts.comparison.clips import Clip
 from scripts.comparison.needed import (
     RATES,
@@ -39,7 +39,7 @@ def swing() -> Clip:
 
 @pytest.fixture(scope="module")
 def found(swing: Clip) -> KeysNeeded:
-    return keys_needed(swing, MODES, 0.1)
+    return keys_needed(swing, KEYFRAME_MODES, 0.1)
 
 
 def test_the_rates_are_those_of_the_papers_table_and_some_below() -> None:
@@ -99,7 +99,7 @@ def test_without_the_reference_among_the_modes_it_is_still_what_is_reached(swing
 
 def test_the_unit_of_a_recording_makes_no_difference(swing: Clip, found: KeysNeeded) -> None:
     poses = Poses(swing.poses.positions * 1e2, swing.poses.quaternions)
-    other = keys_needed(replace(swing, poses=poses, metres_per_unit=1e-2), MODES, 0.1)
+    other = keys_needed(replace(swing, poses=poses, metres_per_unit=1e-2), KEYFRAME_MODES, 0.1)
     np.testing.assert_allclose(other.targets, found.targets, rtol=1e-9)
     assert np.array_equal(other.keys, found.keys)
 
@@ -176,7 +176,7 @@ def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(tmp
     write_keys_needed(tmp_path / "keys_needed.csv", [found, never])
     with (tmp_path / "keys_needed.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
-    assert len(rows) == len(MODES) * 2 * len(RATES) + 6
+    assert len(rows) == len(KEYFRAME_MODES) * 2 * len(RATES) + 6
     for row in rows[:-6]:
         group = next(place for place, modes in enumerate(GROUPS) if row["mode"] in modes)
         at = group, ("uniform", "adaptive").index(row["decimation"]), RATES.index(row["as_good_as_hz"])

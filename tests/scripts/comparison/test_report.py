@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import MODES
+from addon.motion import KEYFRAME_MODES
 from scripts.comparison.charts import GRID_X, GRID_Y
 from scripts.comparison.choices import Tolerance, Uniform
 from scripts.comparison.metrics import measure_reconstruction
@@ -97,7 +97,7 @@ def test_every_clip_rate_and_mode_has_its_place(page: Page) -> None:
     headings = [text for _, text in page.find("h2")]
     assert headings == ["Summary", "Modes and measures", "reach", "throw", "This run"]
     assert [text for _, text in page.find("h3") if "keys/s" in text] == ["5 keys/s", "7.5 keys/s", "20 keys/s"] * 2
-    for mode in MODES.values():
+    for mode in KEYFRAME_MODES.values():
         assert mode.description in html.unescape(page.source)
         assert sum(text == mode.label for _, text in page.find("th", scope="row")) == 7
 
@@ -109,13 +109,13 @@ def test_ids_are_unique_and_every_link_within_the_page_leads_somewhere(page: Pag
 
 def test_the_numbers_in_the_tables_are_those_of_the_metrics(page: Page, runs: list[Reconstruction]) -> None:
     shown = [float(own["data-value"]) for own, _ in page.find("td")]
-    summary = 3 * len(MODES)
+    summary = 3 * len(KEYFRAME_MODES)
     rows = [row for run in runs for row in measure_reconstruction(run)]
     assert shown[summary:] == [getattr(row, column.metric) for row in rows for column in COLUMNS]
 
 
 def test_the_numbers_that_are_read_are_those_that_are_sorted_by_to_three_digits(page: Page) -> None:
-    cells = list(page.find("td"))[3 * len(MODES) :]
+    cells = list(page.find("td"))[3 * len(KEYFRAME_MODES) :]
     for place, (own, text) in enumerate(cells):
         value = float(own["data-value"]) * COLUMNS[place % len(COLUMNS)].factor
         assert float(text.removesuffix(" best")) == pytest.approx(value, rel=0.006)
@@ -125,7 +125,7 @@ def test_the_best_of_each_column_is_marked_and_all_of_them_where_modes_are_ident
     tmp_path: Path, runs: list[Reconstruction]
 ) -> None:
     page = report(tmp_path, runs[:1])
-    cells = list(page.find("td"))[len(MODES) :]
+    cells = list(page.find("td"))[len(KEYFRAME_MODES) :]
     for column in range(len(COLUMNS)):
         values = [float(own["data-value"]) for own, _ in cells[column :: len(COLUMNS)]]
         marked = [own.get("class") == "best" for own, _ in cells[column :: len(COLUMNS)]]
@@ -133,7 +133,7 @@ def test_the_best_of_each_column_is_marked_and_all_of_them_where_modes_are_ident
 
 
 def test_the_relative_errors_are_geometric_means_over_the_clips(page: Page, runs: list[Reconstruction]) -> None:
-    cells = [float(own["data-value"]) for own, _ in page.find("td")][: 3 * len(MODES)]
+    cells = [float(own["data-value"]) for own, _ in page.find("td")][: 3 * len(KEYFRAME_MODES)]
     shell = np.array([[row.rms_shell_m for row in measure_reconstruction(run)] for run in runs]).reshape(2, 3, -1)
     expected = np.exp(np.log(shell / shell[..., :1]).mean(axis=0)).T
     np.testing.assert_allclose(np.reshape(cells, (-1, 3)), expected, rtol=1e-9)
@@ -141,11 +141,11 @@ def test_the_relative_errors_are_geometric_means_over_the_clips(page: Page, runs
 
 def test_identical_modes_share_a_line_and_the_line_bears_all_their_names(page: Page) -> None:
     titles = [text for _, text in page.find("title")]
-    joint = " = ".join(MODES[mode].label for mode in ("dq_sclerp", "pga_slerp", "cga_slerp"))
+    joint = " = ".join(KEYFRAME_MODES[mode].label for mode in ("dq_sclerp", "pga_slerp", "cga_slerp"))
     curves = list(page.find("path", class_="curve"))
     assert joint in titles
     assert len(curves) % 4 == 0
-    assert MODES["pga_slerp"].label not in titles
+    assert KEYFRAME_MODES["pga_slerp"].label not in titles
 
 
 def test_repairs_are_listed_and_their_absence_is_stated(page: Page) -> None:
@@ -260,8 +260,8 @@ def adaptive(runs: list[Reconstruction], tmp_path_factory: pytest.TempPathFactor
     """The report of a run with evenly spaced and adaptive keys."""
     clips = [runs[0].clip, runs[3].clip]
     choices = (Uniform("10"), Tolerance("5mm"), Tolerance("2cm"))
-    made = [choose(clip, choice, MODES, 0.1) for clip in clips for choice in choices]
-    needed = [keys_needed(clip, MODES, 0.1) for clip in clips]
+    made = [choose(clip, choice, KEYFRAME_MODES, 0.1) for clip in clips for choice in choices]
+    needed = [keys_needed(clip, KEYFRAME_MODES, 0.1) for clip in clips]
     path = tmp_path_factory.mktemp("adaptive") / "report.html"
     write_report(path, made, films={}, settings=SETTINGS, needed=needed)
     return Page(path), needed
@@ -286,7 +286,7 @@ def test_the_table_of_keys_has_a_number_and_a_share_for_every_motion(adaptive: t
     for clip in needed:
         rows = table_of(page, f"{clip.clip}: keys needed to be as good as Vector + Quaternion")
         assert [(row[0], row[1]) for row in rows] == [
-            (" = ".join(MODES[mode].label for mode in group), keys)
+            (" = ".join(KEYFRAME_MODES[mode].label for mode in group), keys)
             for group in clip.groups
             for keys in ("evenly spaced", "adaptive")
         ]
@@ -319,8 +319,8 @@ def test_the_mode_that_did_with_the_fewest_keys_is_named(adaptive: tuple[Page, l
             f"{share * 100.0:.0f} %" for share in shares[needed[0].groups.index(best), decimation]
         )
         assert sentence == (
-            f"{MODES[best[0]].label} with {keys} keys was as good as Vector + Quaternion at 30, 20, 15 and 12 keys/s "
-            f"with {first}, {second}, {third} and {last} of the keys."
+            f"{KEYFRAME_MODES[best[0]].label} with {keys} keys was as good as Vector + Quaternion at 30, 20, 15 and 12 "
+            f"keys/s with {first}, {second}, {third} and {last} of the keys."
         )
 
 
@@ -357,7 +357,7 @@ def test_the_curve_of_error_over_keys_runs_through_what_was_found(adaptive: tupl
         curves = [element for element in page.elements[chart:] if element[1].get("class", "").startswith("curve")]
         for row, group in enumerate(clip.groups):
             (_, dashed, title), (_, solid, _) = curves[2 * row : 2 * row + 2]
-            assert "".join(title) == " = ".join(MODES[mode].label for mode in group) + ", evenly spaced"
+            assert "".join(title) == " = ".join(KEYFRAME_MODES[mode].label for mode in group) + ", evenly spaced"
             assert (dashed["class"], solid["class"]) == ("curve dashed", "curve")
             for drawn, x, y in (
                 (dashed, clip.reference_keys_per_s, clip.uniform_errors[row]),
@@ -374,7 +374,7 @@ def test_modes_with_keys_of_their_own_have_their_numbers_and_marks(adaptive: tup
     page, needed = adaptive
     headings = [text for _, text in page.find("h3")]
     assert headings.count("within 5 mm") == 2
-    made = choose(swinging_clip("reach", seed=1), Tolerance("5mm"), MODES, 0.1)
+    made = choose(swinging_clip("reach", seed=1), Tolerance("5mm"), KEYFRAME_MODES, 0.1)
     rows = table_of(page, "reach within 5 mm")
     assert [row[1] for row in rows] == [str(len(keys)) for keys in made.keys.values()]
     coloured = [own for _, own, _ in page.elements if own.get("class") == "marks coloured"]

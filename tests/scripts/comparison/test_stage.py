@@ -9,7 +9,7 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
 from addon.animation import channelbag_of, read_poses
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from addon.motion.quaternions import angle_between, conjugate, multiply, rotate
 from scripts.comparison import layout
 from scripts.comparison.choices import Tolerance
@@ -55,7 +55,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
     times = timeline.times_of(timeline.frames)
     centre = np.array(scene["recording_centre_m"])
-    for mode in MODES:
+    for mode in KEYFRAME_MODES:
         lane = bpy.data.objects[f"Lane {mode}"]
         turn = np.array(lane.matrix_world.to_quaternion())
         kept = reconstruction.keys[mode]
@@ -104,7 +104,7 @@ CLIPS = {
 
 
 @pytest.mark.parametrize("clip", CLIPS)
-@pytest.mark.parametrize("modes", [TWO, tuple(MODES)], ids=["two", "all"])
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
 def test_everything_that_moves_stays_within_its_own_card(clip, modes):
     scene = build_stage(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
     aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
@@ -268,7 +268,7 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
         assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s on average"
 
 
-@pytest.mark.parametrize("modes", [TWO, tuple(MODES)], ids=["two", "all"])
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
 @pytest.mark.parametrize("clip", [1.0, (0.0, 0.0, 3.0)], ids=["as recorded", "up and down"])
 def test_the_count_of_keys_does_not_run_into_the_error(modes, clip):
     build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), SETTINGS)

@@ -11,7 +11,7 @@ import pytest
 from addon.animation import MODE_IDS, set_mode
 from addon.animation.mode_keys import source_of
 from addon.animation.sources import ROWS
-from addon.motion import MODES, Poses, interpolate
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from addon.ui.overlay.cache import path_of
 from addon.ui.overlay.points import (
     AXES,
@@ -79,7 +79,7 @@ def test_blenders_path_leads_where_blender_shows_the_object(scene, order):
     assert on(path, path.native, WHOLE) == pytest.approx(shown_origins(obj, WHOLE), abs=1e-5)
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 @pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
 def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, order):
     obj = key(new_object(rotation_mode=order), scale="even")
@@ -94,7 +94,7 @@ def test_a_modes_path_shows_beforehand_where_the_object_will_be(scene, mode, ord
 def test_looking_at_a_mode_changes_nothing(scene):
     obj = key(new_object())
     digest, shown = source_of(obj).digest, shown_origins(obj, WHOLE)
-    for mode in MODES:
+    for mode in KEYFRAME_MODES:
         scene.rigid_motion_overlay.mode = mode
         assert path_of(obj, scene).wanted is not None
     assert obj.rigid_motion.mode == "BLENDER"
@@ -102,7 +102,7 @@ def test_looking_at_a_mode_changes_nothing(scene):
     assert (shown_origins(obj, WHOLE) == shown).all()
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_between_linear_keys_a_path_is_that_of_interpolate(scene, mode):
     obj = key(new_object(), interpolation="LINEAR")
     scene.rigid_motion_overlay.mode = mode
