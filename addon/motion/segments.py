@@ -15,14 +15,15 @@ A mode's fast form is a function from `Segments` to `Curves`; they are in `addon
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from . import twists
-from .piecewise import BLOCK, blocks, combine, is_dense, multiply
+from . import series, twists
+from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply
 from .poses import Poses
 from .quaternions import align_signs, cross, rotate
 from .quaternions import multiply as product
@@ -30,14 +31,11 @@ from .quaternions import multiply as product
 STILL = 1e-12
 """Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
 
-LONG = 96
-"""Samples of a segment from which on a series is worth its while, in place of a curve that takes many steps."""
+TURN = 1.5
+"""Radians that a piece of a bent curve may turn by at most, for a series to be the same but for rounding."""
 
-TERMS = 32
-"""Of a series at the most."""
-
-SETTLED = 1e-13
-"""The size of terms that a series does without, compared with its largest."""
+ROWS = 8
+"""Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -152,13 +150,18 @@ class Curves:
     bends: np.ndarray | None = None
     """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
 
+    @property
+    def block(self) -> int:
+        """How many samples to work on at once, for the processor's caches: bent curves need more room for each."""
+        return BLOCK if self.bends is None else BLOCK // 4
+
     @cached_property
     def matrices(self) -> np.ndarray:
-        """P and Q of each segment in one matrix, shape (S, 7, functions in b and c)."""
+        """P and Q of each segment in one matrix, shape (S, ROWS, functions in b and c)."""
         functions, segments = self.positions.shape[1:]
-        matrices = np.zeros((segments, 7, 2 + functions))
+        matrices = np.zeros((segments, ROWS, 2 + functions))
         matrices[:, :3, 2:] = self.positions.transpose(2, 0, 1)
-        matrices[:, 3:, :2] = self.quaternions.transpose(2, 0, 1)
+        matrices[:, 3:7, :2] = self.quaternions.transpose(2, 0, 1)
         return matrices
 
 
@@ -176,7 +179,7 @@ def interpolate_along(
         None if keys.scales is None else keys.scales.reshape(-1, keys.scales.shape[-1]),
     )
     key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
-    result = np.empty((7 if keys.scales is None else 8, len(keys), times.shape[-1]))
+    result = np.empty((ROWS, len(keys), times.shape[-1]))
     at_once = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
     for first in range(0, len(keys), at_once):
         few = slice(first, first + at_once)
@@ -197,7 +200,7 @@ def _fill(
     extrapolate: bool,
     out: np.ndarray,
 ) -> None:
-    """Fill out (7 or 8, objects, m) with positions, quaternions and, where the keys have them, scales.
+    """Fill out (ROWS, objects, m) with positions, quaternions and, where the keys have them, scales.
 
     Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
     """
@@ -214,8 +217,20 @@ def _fill(
             np.clip(s, -1.0, 1.0, out=s)
         return s
 
-    numbers = np.stack((segments.start, segments.rate))
-    _evaluate(curves(segments), numbers, bounds, position, not (outside and extrapolate), out.reshape(len(out), -1))
+    mode, within = curves(segments), not (outside and extrapolate)
+    fill, numbers = _filler(mode, within), np.stack((segments.start, segments.rate))
+    pieces = 1 if mode.bends is None else _pieces(segments, mode.bends)
+    if mode.bends is not None and within and samples.size >= DENSE * pieces * segments.start.size:
+        coefficients = _series(mode, pieces)
+        key_times = _divided(key_times, pieces)
+        bounds = _sample_bounds(key_times, times, len(keys))
+        start = np.broadcast_to(key_times[:, :-1], (len(keys), key_times.shape[-1] - 1)).ravel()
+        numbers = np.stack((start, pieces * segments.rate.repeat(pieces)))
+
+        def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+            multiply(coefficients[piece], series.powers(s), counts, out)
+
+    _evaluate(fill, mode.block, numbers, bounds, position, out.reshape(ROWS, -1))
 
 
 def interpolate_within(
@@ -228,79 +243,78 @@ def interpolate_within(
     """
     segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
     bounds = np.concatenate(((0,), np.cumsum(counts)))
-    out = np.empty((7 if keys.scales is None else 8, progress.size))
+    out = np.empty((ROWS, progress.size))
     within = progress.size == 0 or bool(progress.min() >= 0.0 and progress.max() <= 1.0)
-    _evaluate(
-        curves(segments),
-        np.empty((0, segments.start.size)),
-        bounds,
-        lambda sample: 2.0 * progress[sample] - 1.0,
-        within,
-        out,
-    )
+    mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
+    _evaluate(_filler(mode, within), mode.block, no_numbers, bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
     return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
 
 
+Fill = Callable[[slice, np.ndarray, np.ndarray, np.ndarray], None]
+"""What fills out (ROWS, n) for some of the segments at s (n,), of which the i-th has counts[i]."""
+
+
 def _evaluate(
-    mode: Curves,
+    fill: Fill,
+    block: int,
     numbers: np.ndarray,
     bounds: np.ndarray,
     position: Callable[..., np.ndarray],
-    within: bool,
     out: np.ndarray,
 ) -> None:
-    """Fill out (7 or 8, m) with what the curves of S segments are at the samples between their bounds (S + 1,).
+    """Fill out (ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
 
     `position` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
     """
     all_counts = np.diff(bounds)
-    for segment, sample in blocks(bounds, BLOCK if mode.bends is None else BLOCK // 4):
+    for segment, sample in blocks(bounds, block):
         counts = all_counts[segment]
-        s = position(sample, *np.repeat(numbers[:, segment], counts, axis=1))
-        series = None
-        if mode.bends is not None and within and s.size >= LONG * np.count_nonzero(counts):
-            series = _series(mode, segment, len(out))
-        if series is None:
-            _poses(mode, segment, s, within, counts, out[:, sample])
-        else:
-            combine(series, _chebyshev(s, series.shape[1]), counts, out[:, sample])
+        fill(segment, position(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
 
 
-def _poses(mode: Curves, segment: slice, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (7 or 8, n) with what some of the curves are at s (n,), of which the i-th has counts[i]."""
-    parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
-    basis, scales = mode.basis(s, [*parameters], within)
-    _combine(mode, segment, basis, counts, out[:7])
-    if scales is not None:
-        out[7] = scales
-    if mode.bends is not None:
-        _bend(mode.bends[..., segment], s, within, counts, out)
+def _filler(mode: Curves, within: bool) -> Fill:
+    """What a mode's curves are, worked out for every sample."""
+
+    def fill(segment: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+        parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
+        basis, scales = mode.basis(s, [*parameters], within)
+        _combine(mode, segment, basis, counts, out)
+        if scales is not None:
+            out[7] = scales
+        if mode.bends is not None:
+            _bend(mode.bends[..., segment], s, within, counts, out)
+
+    return fill
 
 
-def _series(mode: Curves, segment: slice, rows: int) -> np.ndarray | None:
-    """Some of the curves as Chebyshev series, shape (rows, terms, segments); None where they do not settle soon."""
-    segments = segment.stop - segment.start
-    angles = np.pi * (np.arange(TERMS) + 0.5) / TERMS
-    at_nodes = np.empty((rows, segments * TERMS))
-    _poses(mode, segment, np.tile(np.cos(angles), segments), True, np.full(segments, TERMS), at_nodes)
-    # The discrete cosine transform, as a matrix.
-    transform = np.cos(np.outer(np.arange(TERMS), angles)) * 2.0 / TERMS
-    transform[0] *= 0.5
-    series = at_nodes.reshape(rows, segments, TERMS) @ transform.T
-    sizes = np.abs(series).max(axis=0)
-    needed = 2 + int(np.flatnonzero((sizes > SETTLED * sizes.max(axis=1, keepdims=True)).any(axis=0)).max(initial=0))
-    return np.ascontiguousarray(series[..., :needed].transpose(0, 2, 1)) if needed < TERMS else None
+def _pieces(segments: Segments, bends: np.ndarray) -> int:
+    """How many pieces a segment needs to be cut into for power series."""
+    rates = np.concatenate((segments.screws[:, None], bends), axis=1)
+    turns = np.sqrt(np.einsum("kbs,kbs->bs", rates[:3], rates[:3])) + np.abs(rates[6])
+    return max(1, math.ceil((turns[0] + turns[1:].max(axis=0)).max() / TURN))
 
 
-def _chebyshev(s: np.ndarray, terms: int) -> np.ndarray:
-    """The first Chebyshev polynomials at s (n,), shape (terms, n)."""
-    rows = np.empty((terms, s.size))
-    rows[0], rows[1] = 1.0, s
-    twice = 2.0 * s
-    for term in range(2, terms):
-        np.multiply(twice, rows[term - 1], out=rows[term])
-        rows[term] -= rows[term - 2]
-    return rows
+def _series(mode: Curves, pieces: int) -> np.ndarray:
+    """Every segment's curve in so many pieces as power series, shape (segments * pieces, ROWS, terms)."""
+    count = mode.parameters.shape[1]
+    moments = series.moments(pieces)
+    values = np.zeros((ROWS, count * moments.size))
+    bounds = moments.size * np.arange(count + 1)
+    _evaluate(
+        _filler(mode, True),
+        mode.block,
+        np.empty((0, count)),
+        bounds,
+        lambda sample: np.resize(moments, sample.stop - sample.start),
+        values,
+    )
+    return series.fit(values)
+
+
+def _divided(key_times: np.ndarray, pieces: int) -> np.ndarray:
+    """Key times (k, n) with so many equal pieces to a segment, shape (k, (n - 1) * pieces + 1)."""
+    starts = key_times[:, :-1, None] + np.diff(key_times)[..., None] * (np.arange(pieces) / pieces)
+    return np.append(starts.reshape(len(key_times), -1), key_times[:, -1:], axis=1)
 
 
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
@@ -317,20 +331,20 @@ def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np
 
 
 def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """Fill out (7, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
+    """Fill out (ROWS, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
 
     The i-th of the segments has counts[i] samples, and at least one has any.
     """
     if not is_dense(counts):
         positions, quaternions = mode.positions[..., segment], mode.quaternions[..., segment]
         np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
-        np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:])
+        np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:7])
         return
     multiply(mode.matrices[segment], basis, counts, out)
 
 
 def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
-    """Bend poses (7 or 8, n) that run from key to key so that they leave and arrive with these twists (7, 2, S) added.
+    """Bend poses (ROWS, n) that run from key to key so that they leave and arrive with these twists (7, 2, S) added.
 
     Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there.
     """
@@ -338,12 +352,13 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
     functions = np.stack((u * left * left, -u * u * left))
     if not within:
         functions = np.where(u < 0.0, ((1.0,), (0.0,)) * u, np.where(left < 0.0, ((0.0,), (-1.0,)) * left, functions))
-    added = np.empty((len(bends) if len(out) > 7 else 6, s.size))
+    grows = bool(np.any(bends[6]))
+    added = np.empty((7 if grows else 6, s.size))
     combine(bends[: len(added)], functions, counts, added)
     turns, advances = twists.exponential(added[:6])
     out[:3] += rotate(out[3:7].T, advances.T).T
     out[3:7] = product(out[3:7].T, turns.T).T
-    if len(out) > 7:
+    if grows:
         out[7] *= np.exp(added[6])
 
 

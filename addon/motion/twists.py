@@ -13,6 +13,9 @@ import numpy as np
 
 from .quaternions import conjugate, cross, multiply, rotate
 
+SMALLEST = 1e-200
+"""Stands for the square of an angle of zero, where only ratios count."""
+
 SERIES_BELOW = 0.03
 """Below this angle power series serve, whose next terms are below 1e-16."""
 
@@ -21,24 +24,16 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The motions (n) of twists (6, n): unit quaternions (4, n) and translations (3, n)."""
     turn, advance = twists[:3], twists[3:]
     squared = np.einsum("kn,kn->n", turn, turn)
+    np.maximum(squared, SMALLEST, out=squared)
     angle = np.sqrt(squared)
     half = 0.5 * angle
-    sine, cosine = np.sin(half), np.cos(half)
-    small = angle < SERIES_BELOW
-    if small.all():
-        half_sinc = 0.5 - squared * (1.0 / 48.0 - squared / 3840.0)
-        first = 0.5 - squared * (1.0 / 24.0 - squared / 720.0)
-        second = 1.0 / 6.0 - squared * (1.0 / 120.0 - squared / 5040.0)
-    else:
-        far, far2 = np.where(small, 1.0, angle), np.where(small, 1.0, squared)
-        half_sinc = np.where(small, 0.5 - squared * (1.0 / 48.0 - squared / 3840.0), sine / far)
-        first = np.where(small, 0.5 - squared * (1.0 / 24.0 - squared / 720.0), 2.0 * sine * sine / far2)
-        second = np.where(
-            small, 1.0 / 6.0 - squared * (1.0 / 120.0 - squared / 5040.0), (far - 2.0 * sine * cosine) / (far * far2)
-        )
+    sine = np.sin(half)
     quaternions = np.empty((4, twists.shape[1]))
-    quaternions[0] = cosine
-    np.multiply(half_sinc, turn, out=quaternions[1:])
+    np.cos(half, out=quaternions[0])
+    np.multiply(sine / angle, turn, out=quaternions[1:])
+    # (1 - cos(a)) / a^2 and (a - sin(a)) / a^3. For small angles the second has few digits, of a product that is none.
+    first = 2.0 * sine * sine / squared
+    second = (angle - 2.0 * sine * quaternions[0]) / (angle * squared)
     across = cross(turn, advance)
     return quaternions, advance + first * across + second * cross(turn, across)
 

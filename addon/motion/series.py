@@ -1,0 +1,47 @@
+"""Power series that stand for a curve piece by piece, for curves of many steps that are shown at many moments.
+
+A piece is looked at in a few places; what a polynomial makes of them is the curve itself but for rounding, where the
+piece bends little. Within each piece s runs from -1 to 1. Source: Trefethen, "Approximation Theory and Approximation
+Practice", 2013, chapters 3 and 8.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial.chebyshev import cheb2poly
+
+TERMS = 14
+"""Of a series."""
+
+_ANGLES = np.pi * (np.arange(TERMS) + 0.5) / TERMS
+
+NODES = np.cos(_ANGLES)
+"""Where a piece is looked at: the zeros of Chebyshev's polynomial, shape (TERMS,)."""
+
+_CHEBYSHEV = np.cos(np.outer(np.arange(TERMS), _ANGLES)) * np.where(np.arange(TERMS) > 0, 2.0, 1.0)[:, None] / TERMS
+"""From the values at the nodes to the coefficients of Chebyshev's polynomials: the discrete cosine transform."""
+
+_POWERS = np.stack([np.pad(cheb2poly(np.eye(TERMS)[n, : n + 1]), (0, TERMS - 1 - n)) for n in range(TERMS)])
+"""Chebyshev's polynomials in powers of s, a row each."""
+
+
+def moments(pieces: int) -> np.ndarray:
+    """The nodes of so many equal pieces of -1 to 1, one piece after the other, shape (pieces * TERMS,)."""
+    return ((2.0 * np.arange(pieces)[:, None] + 1.0 + NODES) / pieces - 1.0).ravel()
+
+
+def fit(values: np.ndarray) -> np.ndarray:
+    """The coefficients (pieces, k, TERMS) of k functions with these values (k, pieces * TERMS) at the nodes."""
+    # In two steps, not by one matrix: large powers have large coefficients of nearly opposite size, and only between
+    # the two steps are those of the high polynomials small.
+    series = values.reshape(-1, TERMS) @ _CHEBYSHEV.T @ _POWERS
+    return np.ascontiguousarray(series.reshape(len(values), -1, TERMS).transpose(1, 0, 2))
+
+
+def powers(s: np.ndarray) -> np.ndarray:
+    """What `fit`'s coefficients are to be multiplied by at s (n,), shape (TERMS, n)."""
+    rows = np.empty((TERMS, s.size))
+    rows[0], rows[1] = 1.0, s
+    for power in range(2, TERMS):
+        np.multiply(rows[power // 2], rows[power - power // 2], out=rows[power])
+    return rows
