@@ -5,6 +5,7 @@ No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and 
 
 from .best_of import best_modes, interpolate_by_segments
 from .decimation import decimate
+from .fitting import fit_keys
 from .measures import Errors, measure, rms, shell_error
 from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate
 from .poses import Poses
@@ -20,6 +21,7 @@ __all__ = [
     "Repair",
     "best_modes",
     "decimate",
+    "fit_keys",
     "in_betweens",
     "interpolate",
     "interpolate_by_segments",

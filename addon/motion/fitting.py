@@ -1,0 +1,133 @@
+"""Keys that are no samples of a recording: moved by least squares to where the motion between them follows it best.
+
+A key that is a recorded pose has that sample's noise, and the in-betweens on either side of it pass through it whatever
+that costs. Let go, it takes the place that serves the samples around it. Its time stays.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import twists
+from .modes import MODES, interpolate
+from .poses import Poses
+from .quaternions import align_signs, multiply, normalise, rotate
+
+STEP = 1e-5
+"""Of differences that stand for derivatives: in radians, and as a part of the radius."""
+
+SWEEPS = 4
+"""How often every key is moved. The third time gains a hundredth."""
+
+DAMPING = 1e-9
+"""What is added to the normal equations, as a part of them: a key may have no samples of its own."""
+
+
+def fit_keys(
+    times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str = "motor_spline", radius: float = 0.1
+) -> Poses:
+    """Poses for keys at the times of some samples, such that the in-betweens are as close to the recording as can be.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Strictly rising.
+    poses : Poses, shape (n,)
+        The recording, with unit quaternions.
+    keys : array of int, shape (k,)
+        The samples whose times are those of the keys, rising, at least two.
+    mode : str
+        One of `MODES`.
+    radius : float
+        Of the shell, in the unit of the positions: how much turns count beside ways. Above zero.
+
+    Returns
+    -------
+    Poses, shape (k,)
+        The squared displacements of the shell's points, over all samples, have no larger sum than with the samples
+        themselves for keys. Scales stay as they are.
+
+    Raises
+    ------
+    ValueError
+        For an unknown mode, a radius that is not above zero, and what `interpolate` cannot take.
+
+    Notes
+    -----
+    Gauss and Newton's method, a few keys at a time: those that are so far from one another that no segment knows of
+    two, and then their neighbours. Each is moved only if that is better.
+    """
+    if mode not in MODES:
+        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    if not radius > 0.0:
+        raise ValueError(f"a radius of {radius} is not above zero: turns would not count")
+    fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)
+    apart = MODES[mode].behind + MODES[mode].ahead + 2
+    for _ in range(SWEEPS):
+        for first in range(min(apart, len(keys))):
+            fitting.improve(np.arange(first, len(keys), apart))
+    return fitting.fitted
+
+
+class _Fitting:
+    """The keys as they are by now, and how far the motion between them is off."""
+
+    def __init__(self, times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float) -> None:
+        self.times, self.key_times, self.mode, self.radius = times, times[keys], mode, radius
+        self.first_samples = np.append(0, keys[1:-1])
+        """Of each segment."""
+        self.truth = _shell_points(poses, radius)
+        self.fitted = poses[keys]
+        self.off = self.displacements(self.fitted)
+
+    def displacements(self, keys: Poses) -> np.ndarray:
+        """Of the shell's points at all samples, shape (9, n)."""
+        shown = interpolate(self.key_times, keys, self.times, self.mode)
+        return _shell_points(shown, self.radius) - self.truth
+
+    def improve(self, chosen: np.ndarray) -> None:
+        """Move some keys (c,), of which no segment knows two."""
+        slopes = np.empty((6, *self.off.shape))
+        units = np.repeat((1.0, self.radius), 3)
+        for way in range(6):
+            step = np.zeros((6, len(chosen)))
+            step[way] = STEP * units[way]
+            slopes[way] = (self.displacements(_moved(self.fitted, chosen, step)) - self.off) / STEP
+        normal = self.sums(np.einsum("apn,bpn->abn", slopes, slopes), chosen).transpose(2, 0, 1)
+        right = self.sums(np.einsum("apn,pn->an", slopes, self.off), chosen).T
+        normal += np.eye(6) * (DAMPING * np.trace(normal, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None]
+        steps = -np.linalg.solve(normal, right[..., None])[..., 0].T * units[:, None]
+        moved = _moved(self.fitted, chosen, steps)
+        off = self.displacements(moved)
+        worse = self.sums((off**2).sum(axis=0) - (self.off**2).sum(axis=0), chosen) >= 0.0
+        if worse.any():
+            moved = _moved(self.fitted, chosen, np.where(worse, 0.0, steps))
+            off = self.displacements(moved)
+        self.fitted, self.off = moved, off
+
+    def sums(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Of values (..., n), over the segments that each of the chosen keys has a say in, shape (..., c)."""
+        of_segments = np.add.reduceat(values, self.first_samples, axis=-1)
+        mode, last = MODES[self.mode], of_segments.shape[-1]
+        begins = np.maximum(chosen - 1 - mode.ahead, 0)
+        ends = np.minimum(chosen + mode.behind + 1, last)
+        padded = np.concatenate((of_segments, np.zeros((*values.shape[:-1], 1))), axis=-1)
+        return np.add.reduceat(padded, np.stack((begins, ends), axis=1).ravel(), axis=-1)[..., ::2]
+
+
+def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
+    """The keys, some of them (c,) moved by twists (6, c) along their own axes."""
+    turns, advances = twists.exponential(steps)
+    positions, quaternions = keys.positions.copy(), keys.quaternions.copy()
+    positions[chosen] += rotate(quaternions[chosen], advances.T)
+    quaternions[chosen] = normalise(multiply(quaternions[chosen], turns.T))
+    return Poses(positions, quaternions, keys.scales)
+
+
+def _shell_points(poses: Poses, radius: float) -> np.ndarray:
+    """The points that the shell error goes by, shape (9, n)."""
+    points = []
+    for axis in np.eye(3):
+        arm = radius * axis * (1.0 if poses.scales is None else poses.scales[:, None])
+        points.append((poses.positions + rotate(poses.quaternions, np.broadcast_to(arm, poses.positions.shape))).T)
+    return np.concatenate(points)

@@ -1,0 +1,118 @@
+"""Keys that are fitted: never worse than recorded poses, and near the truth where the recording is noisy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+
+from addon.motion import MODES, Poses, fit_keys, interpolate, reduce_keys, rms, shell_error
+from addon.motion.quaternions import angle_between, normalise
+from tests.motion.test_reduction import wandering
+
+
+def squares(times: np.ndarray, poses: Poses, keys: np.ndarray, at_keys: Poses, mode: str, radius: float) -> float:
+    """The sum of what `fit_keys` makes small, by matrices."""
+    shown = interpolate(times[keys], at_keys, times, mode)
+    total = 0.0
+    for axis in np.eye(3):
+        total += np.sum((placed(shown, radius * axis) - placed(poses, radius * axis)) ** 2)
+    return float(total)
+
+
+def placed(poses: Poses, point: np.ndarray) -> np.ndarray:
+    """Where a point of the body is, shape (n, 3)."""
+    w, x, y, z = np.moveaxis(poses.quaternions, -1, 0)
+    matrices = np.array(
+        (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        )
+    )
+    scales = 1.0 if poses.scales is None else poses.scales[:, None]
+    return poses.positions + scales * np.einsum("ijn,j->ni", matrices, point)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(3, 200), st.integers(0, 2**16), st.sampled_from(tuple(MODES)), st.sampled_from((0.02, 0.1, 2.0)))
+def test_fitted_keys_are_never_worse_than_recorded_ones(count, seed, mode, radius):
+    times, poses = wandering(count, seed)
+    random = np.random.default_rng(seed)
+    keys = np.unique(np.append((0, count - 1), random.integers(0, count, 1 + count // 9)))
+    fitted = fit_keys(times, poses, keys, mode, radius)
+    before, after = (squares(times, poses, keys, at, mode, radius) for at in (poses[keys], fitted))
+    assert after <= before * (1.0 + 1e-9) + 1e-20
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline", "motor_spline_causal"])
+def test_a_general_minimiser_finds_nothing_better(mode):
+    times, poses = wandering(60, 3)
+    keys = np.array((0, 14, 22, 41, 59))
+    fitted = fit_keys(times, poses, keys, mode)
+
+    def off(numbers: np.ndarray) -> np.ndarray:
+        rows = numbers.reshape(-1, 7)
+        at_keys = Poses(rows[:, :3], normalise(rows[:, 3:]))
+        shown = interpolate(times[keys], at_keys, times, mode)
+        return np.concatenate([(placed(shown, 0.1 * axis) - placed(poses, 0.1 * axis)).ravel() for axis in np.eye(3)])
+
+    start = np.concatenate((poses[keys].positions, poses[keys].quaternions), axis=1).ravel()
+    best = 2.0 * least_squares(off, start).cost
+    assert squares(times, poses, keys, fitted, mode, 0.1) < 1.02 * best
+
+
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "motor_spline"])
+def test_of_a_noisy_recording_they_are_nearer_the_truth(mode):
+    times, smooth = wandering(400, 5)
+    keys = np.arange(0, 400, 21)
+    truth = interpolate(times[keys], smooth[keys], times, mode)
+    random = np.random.default_rng(1)
+    noisy = Poses(
+        truth.positions + 2e-3 * random.normal(size=(400, 3)),
+        normalise(truth.quaternions + 5e-3 * random.normal(size=(400, 4))),
+    )
+    fitted = fit_keys(times, noisy, keys, mode)
+    for measured in (
+        lambda at: rms(np.linalg.norm(at.positions - smooth[keys].positions, axis=1)),
+        lambda at: rms(angle_between(at.quaternions, smooth[keys].quaternions)),
+    ):
+        assert measured(fitted) < 0.7 * measured(noisy[keys])
+
+
+def test_a_reduced_recording_gains_by_it():
+    times, poses = wandering(900, 2)
+    keys = reduce_keys(times, poses, tolerance=0.004, rms=True)
+    before, after = (
+        rms(shell_error(interpolate(times[keys], at, times, "motor_spline"), poses))
+        for at in (poses[keys], fit_keys(times, poses, keys))
+    )
+    assert after < 0.95 * before
+
+
+def test_scales_stay_as_they_are():
+    times, poses = wandering(100, 4)
+    growing = Poses(poses.positions, poses.quaternions, np.linspace(1.0, 3.0, 100))
+    keys = np.array((0, 30, 60, 99))
+    fitted = fit_keys(times, growing, keys, "cga_slerp")
+    np.testing.assert_array_equal(fitted.scales, growing.scales[keys])
+    before, after = (squares(times, growing, keys, at, "cga_slerp", 0.1) for at in (growing[keys], fitted))
+    assert after < before
+
+
+def test_a_body_at_rest_stays_at_rest():
+    times = np.arange(20.0)
+    poses = Poses(np.ones((20, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (20, 1)))
+    fitted = fit_keys(times, poses, np.array((0, 7, 19)))
+    np.testing.assert_allclose(fitted.positions, 1.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mode", "radius", "said"), [("no_mode", 0.1, "no mode 'no_mode'"), ("dq_sclerp", 0.0, "radius of 0.0")]
+)
+def test_what_cannot_be_fitted_is_refused(mode, radius, said):
+    times, poses = wandering(20, 0)
+    with pytest.raises(ValueError, match=said):
+        fit_keys(times, poses, np.array((0, 19)), mode, radius)
