@@ -1,0 +1,30 @@
+"""Poses on the way: a sender, a link that delays and loses, and a receiver that shows a motion all the same.
+
+    packets = send(times, poses, rate=20.0, packing=PACKINGS["double"])
+    arrivals = Link(latency=0.05, jitter=0.02, loss=0.1).carry(packets, np.random.default_rng(1))
+    playback = receive(packets, arrivals, display_times, "dq_sclerp")
+
+Seconds throughout; positions keep their unit. NumPy alone.
+"""
+
+from .events import Event, What
+from .link import Link
+from .packets import Packets, bandwidth
+from .packing import PACKINGS, Packing, smallest_three
+from .receiver import Playback, PlayOut, receive
+from .sender import send
+
+__all__ = [
+    "PACKINGS",
+    "Event",
+    "Link",
+    "Packets",
+    "Packing",
+    "PlayOut",
+    "Playback",
+    "What",
+    "bandwidth",
+    "receive",
+    "send",
+    "smallest_three",
+]

@@ -1,0 +1,50 @@
+"""Events: what a receiver had to deal with, and when. Times are seconds by the clock of the display."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class What(StrEnum):
+    """What happened, and what the amount of it counts."""
+
+    LATE = "late"
+    """A packet came after the play-out could have used it, and serves from there on. Seconds too late."""
+
+    TOO_LATE = "too late"
+    """A packet came when the play-out had passed a later one, and was dropped. Seconds too late."""
+
+    LOST = "lost"
+    """Packets had not come when the play-out passed a later one, nor did they ever. How many, from this number on."""
+
+    REORDERED = "reordered"
+    """A packet came after others that were sent later. How many of them."""
+
+    DUPLICATE = "duplicate"
+    """A packet came again, and was dropped. 1."""
+
+    DAMAGED = "damaged"
+    """A packet held numbers that are no pose, or a time that contradicts its number, and was dropped. 1."""
+
+    RAN_OUT = "ran out"
+    """The play-out passed the newest key, this one, and the motion went on slower and slower. Seconds until a frame
+    had a newer one, or until the last frame."""
+
+    CAUGHT_UP = "caught up"
+    """The path changed under what was shown, now that this key is known. The distance that began to fade."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """One thing that happened."""
+
+    time: float
+
+    what: What
+
+    sequence: int
+    """Of the packet."""
+
+    amount: float
+    """As `What` counts it."""
