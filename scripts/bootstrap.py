@@ -4,6 +4,7 @@
     python scripts/bootstrap.py compare hand.csv --axes unity
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
+    python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
     python scripts/bootstrap.py benchmark
     python scripts/bootstrap.py build                       dist/rigid_motion-VERSION.zip, the extension to install
 
@@ -29,6 +30,7 @@ COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "test": (["-m", "pytest"], ("test",)),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
+    "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""

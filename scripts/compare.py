@@ -28,27 +28,39 @@ except ImportError as error:
     print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
     sys.exit(2)
 
+import numpy as np
+
 from addon.motion import KEYFRAME_MODES, MODES
-from scripts.comparison import needed
+from scripts.command_line import own_arguments
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
-from scripts.comparison.clips import Clip
-from scripts.comparison.film import render_film, save_blend
-from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_reconstruction
-from scripts.comparison.needed import KeysNeeded
+from scripts.comparison.modes import BEST_OF, single_modes
+from scripts.comparison.planning import SOURCES, Wanted, comparison_tasks, look_into, reading_tasks
 from scripts.comparison.progress import Progress
-from scripts.comparison.reconstructions import Reconstruction
-from scripts.comparison.report import Settings, write_report
-from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings, build_stage
-from scripts.comparison.study import read_clips, reconstruct
+from scripts.comparison.report import Settings
+from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings
+from scripts.comparison.steps import KEYS_NEEDED, REPORT
 from scripts.comparison.subject import SubjectError, load_subject
-from scripts.comparison.timeline import Timeline
-from scripts.trajectories import TrajectoryError
 from scripts.trajectories.axes import AXES
+from scripts.workplan import (
+    Executor,
+    FolderInUse,
+    ManifestError,
+    Outcome,
+    Plan,
+    ProcessExecutor,
+    SerialExecutor,
+    State,
+    Task,
+    Workspace,
+    code_version,
+    run,
+)
 
 RATES = "5,10,15,20"
 """Keys a second where none are asked for."""
 
-KEYS_NEEDED = "keys_needed.csv"
+ALL = "all"
+"""Stands for the modes that are compared where none are named."""
 
 EPILOG = """
 inputs:
@@ -61,6 +73,7 @@ examples:
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
   python scripts/compare.py shot.blend:Camera --no-video
+  python scripts/compare.py hand_left.csv --modes all,best_of
   python scripts/compare.py take.csv --decimate adaptive --tolerance 5mm
   python scripts/compare.py take.csv --decimate adaptive --budget 5,10 --rates 10
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
@@ -73,11 +86,22 @@ choosing keys:
   then also shows the curve of error over keys, and how many keys every mode needs to be as good as lerp_slerp at 30,
   20, 15 and 12 a second; that alone takes up to a second for every 100 samples.
 
-It writes OUTPUT/report.html (all of it in one file), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv, and
-for every clip and choice of keys a folder (OUTPUT/CLIP/10, /budget-10, /tolerance-5mm) with keys.csv (MODE.keys.csv for
-adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The last line it prints is the path of the report.
-Exit code: 0 done, 1 a video could not be rendered, 2 a wrong input or option, 130 stopped by Ctrl-C; after that the
-report holds what was ready.
+choosing modes:
+  best_of takes in every segment, from key to key, that of the other modes named which comes closest to the recording
+  there. Evenly spaced keys are the same for all; of adaptive ones it has those of the best single mode. The mode of
+  each segment is a column of best_of.keys.csv.
+
+It writes OUTPUT/report.html (all of it in one file; of more than 24 clips each has a page of its own, beside its
+folders), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv, and for every clip and choice of keys a folder
+(OUTPUT/CLIP/10, /budget-10, /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4
+and comparison.blend. The last line it prints is the path of the report.
+
+many clips:
+  The work is done in small tasks, by as many processes as --jobs says. What is done is kept: stopped by Ctrl-C, a full
+  disk or worse, the same command goes on from there, and with other options it does what these ask for anew. A
+  recording that cannot be read, or a video that cannot be rendered, is reported, and the others go on.
+Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could, or a wrong option, 130 stopped by
+Ctrl-C; after that the report holds what was ready.
 """
 
 
@@ -95,7 +119,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_modes,
         default=",".join(KEYFRAME_MODES),
         metavar="MODE,...",
-        help="what fills them in (%(default)s)",
+        help="what fills them in (%(default)s); all for all of these, and best_of for the best of each segment",
     )
     parser.add_argument(
         "--output", type=Path, default=ROOT / "renders" / "comparison", help="folder to write to (renders/comparison)"
@@ -104,6 +128,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--radius", type=_positive, default=0.1, metavar="M", help="of the shell error, in metres (%(default)s)"
     )
+    parser.add_argument(
+        "--jobs", type=_jobs, metavar="N", help="processes that work; 0 for none but this one (one for each processor)"
+    )
+    parser.add_argument("--force", action="store_true", help="do everything again, also what is done already")
     keys = parser.add_argument_group("choosing keys")
     keys.add_argument(
         "--decimate",
@@ -189,134 +217,113 @@ def main(arguments: list[str]) -> int:
     if missing:
         print(f"compare.py: {way_out(missing)}\nOr go without videos: --no-video", file=sys.stderr)
         return 2
-    started = time.perf_counter()
-    with Progress() as progress:
-        try:
-            with progress.stage("Reading", 1):
-                clips, notes = read_clips(options.inputs, options.axes)
-                if not options.no_video:
-                    load_subject(options.object)
-        except (TrajectoryError, SubjectError) as error:
-            progress.note(f"compare.py: {error}")
-            return 2
-        for note in notes:
-            progress.note(note)
-        for clip in clips:
-            for repaired in clip.repairs:
-                progress.note(f"{clip.name}: {repaired}")
-        run = _Run(options, progress, shlex.join(["compare.py", *arguments]))
-        try:
-            run.measure(clips)
-            if options.decimate == "adaptive":
-                run.count_keys()
-            if run.reconstructions and not options.no_video:
-                run.film()
-        except KeyboardInterrupt:
-            run.interrupted = True
-        except OSError as error:
-            progress.note(f"compare.py: {error.filename or options.output}: {error.strerror or error}")
-            return 2
-        if not run.reconstructions:
-            if not run.interrupted:
-                higher = "--budget" if options.budget else "--rates"
-                progress.note(f"compare.py: every clip is too short for two keys at these rates; give higher {higher}")
-            return 130 if run.interrupted else 2
-        report = run.report()
-    seconds = time.perf_counter() - started
-    print(
-        f"{seconds:.1f} s in all, {run.rendering:.1f} s ({run.rendering / seconds:.0%}) of them Blender's rendering.",
-        file=sys.stderr,
-    )
-    if run.interrupted:
-        print("Stopped; the report holds what was ready.", file=sys.stderr)
-    print(report, flush=True)
-    return 130 if run.interrupted else int(run.failed)
+    try:
+        if not options.no_video:
+            load_subject(options.object)
+        executor = SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs)
+        with Progress() as progress, Workspace(options.output) as workspace, executor:
+            return _Run(options, workspace, executor, progress, shlex.join(["compare.py", *arguments])).run()
+    except (SubjectError, FolderInUse, ManifestError) as error:
+        print(f"compare.py: {error}", file=sys.stderr)
+    except OSError as error:
+        print(f"compare.py: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+    return 2
 
 
 class _Run:
-    """What a run has made so far: enough for a report at any time."""
+    """A comparison in its output folder."""
 
-    def __init__(self, options: argparse.Namespace, progress: Progress, command: str) -> None:
-        self.options, self.progress, self.command = options, progress, command
-        self.reconstructions: list[Reconstruction] = []
-        self.needed: list[KeysNeeded] = []
-        self.films: dict[tuple[str, str], Path] = {}
-        self.rendering = 0.0
-        self.failed = self.interrupted = False
+    def __init__(
+        self, options: argparse.Namespace, workspace: Workspace, executor: Executor, progress: Progress, command: str
+    ) -> None:
+        self.options, self.workspace, self.executor, self.progress = options, workspace, executor, progress
+        self.command = command
+        self.version = f"Blender {bpy.app.version_string}, NumPy {np.__version__}, {code_version(*SOURCES)}"
 
-    def measure(self, clips: list[Clip]) -> None:
-        """All numbers first: they take seconds, and are there whatever becomes of the videos."""
-        # What an earlier run found must not pass for a finding of this.
-        (self.options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        with self.progress.stage("Measuring", len(clips) * len(self.options.choices)) as stage:
-            for clip in clips:
-                for choice in self.options.choices:
-                    stage.say(f"{clip.name} {choice.phrase}")
-                    made = reconstruct(clip, choice, self.options.modes, self.options.radius)
-                    if made is None:
-                        self.progress.note(f"{clip.name}: too short for two keys at {choice.rate} a second; left out")
-                    else:
-                        write_reconstruction(self._folder(made), made)
-                        self.reconstructions.append(made)
-                    stage.advance()
-        rows = [row for made in self.reconstructions for row in measure_reconstruction(made)]
-        write_metrics(self.options.output / "metrics.csv", rows)
+    def run(self) -> int:
+        """Read the recordings, see what there is to do, do it, and say what came of it."""
+        started = time.perf_counter()
+        options = self.options
+        reading = reading_tasks(options.inputs, options.axes)
+        read = self._do(list({task.name: task for task in reading}.values()), "Reading")
+        if read.interrupted:
+            return 130
+        there = [task for task in reading if read.states[task.name].there]
+        if read.problem or not there:
+            return 2
+        found = look_into(self.workspace.output, there, options.choices)
+        for note in found.notes:
+            self.progress.note(note)
+        if not found.studies:
+            higher = "--budget" if options.budget else "--rates"
+            self.progress.note(f"compare.py: every clip is too short for two keys at these rates; give higher {higher}")
+            return 2
+        if options.decimate != "adaptive":
+            # What an earlier run found must not pass for a finding of this.
+            (options.output / KEYS_NEEDED).unlink(missing_ok=True)
+        tasks = comparison_tasks(found.studies, there, self._wanted())
+        outcome = self._do(tasks, "Comparing")
+        outcome.states |= read.states
+        self._say(outcome, tasks, time.perf_counter() - started)
+        return 130 if outcome.interrupted else 2 if outcome.problem else int(State.FAILED in outcome.states.values())
 
-    def count_keys(self) -> None:
-        """How many keys every mode needs, on the clips that there are reconstructions of."""
-        clips = {made.clip.name: made.clip for made in self.reconstructions}
-        with self.progress.stage("Counting the keys needed", len(clips) * len(needed.RATES)) as stage:
-            for clip in clips.values():
-                stage.say(clip.name)
-                self.needed.append(needed.keys_needed(clip, self.options.modes, self.options.radius, stage.advance))
-        needed.write_keys_needed(self.options.output / KEYS_NEEDED, self.needed)
-
-    def film(self) -> None:
-        """A .blend and an MP4 for every clip and choice of keys."""
-        self.films = {
-            (made.clip.name, made.choice.name): self._folder(made) / "comparison.mp4" for made in self.reconstructions
-        }
-        count = sum(
-            Timeline.of(made, self.options.fps, self.options.slow_motion).count for made in self.reconstructions
+    def _do(self, tasks: list[Task], title: str) -> Outcome:
+        outcome = run(
+            Plan(tasks, self.version),
+            self.workspace,
+            self.executor,
+            force=self.options.force,
+            progress=self.progress,
+            title=title,
+            describe=lambda problem: f"compare.py: {problem}",
         )
-        with self.progress.stage("Rendering", count) as stage:
-            for made in self.reconstructions:
-                title = f"{made.clip.name} {made.choice.phrase}"
-                stage.say(title)
-                path = self.films[made.clip.name, made.choice.name]
-                path.unlink(missing_ok=True)  # A film of an earlier run must not pass for one of this.
-                try:
-                    scene = build_stage(made, self.options.stage)
-                    save_blend(path.with_suffix(".blend"))
-                    self.rendering += render_film(
-                        scene, path, lambda done, of, title=title: stage.advance(1, f"{title}: {done}/{of}")
-                    )
-                except RuntimeError as error:
-                    self.failed = True
-                    self.progress.note(f"{title}: no video: {error}")
+        if outcome.problem:
+            self.progress.note(
+                f"compare.py: {outcome.problem}; nothing that is done is lost: put that right, and run the same "
+                "command again"
+            )
+        return outcome
 
-    def report(self) -> Path:
-        """The page, with the films that there are."""
-        path = self.options.output / "report.html"
+    def _wanted(self) -> Wanted:
+        options, stage = self.options, self.options.stage
         manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
-        stage = self.options.stage
         settings = Settings(
-            radius=self.options.radius,
+            radius=options.radius,
             program=f"{manifest['name']} {manifest['version']}",
             blender=bpy.app.version_string,
             command=self.command,
             details={}
-            if self.options.no_video
+            if options.no_video
             else {
                 "Videos": f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s",
                 "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
             },
         )
-        write_report(path, self.reconstructions, films=self.films, settings=settings, needed=self.needed)
-        return path.resolve()
+        return Wanted(
+            choices=tuple(options.choices),
+            modes=tuple(options.modes),
+            radius=options.radius,
+            settings=settings,
+            stage=None if options.no_video else stage,
+            count_keys=options.decimate == "adaptive",
+        )
 
-    def _folder(self, made: Reconstruction) -> Path:
-        return self.options.output / made.clip.name / made.choice.name
+    def _say(self, outcome: Outcome, tasks: list[Task], seconds: float) -> None:
+        """What came of it, and last the path of the report."""
+        records = self.workspace.manifest.tasks
+        done = [records[name] for name in outcome.of(State.DONE)]
+        work = sum(record.seconds for record in done)
+        rendering = sum(record.facts.get("rendering", 0.0) for record in done)
+        share = f", {rendering:.1f} s ({rendering / work:.0%}) of them Blender's rendering" if rendering else ""
+        lines = [f"{seconds:.1f} s in all; {work:.1f} s of work{share}.", f"Tasks: {outcome}."]
+        report = self.workspace.output / REPORT
+        if outcome.interrupted:
+            holds = "the report holds what was ready" if outcome.states[REPORT].there else "there is no new report yet"
+            lines.append(f"Stopped; {holds}. The same command goes on from here.")
+        for line in lines:
+            print(line, file=sys.stderr)
+        if outcome.states[REPORT].there:
+            print(report, flush=True)
 
 
 def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
@@ -333,13 +340,27 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
 
 
 def _modes(text: str) -> list[str]:
-    modes = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    written = [part.strip() for part in text.split(",") if part.strip()]
+    named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part == ALL else (part,))))
+    modes = single_modes(named)
     wrong = [mode for mode in modes if mode not in MODES]
-    if wrong or not modes:
+    if wrong or not named:
         raise argparse.ArgumentTypeError(
-            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join(MODES)}"
+            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, ALL, BEST_OF))}"
         )
-    return modes
+    if BEST_OF not in named:
+        return list(modes)
+    if len(modes) < 2:
+        raise argparse.ArgumentTypeError(
+            f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
+        )
+    return [*modes, BEST_OF]
+
+
+def _jobs(text: str) -> int:
+    if not re.fullmatch(r"\d{1,3}", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
+    return int(text)
 
 
 def _positive(text: str) -> float:
@@ -359,15 +380,8 @@ def _resolution(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _arguments() -> list[str]:
-    """Ours: in Blender what is behind the "--", in Python everything."""
-    if Path(sys.argv[0]).name == Path(__file__).name:
-        return sys.argv[1:]
-    return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-
-
 if __name__ == "__main__":
     try:
-        sys.exit(main(_arguments()))
+        sys.exit(main(own_arguments(__file__)))
     except KeyboardInterrupt:
         sys.exit(130)

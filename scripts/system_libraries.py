@@ -29,8 +29,8 @@ def missing_for_rendering() -> str | None:
     return None
 
 
-def way_out(error: str) -> str:
-    """What to do about the message that `import bpy` failed with, in a few lines."""
+def way_out(error: str, script: str = "compare.py") -> str:
+    """What to do about the message that `import bpy` failed with in a script, in a few lines."""
     missing = re.search(r"(\S+): cannot open shared object file", error)
     if missing:
         return (
@@ -40,5 +40,5 @@ def way_out(error: str) -> str:
         )
     return (
         "Blender's Python module bpy is not here. Run this through `python scripts/bootstrap.py`, which installs it,\n"
-        "or inside Blender: blender --background --python scripts/compare.py -- INPUT"
+        f"or inside Blender: blender --background --python scripts/{script} -- INPUT"
     )

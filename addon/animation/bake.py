@@ -219,7 +219,8 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
     new = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in FIELDS.items()}
     own = np.flatnonzero(~(before | behind))
-    places = np.abs(frames[:, None] - at[own]).argmin(axis=0)
+    places = np.clip(np.searchsorted(frames, at[own]), 1, len(frames) - 1)
+    places -= at[own] - frames[places - 1] <= frames[places] - at[own]
     new["type"][:] = code_of("type", "GENERATED")
     for name, numbers in new.items():
         numbers[places] = old[name][own]

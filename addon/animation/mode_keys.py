@@ -46,6 +46,12 @@ def modes_of(obj: bpy.types.Object, frames: np.ndarray) -> list[str]:
     return [MODE_IDS[number] for number in _modes_in(obj, curves, frames)]
 
 
+def segment_modes(slot: Slot) -> list[str]:
+    """The modes of the segments between the keys of a slot, one after the other."""
+    curves = curves_in(slot.channelbag)
+    return [MODE_IDS[number] for number in _modes_in(slot.users[0], curves, _frames_in(curves)[:-1])]
+
+
 def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
     found = []
     for (path, _), fcurve in curves.items():

@@ -8,18 +8,20 @@ the original stays in the file, for `restore_keys`. Frames are those of the Acti
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ..motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
+from ..motion.best_of import least_errors
 from . import live
 from .bake import channel_values
 from .channels import code_of
-from .fcurves import LINEAR, Keys
+from .fcurves import CONSTANT, LINEAR, Keys
 from .inbetweens import in_betweens
-from .mode_keys import set_mode_in
+from .mode_keys import segment_modes, set_mode_in
 from .originals import (
     REDUCED,
     entries_in_use,
@@ -51,6 +53,8 @@ class Reduction:
     before: int
     after: int
     largest_error: float
+    segments: dict[str, int]
+    """How many segments each mode has by now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +72,21 @@ class _Fewer:
     key_frames: np.ndarray
     """The same with frames of keys that a scale keeps, shape (n,)."""
 
+    modes: np.ndarray
+    """What goes on from each of these, as `MODE_IDS` counts them, shape (n,)."""
+
     keeps_scale: bool
 
     largest_error: float
 
 
 def reduce_keys_of(
-    obj: bpy.types.Object, mode: str = "motor_spline", tolerance: float = 0.001, radius: float | None = None
+    obj: bpy.types.Object,
+    mode: str = "motor_spline",
+    tolerance: float = 0.001,
+    radius: float | None = None,
+    *,
+    best_of: bool = False,
 ) -> Reduction:
     """Leave an object only the keys that a mode needs to show the same motion.
 
@@ -91,6 +103,9 @@ def reduce_keys_of(
         The largest shell error on any frame, in the scene's units.
     radius : float, optional
         Of the shell, in the scene's units. `radius_of` the object, otherwise.
+    best_of : bool
+        Give each segment between these keys the mode with the least RMS shell error there that keeps to the tolerance;
+        of equally good ones `mode`.
 
     Returns
     -------
@@ -111,14 +126,14 @@ def reduce_keys_of(
     readings = [(slot, source) for slot, source in readings if source.channels]
     if not readings:
         raise Refused(_why_nothing_is_there(obj, 0))
-    found = [_fewer_keys(obj, slot, source, mode, tolerance, radius) for slot, source in readings]
+    found = [_fewer_keys(obj, slot, source, mode, tolerance, radius, best_of=best_of) for slot, source in readings]
     fewer = [one for one in found if len(one.key_frames) < one.before]
     if not fewer:
         before, keeps_scale = sum(one.before for one in found), any(one.keeps_scale for one in found)
         raise Refused(_why_no_fewer(obj, before, keeps_scale=keeps_scale))
     with live.paused():
         for one in fewer:
-            _write(obj, one, mode)
+            _write(obj, one)
     live.refresh([obj])
     return reduction_of(obj)
 
@@ -128,10 +143,12 @@ def reduction_of(obj: bpy.types.Object) -> Reduction | None:
     entries = [entry for entry in entries_in_use(obj) if entry.kind == REDUCED]
     if not entries:
         return None
+    reduced = {entry.changed for entry in entries}
     return Reduction(
         sum(entry.keys_before for entry in entries),
         sum(entry.keys_after for entry in entries),
         max(entry.largest_error for entry in entries),
+        dict(Counter(mode for slot in slots_of([obj]) if slot.action in reduced for mode in segment_modes(slot))),
     )
 
 
@@ -197,7 +214,7 @@ def _size(matrix: object) -> float:
 
 
 def _fewer_keys(
-    obj: bpy.types.Object, slot: Slot, source: Source, mode: str, tolerance: float, radius: float
+    obj: bpy.types.Object, slot: Slot, source: Source, mode: str, tolerance: float, radius: float, *, best_of: bool
 ) -> _Fewer:
     """The keys that one slot needs, which may be as many as it has."""
     before, frames = distinct(source.keyed_frames), _samples(source)
@@ -208,12 +225,13 @@ def _fewer_keys(
     truth, own = _poses(source, seen), np.isin(seen, frames)
     unit, radius = _in_channels(obj, radius, truth.scales is not None)
     tolerance /= unit
+    rounding = SMALLEST * (float(np.abs(truth.positions).max()) + radius)
+    allowed = tolerance + rounding
     values = _values(obj, source, frames)
     chosen = _chosen(obj, source, frames, truth[own], mode, tolerance, radius)
     while True:
         fewer = _with_keys(source, frames[chosen], {row: column[chosen] for row, column in values.items()}, mode)
         error = shell_error(_poses(fewer, seen), truth, radius)
-        allowed = tolerance + SMALLEST * (float(np.abs(truth.positions).max()) + radius)
         if error.max() <= allowed:
             break
         more = _worst(chosen, error[own], allowed)
@@ -223,13 +241,21 @@ def _fewer_keys(
                 "channels constant extrapolation and no cycles, or cycles that all have the same range"
             )
         chosen = np.union1d(chosen, more)
+    if best_of:
+        mixed = _with_best_modes(fewer, frames, truth[own], radius, rounding, allowed)
+        error_of_mixed = shell_error(_poses(mixed, seen), truth, radius)
+        # Outside of the keys cycles of different lengths may meet in other segments than inside.
+        if error_of_mixed.max() <= allowed:
+            fewer, error = mixed, error_of_mixed
+    key_frames = distinct(fewer.keyed_frames)
     paths = _paths(Transformable.of(obj))
     return _Fewer(
         slot,
         len(before),
         frames[chosen],
         {paths[row]: column[chosen] for row, column in values.items()},
-        distinct(fewer.keyed_frames),
+        key_frames,
+        fewer.modes_at(key_frames + SAME_FRAME),
         SCALE in source.keyed and ROWS[SCALE].start not in values,
         float(error.max()) * unit,
     )
@@ -260,6 +286,18 @@ def _chosen(
     elif poses.scales is not None and not np.all(poses.scales > 0.0):
         raise Refused(f"{obj.name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)")
     return reduce_keys(frames, poses, mode, tolerance, radius)
+
+
+def _with_best_modes(
+    source: Source, frames: np.ndarray, truth: Poses, radius: float, rounding: float, allowed: float
+) -> Source:
+    """The source with the best mode in each segment, of those that keep within what is allowed on these frames."""
+    keys = distinct(source.keyed_frames)
+    codes = np.array([source.mode, *(code for code in range(1, len(MODE_IDS)) if code != source.mode)])
+    errors = np.stack([shell_error(_poses(replace(source, mode=int(code)), frames), truth, radius) for code in codes])
+    best = least_errors(errors, np.searchsorted(frames, keys - SAME_FRAME), rounding, allowed)
+    points = np.stack((keys, codes[[*best, best[-1]]]), axis=-1)[None].astype(np.float32)
+    return replace(source, mode=Keys(points, np.full(points.shape[:2], CONSTANT, np.int32)))
 
 
 def _worst(chosen: np.ndarray, error: np.ndarray, allowed: float) -> np.ndarray:
@@ -339,7 +377,7 @@ def _with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray]
     return replace(source, channels=tuple(channels), rest=rest, mode=MODE_IDS.index(mode))
 
 
-def _write(obj: bpy.types.Object, fewer: _Fewer, mode: str) -> None:
+def _write(obj: bpy.types.Object, fewer: _Fewer) -> None:
     copy = move_by_copy(obj, fewer.slot, REDUCED)
     entry = obj.rigid_motion.bakes[-1]
     entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
@@ -349,7 +387,8 @@ def _write(obj: bpy.types.Object, fewer: _Fewer, mode: str) -> None:
         _set_keys(curves.get((path, index)) or fcurves.new(path, index=index), fewer.frames, values)
     if (MODE_PATH, 0) in curves:
         fcurves.remove(curves[MODE_PATH, 0])
-    set_mode_in(copy, mode, fewer.key_frames)
+    for mode in np.unique(fewer.modes):
+        set_mode_in(copy, MODE_IDS[mode], fewer.key_frames[fewer.modes == mode])
 
 
 def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:

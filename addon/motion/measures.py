@@ -42,13 +42,15 @@ def measure(times: np.ndarray, poses: Poses, truth: Poses, radius: float = 0.1) 
     The velocity error is that of the origin, by differences between successive samples: an in-between that runs
     unevenly, or turns a corner at a key, shows there first. A motion that is merely displaced has none.
     """
-    offset = poses.positions - truth.positions
-    return Errors(
-        shell=shell_error(poses, truth, radius),
-        position=np.linalg.norm(offset, axis=-1),
-        rotation=angle_between(truth.quaternions, poses.quaternions),
-        velocity=np.linalg.norm(np.diff(offset, axis=-2), axis=-1) / np.diff(times, axis=-1),
-    )
+    # Poses that are not finite have errors that are not, and that is no news.
+    with np.errstate(over="ignore", invalid="ignore"):
+        offset = poses.positions - truth.positions
+        return Errors(
+            shell=shell_error(poses, truth, radius),
+            position=np.linalg.norm(offset, axis=-1),
+            rotation=angle_between(truth.quaternions, poses.quaternions),
+            velocity=np.linalg.norm(np.diff(offset, axis=-2), axis=-1) / np.diff(times, axis=-1),
+        )
 
 
 def shell_error(poses: Poses, truth: Poses, radius: float = 0.1) -> np.ndarray:

@@ -15,6 +15,12 @@ from numpy.typing import ArrayLike
 
 from .quaternions import conjugate, multiply, rotate
 
+LARGEST = 1e40
+"""A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
+
+SHORTEST = 1e-30
+"""Between two moments, for the same reason: what happens in less has a speed that is no float."""
+
 
 @dataclass(frozen=True, eq=False)
 class Poses:

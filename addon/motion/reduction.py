@@ -20,7 +20,7 @@ import numpy as np
 
 from .measures import shell_error
 from .modes import MODES, in_betweens, interpolate
-from .poses import Poses, beyond
+from .poses import LARGEST, SHORTEST, Poses, beyond
 from .quaternions import align_signs
 
 PEAK = 8
@@ -34,6 +34,9 @@ ROUNDS = 12
 
 LOOSER = (1.3, 1.6, 1.15)
 """How many times the tolerance a search begins with: far-sighted keys, which are worth mending."""
+
+WORST = 1e30
+"""Errors beyond this are all as bad: their powers are to stay floats."""
 
 BATCH = 2**14
 """Samples looked at in one go: few enough for the processor's caches."""
@@ -82,7 +85,7 @@ def reduce_keys(
     ------
     ValueError
         Where it is not one of tolerance and budget that is given, or either is no sensible number, or a sample is not
-        finite.
+        finite, out of order or of no size.
     """
     if (tolerance is None) == (budget is None):
         raise ValueError("key reduction needs either a tolerance or a budget of keys")
@@ -96,11 +99,13 @@ def reduce_keys(
     if times.shape != poses.shape:
         raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}")
     numbers = np.column_stack((times, poses.positions, poses.quaternions))
-    finite = np.isfinite(numbers).all(axis=1)
+    finite = (np.abs(numbers) < LARGEST).all(axis=1)
     if not finite.all():
-        raise ValueError(f"sample {int(np.argmin(finite))} is not finite")
-    if np.any(np.diff(times) <= 0.0):
-        raise ValueError(f"sample {int(np.argmax(np.diff(times) <= 0.0)) + 1} is not later than the one before it")
+        raise ValueError(f"sample {int(np.argmin(finite))} is not finite, or has a number beyond {LARGEST:g}")
+    if poses.scales is not None and not (sound := (poses.scales > 1.0 / LARGEST) & (poses.scales < LARGEST)).all():
+        raise ValueError(f"sample {int(np.argmin(sound))} has a scale that is not a positive number")
+    if np.any(early := np.diff(times) <= SHORTEST):
+        raise ValueError(f"sample {int(np.argmax(early)) + 1} is not later than the one before it")
     if len(times) <= 2:
         return np.arange(len(times))
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
@@ -303,7 +308,7 @@ class _Reduction:
         start_times, durations = key_times[:, :-1].ravel(), np.diff(key_times).ravel()
         progress = (self.times[samples] - start_times[segment]) / durations[segment]
         shown = in_betweens(key_times, keys, every, progress, self.mode)
-        error = shell_error(shown, self.poses[samples], self.radius)
+        error = np.minimum(shell_error(shown, self.poses[samples], self.radius), WORST)
         filled = np.flatnonzero(every.ravel())
         sums, largest = np.zeros((2, every.size))
         sums[filled] = np.add.reduceat(error**self.power, first[filled])

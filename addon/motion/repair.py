@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .poses import Poses
+from .poses import LARGEST, SHORTEST, Poses
 from .quaternions import align_signs, normalise
 
 GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
 
-LARGEST = 1e100
-"""A number beyond this is damage, not a measurement: its differences and squares would leave the range of floats."""
+LARGEST_SCALE = 1e12
+"""A scale beyond this, or below its inverse, is damage: growth goes by powers, and would leave the range of floats."""
 
 UNIT_TOLERANCE = 1e-3
 """How far a quaternion's length may be from 1 before normalising it is worth a word: three decimals are often kept."""
@@ -73,11 +73,11 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
 
     finite = _usable(times) & _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)
     if poses.scales is not None:
-        finite &= _usable(poses.scales) & (poses.scales > 0.0)
+        finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
     keep(finite, "dropped rows with numbers that are missing or not finite")
     keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
     keep(_rising(times), "dropped rows whose time runs backwards")
-    keep(np.diff(times, append=np.inf) > 0.0, "dropped rows whose time comes again, keeping the last of each")
+    keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
     if (uneven := np.abs(lengths - 1.0) > UNIT_TOLERANCE).any():

@@ -40,6 +40,9 @@ ROWS = 8
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
 
+MOST_GROWTH = 50.0
+"""The logarithm of what a bend may grow or shrink by: after a sudden growth splines shoot further than floats go."""
+
 
 @dataclass(frozen=True, eq=False)
 class Segments:
@@ -359,7 +362,7 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
     out[:3] += rotate(out[3:7].T, advances.T).T
     out[3:7] = product(out[3:7].T, turns.T).T
     if grows:
-        out[7] *= np.exp(added[6])
+        out[7] *= np.exp(np.clip(added[6], -MOST_GROWTH, MOST_GROWTH, out=added[6]))
 
 
 def _components(vectors: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
@@ -19,7 +19,7 @@ from ..animation.reducing import metres_per_unit
 from .preferences import DEFAULT_MODE, default_mode
 from .rows import labelled
 from .targets import SCOPES, SELECTED, WHOLE, frames_meant, objects_for, scope_for
-from .wording import DESCRIPTIONS, LABELS, length, listed, reduction_told
+from .wording import DESCRIPTIONS, LABELS, counted_modes, length, listed, reduction_told
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
@@ -278,12 +278,19 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
         items=[item for item in MODE_ITEMS if item[0] != "BLENDER"],
         default="motor_spline",
     )
+    best_of: BoolProperty(
+        name="Best per Segment",
+        description=(
+            "Then key each segment with the mode that comes closest to the recording there, within the tolerance. "
+            "Where one mode meets another the object may turn a corner"
+        ),
+    )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        for name in ("tolerance", "radius", "mode"):
+        for name in ("tolerance", "radius", "mode", "best_of"):
             layout.prop(self, name)
         for obj in objects_for(context)[:MOST_TOLD]:
             if (reduction := animation.reduction_of(obj)) is not None:
@@ -291,6 +298,10 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
                 labelled(layout, obj.name).label(
                     text=f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}, {error} off"
                 )
+                if self.best_of:
+                    column = layout.column(align=True)
+                    for line in counted_modes(reduction.segments):
+                        labelled(column).label(text=line)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         objects = objects_for(context)
@@ -301,7 +312,7 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
         return self.act(objects, lambda obj: self._reduce(context.scene, obj))
 
     def _reduce(self, scene: bpy.types.Scene, obj: bpy.types.Object) -> str:
-        reduction = animation.reduce_keys_of(obj, self.mode, self.tolerance, self.radius or None)
+        reduction = animation.reduce_keys_of(obj, self.mode, self.tolerance, self.radius or None, best_of=self.best_of)
         return reduction_told(scene, reduction)
 
 

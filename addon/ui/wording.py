@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import bpy
 
@@ -63,7 +63,15 @@ def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
 def reduction_told(scene: bpy.types.Scene, reduction: Reduction) -> str:
     """What became of the keys of an object."""
     error = length(scene, reduction.largest_error, precision=3)
-    return f"{reduction.before} keys became {reduction.after}, largest error {error}"
+    told = f"{reduction.before} keys became {reduction.after}, largest error {error}"
+    if len(reduction.segments) > 1:
+        told += f"; segments: {', '.join(counted_modes(reduction.segments))}"
+    return told
+
+
+def counted_modes(segments: Mapping[str, int]) -> list[str]:
+    """Each mode with how many segments have it, most of them first."""
+    return [f"{count} {LABELS[mode]}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])]
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:

@@ -77,6 +77,13 @@ class Choice(ABC):
         """The keys a second that were asked for, as written; empty where none were."""
         return self.written
 
+    @abstractmethod
+    def ends(self, times: np.ndarray) -> tuple[int, int] | None:
+        """The samples of the first and the last key, which all modes keep, among a clip's times, shape (n,).
+
+        None where the clip is too short for two keys.
+        """
+
     def tolerance(self, clip: Clip) -> float | None:
         """The largest shell error that is allowed, in metres; None where nothing is said of it."""
         return None
@@ -95,6 +102,10 @@ class Uniform(Choice):
     def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
         return decimate(clip.times, float(self.written))
 
+    def ends(self, times: np.ndarray) -> tuple[int, int] | None:
+        keys = decimate(times, float(self.written))
+        return (int(keys[0]), int(keys[-1])) if len(keys) > 1 else None
+
 
 class Budget(Choice):
     """So many keys a second on average, where they make the RMS shell error of a mode smallest."""
@@ -103,12 +114,17 @@ class Budget(Choice):
     unit = "keys/s on average"
 
     def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
-        duration = float(clip.times[-1] - clip.times[0])
-        # As many as a sender at that rate has ticks: the allowance is for rounding, as in 2.0 * 0.5.
-        count = int(duration * float(self.written) + 1e-9) + 1
+        count = self._count(clip.times)
         if count < 2:
             return np.array([0])
         return _reduced(clip, mode, radius, budget=min(count, len(clip.times)), rms=True)
+
+    def ends(self, times: np.ndarray) -> tuple[int, int] | None:
+        return (0, len(times) - 1) if self._count(times) > 1 else None
+
+    def _count(self, times: np.ndarray) -> int:
+        """As many keys as a sender at that rate has ticks: the allowance is for rounding, as in 2.0 * 0.5."""
+        return int(float(times[-1] - times[0]) * float(self.written) + 1e-9) + 1
 
     @property
     def name(self) -> str:
@@ -127,6 +143,9 @@ class Tolerance(Choice):
 
     def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
         return _reduced(clip, mode, radius, tolerance=self.tolerance(clip) / clip.metres_per_unit)
+
+    def ends(self, times: np.ndarray) -> tuple[int, int]:
+        return 0, len(times) - 1
 
     @property
     def name(self) -> str:
@@ -171,3 +190,17 @@ class Tolerance(Choice):
 
 def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np.ndarray:
     return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)
+
+
+KINDS: dict[str, type[Choice]] = {kind.__name__.lower(): kind for kind in (Uniform, Budget, Tolerance)}
+"""What choices are called where they are plain data."""
+
+
+def choice_parts(choice: Choice) -> tuple[str, str]:
+    """A choice as plain data."""
+    return type(choice).__name__.lower(), choice.written
+
+
+def choice_from(kind: str, written: str) -> Choice:
+    """The choice of `choice_parts`."""
+    return KINDS[kind](written)

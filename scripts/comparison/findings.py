@@ -7,15 +7,16 @@ much as one with small. Where a tolerance decides, the number of keys takes the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from .choices import Choice, Tolerance, Uniform
-from .metrics import Metrics
-from .reconstructions import Reconstruction, identical_modes
+from .modes import BEST_OF, single_modes
+from .reconstructions import Groups, joint_groups
+from .results import Result
 
 REFERENCE = "lerp_slerp"
 """The state of the art in the paper: what the other modes are held against."""
@@ -83,23 +84,29 @@ class Summary:
         return self.errors[..., self.modes.index(mode)]
 
 
-def summarise(measured: Sequence[tuple[Reconstruction, Sequence[Metrics]]]) -> list[Summary]:
+def summarise(results: Iterable[Result]) -> list[Summary]:
     """Gather the rows of all clips and modes, a summary for each kind of choice that there is."""
-    kinds = dict.fromkeys(type(reconstruction.choice) for reconstruction, _ in measured)
-    return [_summary([one for one in measured if type(one[0].choice) is kind]) for kind in kinds]
+    # Of thousands of clips only these few numbers are kept.
+    gathered: dict[type[Choice], dict[tuple[str, Choice], dict[str, float]]] = {}
+    groupings: dict[type[Choice], dict[Groups, None]] = {}
+    for result in results:
+        kind = type(result.choice)
+        found = {row.mode: row.keys_per_s if kind is Tolerance else row.rms_shell_m for row in result.rows}
+        gathered.setdefault(kind, {})[result.clip, result.choice] = found
+        groupings.setdefault(kind, {})[result.groups] = None
+    return [_summary(found, joint_groups(groupings[kind])) for kind, found in gathered.items()]
 
 
-def _summary(measured: Sequence[tuple[Reconstruction, Sequence[Metrics]]]) -> Summary:
-    reconstructions = [reconstruction for reconstruction, _ in measured]
-    rows = [(reconstruction.choice, row) for reconstruction, some in measured for row in some]
-    clips = tuple(dict.fromkeys(row.clip for _, row in rows))
-    choices = tuple(sorted(dict.fromkeys(choice for choice, _ in rows), key=lambda choice: choice.size))
-    modes = tuple(dict.fromkeys(row.mode for _, row in rows))
+def _summary(found: Mapping[tuple[str, Choice], Mapping[str, float]], groups: Groups) -> Summary:
+    clips = tuple(dict.fromkeys(clip for clip, _ in found))
+    choices = tuple(sorted(dict.fromkeys(choice for _, choice in found), key=lambda choice: choice.size))
+    modes = tuple(dict.fromkeys(mode for errors in found.values() for mode in errors))
+    rows, layers, columns = ({one: place for place, one in enumerate(some)} for some in (clips, choices, modes))
     errors = np.full((len(clips), len(choices), len(modes)), np.nan)
-    for choice, row in rows:
-        found = row.keys_per_s if isinstance(choice, Tolerance) else row.rms_shell_m
-        errors[clips.index(row.clip), choices.index(choice), modes.index(row.mode)] = found
-    return Summary(clips, choices, modes, identical_modes(reconstructions), errors)
+    for (clip, choice), by_mode in found.items():
+        for mode, error in by_mode.items():
+            errors[rows[clip], layers[choice], columns[mode]] = error
+    return Summary(clips, choices, modes, groups, errors)
 
 
 def findings(summary: Summary, labels: dict[str, str]) -> list[str]:
@@ -111,6 +118,7 @@ def findings(summary: Summary, labels: dict[str, str]) -> list[str]:
         *_what_is_identical(summary, labels),
         *_compared_with_the_reference(summary, labels),
         *_keys_for_the_same_error(summary, labels),
+        *_what_choosing_gains(summary, labels),
         *_who_is_closest(summary, labels),
         *_extremes(summary, labels),
     ]
@@ -135,7 +143,7 @@ def _compared_with_the_reference(summary: Summary, labels: dict[str, str]) -> li
         if summary.reference in group or not np.isfinite(relative).any():
             continue
         changes = [
-            f"{_change(ratio)} {choice.at} {choice.amount}"
+            f"{compared(ratio)} {choice.at} {choice.amount}"
             for choice, ratio in zip(summary.choices, relative, strict=True)
             if np.isfinite(ratio)
         ]
@@ -170,9 +178,42 @@ def _keys_for_the_same_error(summary: Summary, labels: dict[str, str]) -> list[s
     ]
 
 
+def _what_choosing_gains(summary: Summary, labels: dict[str, str]) -> list[str]:
+    """The best mode of each segment beside the best single mode of each clip, by the error."""
+    if BEST_OF not in summary.modes or summary.kind is Tolerance:
+        return []
+    modes = single_modes(summary.modes)
+    single = np.stack([summary.of(mode) for mode in modes], axis=-1)
+    least = single.min(axis=-1)
+    ratios = np.divide(summary.of(BEST_OF), least, out=np.full_like(least, np.nan), where=least > NOTHING)
+    if not np.isfinite(ratios).any():
+        return []
+    changes = [
+        f"{compared(ratio)} {choice.at} {choice.amount}"
+        for choice, ratio in zip(summary.choices, np.exp(_mean_over_clips(np.log(ratios))), strict=True)
+        if np.isfinite(ratio)
+    ]
+    several = len(summary.clips) > 1
+    mean = f" (geometric mean over {len(summary.clips)} clips)" if several else ""
+    said = (
+        f"Choosing the best mode of each segment made the error {listed(changes)} {summary.kind.unit} compared with "
+        f"the best single mode{' of each clip' if several else ''}{mean}."
+    )
+    clip, choice = np.unravel_index(np.nanargmin(ratios), ratios.shape)
+    if several and (change := compared(ratios[clip, choice])) != SAME:
+        best = modes[int(single[clip, choice].argmin())]
+        said += (
+            f" It gained most on {summary.clips[clip]} {summary.choices[choice].phrase}: {change} than by "
+            f"{labels[best]}."
+        )
+    return [said]
+
+
 def _who_is_closest(summary: Summary, labels: dict[str, str]) -> list[str]:
-    errors = np.stack([summary.of(group[0]) for group in summary.groups], axis=-1)
-    names = [labels[group[0]] for group in summary.groups]
+    # What is chosen for being closest says nothing by being so.
+    groups = [group for group in summary.groups if group[0] != BEST_OF]
+    errors = np.stack([summary.of(group[0]) for group in groups], axis=-1)
+    names = [labels[group[0]] for group in groups]
     sentences, nothing = [], []
     best = "Fewest keys" if summary.kind is Tolerance else "Closest to the recording"
     for at, choice in enumerate(summary.choices):
@@ -194,18 +235,20 @@ def _who_is_closest(summary: Summary, labels: dict[str, str]) -> list[str]:
 
 
 def _extremes(summary: Summary, labels: dict[str, str]) -> list[str]:
-    if len(summary.clips) < 2 or not np.isfinite(summary.ratios).any():
+    modes = single_modes(summary.modes)
+    ratios = summary.ratios[..., [summary.modes.index(mode) for mode in modes]]
+    if len(summary.clips) < 2 or not np.isfinite(ratios).any():
         return []
     sentences = []
     article = "a" if summary.kind is Tolerance else "an"
     for place, title in (
-        (np.nanargmin(summary.ratios), "The largest gain over"),
-        (np.nanargmax(summary.ratios), "The largest loss to"),
+        (np.nanargmin(ratios), "The largest gain over"),
+        (np.nanargmax(ratios), "The largest loss to"),
     ):
-        clip, choice, mode = np.unravel_index(place, summary.ratios.shape)
-        change = _change(ratio := summary.ratios[clip, choice, mode])
+        clip, choice, mode = np.unravel_index(place, ratios.shape)
+        change = compared(ratio := ratios[clip, choice, mode])
         if change != SAME and (ratio < 1.0) == title.endswith("over"):
-            first = next(group[0] for group in summary.groups if summary.modes[mode] in group)
+            first = next(group[0] for group in summary.groups if modes[mode] in group)
             sentences.append(
                 f"{title} {labels[summary.reference]} was that of {labels[first]} on {summary.clips[clip]} "
                 f"{summary.choices[choice].phrase}: {article} {summary.what} {change}."
@@ -225,7 +268,8 @@ def _mean_over_clips(values: np.ndarray) -> np.ndarray:
     return np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
 
 
-def _change(ratio: float) -> str:
+def compared(ratio: float) -> str:
+    """A ratio as prose has it: "12 % lower"."""
     percent = round(abs(ratio - 1.0) * 100.0)
     return f"{percent}\u00a0% {'lower' if ratio < 1.0 else 'higher'}" if percent else SAME
 

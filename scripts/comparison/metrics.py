@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,12 +17,16 @@ import numpy as np
 from addon.motion import Poses
 from addon.motion.measures import rms
 
-from .files import write_text
+from .choices import Choice
+from .files import replacing
 from .modes import BEST_OF
 from .reconstructions import Reconstruction
 
 BYTES_PER_KEY = 7 * 8
 """A position and a quaternion, as doubles: what the paper sends for an update."""
+
+BLOCK = 10_000
+"""Rows of a table that are made at a time."""
 
 BYTES_PER_MODE = 1
 """What a key has in addition where every segment has a mode of its own."""
@@ -72,10 +75,10 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
 
     Notes
     -----
-    `bytes_per_s` is (keys - 1) / duration times 56 bytes, and one more for the mode under `best_of`. A recording that is thinned to 10 keys a second keeps fewer
-    where it has gaps or is slow itself, and it is what would be sent that counts. The first key is not counted, since
-    a stretch of the motion costs the key at its end: keys exactly a tenth of a second apart are 560 bytes a second for
-    any length of the clip.
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes, or 57 under `best_of`, whose keys say the mode. A recording
+    that is thinned to 10 keys a second keeps fewer where it has gaps or is slow itself, and it is what would be sent
+    that counts. The first key is not counted, since a stretch of the motion costs the key at its end: keys exactly a
+    tenth of a second apart are 560 bytes a second for any length of the clip.
 
     Raises
     ------
@@ -117,11 +120,10 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
 
 def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
     """Write `metrics.csv`: a header and a row for every clip, choice of keys and mode."""
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(field.name for field in dataclasses.fields(Metrics))
-    writer.writerows(dataclasses.astuple(row) for row in rows)
-    write_text(path, table.getvalue())
+    with replacing(path) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(field.name for field in dataclasses.fields(Metrics))
+        writer.writerows(dataclasses.astuple(row) for row in rows)
 
 
 def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
@@ -140,11 +142,26 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str
     if poses.scales is not None:
         columns.append(poses.scales)
         header += ",s"
-    lines = [",".join(map(repr, row)) for row in np.stack(columns, axis=-1).tolist()]
-    if modes:
-        header += ",mode"
-        lines = [f"{line},{mode}" for line, mode in zip(lines, (*modes, ""), strict=True)]
-    write_text(path, "\n".join([header, *lines, ""]))
+    with replacing(path) as stream:
+        stream.write(f"{header},mode\n" if modes else f"{header}\n")
+        # Numbers take many times their memory as text, and a recording may have hours of them.
+        for first in range(0, len(times), BLOCK):
+            rows = np.stack([column[first : first + BLOCK] for column in columns], axis=-1).tolist()
+            lines = [",".join(map(repr, row)) for row in rows]
+            if modes:
+                lines = [
+                    f"{line},{mode}" for line, mode in zip(lines, (*modes, "")[first : first + BLOCK], strict=True)
+                ]
+            stream.write("\n".join([*lines, ""]))
+
+
+def table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
+    """The files that `write_reconstruction` writes for a choice of keys."""
+    modes = tuple(modes)
+    keys = {f"{mode}.keys.csv": mode for mode in modes}
+    if choice.decimation == "uniform":
+        keys = {"keys.csv": ""} | ({f"{BEST_OF}.keys.csv": BEST_OF} if BEST_OF in modes else {})
+    return [*(f"{mode}.csv" for mode in modes), *keys]
 
 
 def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:

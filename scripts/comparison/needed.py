@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -175,6 +176,20 @@ def _between(clip: Clip, keys: np.ndarray) -> Clip:
     """The part of a clip from the first key to the last."""
     part = slice(int(keys[0]), int(keys[-1]) + 1)
     return replace(clip, times=clip.times[part], poses=clip.poses[part])
+
+
+def to_json(found: KeysNeeded) -> str:
+    """As text, of which `from_json` makes it again."""
+    content = {name: one.tolist() if isinstance(one, np.ndarray) else one for name, one in vars(found).items()}
+    return json.dumps(content, indent=1) + "\n"
+
+
+def from_json(text: str) -> KeysNeeded:
+    """What `to_json` wrote."""
+    content = json.loads(text)
+    groups, rates = tuple(map(tuple, content.pop("groups"))), tuple(content.pop("rates"))
+    clip = content.pop("clip")
+    return KeysNeeded(clip, groups, rates, **{name: np.array(one, dtype=float) for name, one in content.items()})
 
 
 # -- over all clips ---------------------------------------------------------------------------------------------------

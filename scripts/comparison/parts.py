@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .charts import Curve
+from .charts import Axis, Curve
 from .markup import Content, Markup, element
 from .modes import label_of as label
 from .palette import colour_of
@@ -15,6 +15,11 @@ from .palette import colour_of
 def curve(group: Sequence[str], x: np.ndarray, y: np.ndarray) -> Curve:
     """The curve that modes share."""
     return Curve(tuple(map(label, group)), x, y, colour_of(group[0]))
+
+
+def rate_axis(rates: np.ndarray) -> Axis:
+    """Rates as an axis, with a tick at each."""
+    return Axis("rate", "keys/s", float(rates.min()), float(rates.max()), ticks=tuple(rates))
 
 
 def swatch(mode: str) -> Markup:

@@ -35,6 +35,11 @@ class Stage:
         self.done = min(self.done + steps, self.total)
         self.say(self.doing if doing is None else doing)
 
+    def reach(self, done: float, doing: str | None = None) -> None:
+        """Count so many steps as done in all, also fewer than before: work was lost, and is done again."""
+        self.done = min(done, self.total)
+        self.say(self.doing if doing is None else doing)
+
     def say(self, doing: str) -> None:
         """Say what is being done within the stage: "frame 17 of 120"."""
         self.doing = doing
@@ -68,7 +73,7 @@ class Progress:
         self._coloured = self._live and not environ.get("NO_COLOR") and (os.name != "nt" or "WT_SESSION" in environ)
         self._blocks = _encodes(self._stream, "▕█▉▊▋▌▍▎▏")
         self._stages: list[tuple[Stage, float]] = []
-        self._started = self._clock()
+        self._started = self._stage_started = self._clock()
         self._shown_at: float | None = None
         self._shown_columns = 0
 
@@ -86,8 +91,10 @@ class Progress:
     def stage(self, title: str, total: float, *, weight: float = 1.0) -> Iterator[Stage]:
         """Open a stage of `total` steps. Inside another stage it makes up `weight` of that one's steps."""
         stage = Stage(title, total, self._redraw)
+        if not self._stages:
+            self._stage_started = self._clock()
         self._stages.append((stage, weight))
-        self._redraw(now=len(self._stages) == 1)
+        self._redraw(now=len(self._stages) == 1 and total > 0.0)
         try:
             yield stage
             stage.done = total
@@ -144,12 +151,13 @@ class Progress:
             return 80
 
     def _times(self) -> str:
-        elapsed, fraction = self._clock() - self._started, self.fraction
+        now, fraction = self._clock(), self.fraction
+        elapsed, in_stage = now - self._started, now - self._stage_started
         if fraction >= 1.0:
             return f"done in {_duration(elapsed)}"
         if fraction <= 0.0:
             return _duration(elapsed)
-        return f"{_duration(elapsed)}, {_duration(elapsed / fraction - elapsed)} left"
+        return f"{_duration(elapsed)}, {_duration(in_stage / fraction - in_stage)} left"
 
     def _doing(self) -> str:
         words = [word for stage, _ in self._stages for word in (stage.title, stage.doing) if word]

@@ -5,16 +5,19 @@ Times and poses are the clip's, errors are in metres (`clips`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from addon.motion import Errors, Poses, interpolate, interpolate_by_segments, shell_error
+from addon.motion import Errors, Poses, interpolate, interpolate_by_segments, rms, shell_error
 
 from .choices import Choice
 from .clips import Clip
-from .modes import BEST_OF
+from .modes import BEST_OF, single_modes
+
+Groups = tuple[tuple[str, ...], ...]
+"""Modes, those together that are one motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,11 @@ class Reconstruction:
         """The times of `samples`."""
         return self.clip.times[self.samples]
 
+    @property
+    def best_mode(self) -> str:
+        """The best single mode: with the fewest keys, and of those with the least RMS shell error."""
+        return min(single_modes(self.keys), key=lambda mode: (len(self.keys[mode]), rms(self.errors[mode].shell)))
+
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
         """What a mode makes of its keys at any times."""
         key_times, keys = self.clip.times[self.keys[mode]], self.clip.poses[self.keys[mode]]
@@ -60,16 +68,33 @@ class Reconstruction:
         return interpolate(key_times, keys, times, mode)
 
 
-def identical_modes(reconstructions: Sequence[Reconstruction]) -> tuple[tuple[str, ...], ...]:
+def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:
     """The modes in groups that gave the same poses in all of these reconstructions.
 
     The same means: apart by less than a millionth of their error, by the shell measure, or than what rounding does.
     Some modes are one curve by theory (ScLERP and the SLERP of motors); this looks whether they were.
     """
+    return joint_groups([_groups(reconstruction) for reconstruction in reconstructions])
+
+
+def joint_groups(groupings: Iterable[Groups]) -> Groups:
+    """The modes in groups that are together in all of these groupings of the same modes."""
+    places: dict[str, list[int]] = {}
+    for groups in groupings:
+        for place, group in enumerate(groups):
+            for mode in group:
+                places.setdefault(mode, []).append(place)
+    joint: dict[tuple[int, ...], list[str]] = {}
+    for mode, where in places.items():
+        joint.setdefault(tuple(where), []).append(mode)
+    return tuple(map(tuple, joint.values()))
+
+
+def _groups(reconstruction: Reconstruction) -> Groups:
     groups: list[list[str]] = []
-    for mode in dict.fromkeys(mode for reconstruction in reconstructions for mode in reconstruction.poses):
+    for mode in reconstruction.poses:
         for group in groups:
-            if all(_same(reconstruction, group[0], mode) for reconstruction in reconstructions):
+            if _same(reconstruction, group[0], mode):
                 group.append(mode)
                 break
         else:
@@ -78,8 +103,6 @@ def identical_modes(reconstructions: Sequence[Reconstruction]) -> tuple[tuple[st
 
 
 def _same(reconstruction: Reconstruction, first: str, second: str) -> bool:
-    if first not in reconstruction.poses or second not in reconstruction.poses:
-        return False
     poses, others = (reconstruction.clip.in_metres(reconstruction.poses[mode]) for mode in (first, second))
     rounding = 1e-12 * (1.0 + np.abs(poses.positions).max())
     apart = shell_error(poses, others).max()

@@ -108,14 +108,14 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
         traced=layout.telling_point(motion.recording, outline),
     )
 
-    frame = _make_frame(plan.metres)
+    frame = make_frame(plan.metres)
     lanes = Lanes(cast, frame)
     for mode, cell in zip(motion.modes, plan.cells, strict=True):
         lanes.build(mode, cell)
     _make_header(reconstruction, settings, cast, lanes, magnification)
-    _make_camera(scene, plan.metres, depth=float(high[2] - low[2]))
-    _make_lights(scene)
-    _set_up_render(scene, settings, timeline.count)
+    make_camera(scene, plan.metres, depth=float(high[2] - low[2]))
+    make_lights(scene)
+    set_up_render(scene, settings, timeline.count)
     scene["recording_centre_m"] = motion.centre.tolist()
     scene["recording_start_s"] = timeline.start
     return scene
@@ -149,7 +149,7 @@ def _notes(reconstruction: Reconstruction) -> dict[str, str]:
     return {mode: f"{(count - 1) / duration:.1f} keys/s on average" for mode, count in counts.items()}
 
 
-def _make_frame(metres: float) -> bpy.types.Object:
+def make_frame(metres: float) -> bpy.types.Object:
     """The plane of the picture, behind everything that moves."""
     frame = bpy.data.objects.new("Frame", None)
     frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
@@ -193,7 +193,7 @@ def _make_header(
     put(captions.words("Legend", legend, size, lanes.faint), left, -0.5 + layout.MARGIN + 0.002)
 
 
-def _make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
+def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
     """A camera square to the frame, in front of all that moves, with parallel rays."""
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
@@ -207,7 +207,7 @@ def _make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
     camera.data.clip_end = depth + 1.5 * metres
 
 
-def _make_lights(scene: bpy.types.Scene) -> None:
+def make_lights(scene: bpy.types.Scene) -> None:
     """Two suns for EEVEE and Cycles. Workbench brings its own light."""
     for name, strength, pitch, yaw in (("Key light", 3.0, 40.0, -35.0), ("Fill light", 1.2, 60.0, 50.0)):
         light = bpy.data.lights.new(name, "SUN")
@@ -218,7 +218,10 @@ def _make_lights(scene: bpy.types.Scene) -> None:
         scene.collection.objects.link(obj)
 
 
-def _set_up_render(scene: bpy.types.Scene, settings: StageSettings, frames: int) -> None:
+def set_up_render(
+    scene: bpy.types.Scene, settings: StageSettings, frames: int, background: str = palette.BACKGROUND
+) -> None:
+    """Engine, size, colours and encoder of a scene of so many frames."""
     scene.frame_start, scene.frame_end = 1, frames
     scene.frame_set(1)
     render = scene.render
@@ -227,7 +230,7 @@ def _set_up_render(scene: bpy.types.Scene, settings: StageSettings, frames: int)
     render.fps, render.fps_base = settings.fps, 1.0
     render.engine = _engine_id(settings.engine)
     scene.view_settings.view_transform = "Standard"
-    _set_background(scene)
+    _set_background(scene, background)
     _set_up_video(scene)
     scene.display.render_aa = settings.antialiasing or ("FXAA" if render.resolution_y < SMALL_PICTURE else "OFF")
     shading = scene.display.shading
@@ -252,13 +255,14 @@ def _set_up_video(scene: bpy.types.Scene) -> None:
     video.ffmpeg_preset = "REALTIME"
     video.gopsize = scene.render.fps
     scene.render.use_file_extension = True
+    scene.render.use_stamp_date = False  # The same film is the same file, whenever it is made.
     scene.render.filepath = "//comparison.mp4"
 
 
-def _set_background(scene: bpy.types.Scene) -> None:
+def _set_background(scene: bpy.types.Scene, background: str) -> None:
     """One colour, for Workbench and for the others."""
     scene.world = bpy.data.worlds.new("World")
-    colour = palette.linear(palette.BACKGROUND)
+    colour = palette.linear(background)
     scene.world.color = colour
     if scene.world.node_tree is None:  # Blender 5 makes it, and warns of the switch.
         scene.world.use_nodes = True

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from addon.motion import best_modes, interpolate, interpolate_by_segments, measure, repair, rms
+from addon.motion import best_modes, measure, repair
 from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
 
 from .choices import Choice, Uniform
@@ -19,7 +19,7 @@ from .reconstructions import Reconstruction, identical_modes
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
 
-NOT_FOLDERS = {"metrics.csv", "keys_needed.csv", "report.html", *["con", "prn", "aux", "nul"]} | {
+NOT_FOLDERS = {"metrics.csv", "keys_needed.csv", "report.html", "manifest.json", *["con", "prn", "aux", "nul"]} | {
     f"{device}{digit}" for device in ("com", "lpt") for digit in range(1, 10)
 }
 """Names that the output needs itself, or that Windows keeps for devices."""
@@ -49,17 +49,23 @@ def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]
     TrajectoryError
         For the first source that cannot be read, or of which fewer than two poses are left.
     """
-    clips: list[Clip] = []
-    notes: list[str] = []
-    for source in sources:
-        recording = read_trajectories(source)
-        if recording.note:
-            notes.append(recording.note)
-        stem = recording.path.stem
-        for trajectory in recording.trajectories:
-            name = f"{stem}-{trajectory.name}" if len(recording.trajectories) > 1 else stem
-            clips.append(make_clip(trajectory, source, folder_name(name, [clip.name for clip in clips]), axes))
-    return clips, notes
+    read = [read_source(source, axes) for source in sources]
+    clips = [clip for some, _ in read for clip in some]
+    names = folder_names(clip.name for clip in clips)
+    return [replace(clip, name=name) for clip, name in zip(clips, names, strict=True)], [
+        note for _, note in read if note
+    ]
+
+
+def read_source(source: str, axes: str) -> tuple[list[Clip], str]:
+    """The clips of one source, repaired but not yet told apart by their names, and a note on it, which may be empty."""
+    recording = read_trajectories(source)
+    stem, several = recording.path.stem, len(recording.trajectories) > 1
+    clips = [
+        make_clip(trajectory, source, f"{stem}-{trajectory.name}" if several else stem, axes)
+        for trajectory in recording.trajectories
+    ]
+    return clips, recording.note
 
 
 def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip:
@@ -71,20 +77,26 @@ def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip
     return Clip(name, source, axes, times, poses, tuple(map(str, repairs)), trajectory.metres_per_unit)
 
 
-def folder_name(wanted: str, taken: Iterable[str]) -> str:
-    """A name like the one wanted that is safe for a folder on every system, and unlike those that are taken.
+def folder_names(wanted: Iterable[str]) -> list[str]:
+    """Names like those wanted that are safe for folders on every system, each unlike all before it.
 
     Letters and digits of any script stay, and so do dots inside, dashes and underscores. Case makes no difference.
     """
-    safe = re.sub(r"[^\w.-]+", "_", wanted)[:LONGEST_NAME].strip("._ ") or "clip"
-    unavailable = NOT_FOLDERS | {name.casefold() for name in taken}
-    # Windows takes "nul.txt" for the device too.
-    if safe.casefold() in unavailable or safe.casefold().split(".")[0] in NOT_FOLDERS:
-        number = 2
-        while f"{safe}-{number}".casefold() in unavailable:
-            number += 1
-        return f"{safe}-{number}"
-    return safe
+    names: list[str] = []
+    unavailable, numbers = set(NOT_FOLDERS), {}
+    for name in wanted:
+        safe = re.sub(r"[^\w.-]+", "_", name)[:LONGEST_NAME].strip("._ ") or "clip"
+        folded = safe.casefold()
+        # Windows takes "nul.txt" for the device too.
+        if folded in unavailable or folded.split(".")[0] in NOT_FOLDERS:
+            number = numbers.get(folded, 2)
+            while f"{folded}-{number}" in unavailable:
+                number += 1
+            numbers[folded] = number + 1
+            safe, folded = f"{safe}-{number}", f"{folded}-{number}"
+        unavailable.add(folded)
+        names.append(safe)
+    return names
 
 
 def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float) -> Reconstruction | None:
@@ -121,33 +133,29 @@ def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float)
 
 
 def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
-    """The same with `BEST_OF` its modes, which has the keys of the best of them: the fewest, then the least error."""
-    clip, modes = made.clip, tuple(made.keys)
-    kept = made.keys[min(modes, key=lambda mode: (len(made.keys[mode]), rms(made.errors[mode].shell)))]
+    """The same with `BEST_OF` its modes, which has the keys of the best single one."""
+    clip, kept = made.clip, made.keys[made.best_mode]
     tolerance = made.choice.tolerance(clip)
     unit = clip.metres_per_unit
     chosen = best_modes(
-        clip.times, clip.poses, kept, modes, radius / unit, None if tolerance is None else tolerance / unit
+        clip.times, clip.poses, kept, made.keys, radius / unit, None if tolerance is None else tolerance / unit
     )
-    poses = interpolate_by_segments(clip.times[kept], clip.poses[kept], made.times, chosen)
-    errors = measure(made.times, clip.in_metres(poses), clip.in_metres(clip.poses[made.samples]), radius)
-    return replace(
-        made,
-        keys=made.keys | {BEST_OF: kept},
-        poses=made.poses | {BEST_OF: poses},
-        errors=made.errors | {BEST_OF: errors},
-        segment_modes=chosen,
-    )
+    best = fill_in(clip, made.choice, {BEST_OF: kept}, radius, chosen)
+    return replace(best, keys=made.keys | best.keys, poses=made.poses | best.poses, errors=made.errors | best.errors)
 
 
-def fill_in(clip: Clip, choice: Choice, keys: dict[str, np.ndarray], radius: float) -> Reconstruction:
-    """What each mode makes of its keys, at least two, which begin and end with the same samples."""
-    ends = next(iter(keys.values()))
-    samples = slice(int(ends[0]), int(ends[-1]) + 1)
-    times, truth = clip.times[samples], clip.in_metres(clip.poses[samples])
-    poses = {mode: interpolate(clip.times[kept], clip.poses[kept], times, mode) for mode, kept in keys.items()}
+def fill_in(
+    clip: Clip, choice: Choice, keys: dict[str, np.ndarray], radius: float, segment_modes: tuple[str, ...] = ()
+) -> Reconstruction:
+    """What each mode makes of its keys, at least two, which begin and end with the same samples.
+
+    `BEST_OF` among them has the modes of its segments from `segment_modes`.
+    """
+    made = Reconstruction(clip, choice, keys, {}, {}, segment_modes)
+    times, truth = made.times, clip.in_metres(clip.poses[made.samples])
+    poses = {mode: made.filled_in(mode, times) for mode in keys}
     errors = {mode: measure(times, clip.in_metres(filled), truth, radius) for mode, filled in poses.items()}
-    return Reconstruction(clip, choice, keys, poses, errors)
+    return replace(made, poses=poses, errors=errors)
 
 
 def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tuple[str, ...], ...]:

@@ -36,12 +36,12 @@ def load_subject(wanted: str) -> bpy.types.Mesh:
     SubjectError
         Where the file, the object or its faces are missing.
     """
-    if wanted in MODELS:
-        return _read_mesh(MODELS_FILE, MODELS[wanted])
-    file, colon, name = wanted.rpartition(":")
-    if not colon or not file.lower().endswith(".blend"):
-        raise SubjectError(f"object {wanted!r}: give {', '.join(MODELS)} or file.blend:Name")
-    return _read_mesh(Path(file), name)
+    return _read_mesh(*_file_and_name(wanted))
+
+
+def file_of_subject(wanted: str) -> Path:
+    """The file that an object is in, whether or not it is there. Raises SubjectError where no object is named."""
+    return _file_and_name(wanted)[0]
 
 
 def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -70,6 +70,15 @@ def _plain(name: str) -> str:
     """The name without the number that Blender adds to make it unique."""
     stem, dot, number = name.rpartition(".")
     return stem if dot and number.isdecimal() else name
+
+
+def _file_and_name(wanted: str) -> tuple[Path, str]:
+    if wanted in MODELS:
+        return MODELS_FILE, MODELS[wanted]
+    file, colon, name = wanted.rpartition(":")
+    if not colon or not file.lower().endswith(".blend"):
+        raise SubjectError(f"object {wanted!r}: give {', '.join(MODELS)} or file.blend:Name")
+    return Path(file), name
 
 
 def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:

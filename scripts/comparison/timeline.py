@@ -41,9 +41,14 @@ class Timeline:
     def of(cls, reconstruction: Reconstruction, fps: int, slow_motion: float) -> Timeline:
         """All frames from the first key to the last, `slow_motion` times slower than life."""
         times = reconstruction.times
+        return cls.between(float(times[0]), float(times[-1]), fps, slow_motion)
+
+    @classmethod
+    def between(cls, start: float, end: float, fps: int, slow_motion: float) -> Timeline:
+        """All frames between two moments of a clip."""
         rate = fps * slow_motion
-        count = math.floor((times[-1] - times[0]) * rate + 1e-6) + 1
-        return cls(float(times[0]), count, rate, max(1, math.ceil(PATH_RATE / fps)))
+        count = math.floor((end - start) * rate + 1e-6) + 1
+        return cls(start, count, rate, max(1, math.ceil(PATH_RATE / fps)))
 
     @property
     def frames(self) -> np.ndarray:
@@ -101,9 +106,7 @@ class ShownMotion:
         centre = (recording.positions.min(axis=0) + recording.positions.max(axis=0)) / 2.0
         return cls(
             recording=_around(centre, recording),
-            modes={
-                mode: _around(centre, shown(reconstruction.filled_in(mode, times))) for mode in kept
-            },
+            modes={mode: _around(centre, shown(reconstruction.filled_in(mode, times))) for mode in kept},
             keys={mode: _around(centre, shown(poses)) for mode, poses in keys.items()},
             key_frames={mode: timeline.frames_of(moments) for mode, moments in key_times.items()},
             centre=centre,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -21,13 +22,15 @@ from addon.animation import (
     radius_of,
     read_poses,
     reduce_keys_of,
+    reducing,
     reduction_of,
     restore_keys,
     set_mode,
     unbake,
     write_channel,
 )
-from addon.motion import KEYFRAME_MODES, Poses, interpolate, repair, shell_error
+from addon.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
+from addon.motion.quaternions import multiply
 from scripts.trajectories import read_trajectories
 from tests.animation.oracle import curves_of, rotation_path, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
@@ -85,6 +88,101 @@ def test_every_mode_gets_the_keys_that_it_needs(live_file, mode):
     assert keys_of(obj, "rigid_motion.mode") == key_frames(obj).tolist()
     assert set(modes_of(obj, key_frames(obj))) == {mode}
     assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+
+
+def best_of(obj: bpy.types.Object, mode: str = "motor_spline", tolerance: float = TOLERANCE):
+    """Reduce with the best mode of each segment: the frames of the keys, and the modes of the segments."""
+    reduction = reduce_keys_of(obj, mode, tolerance, RADIUS, best_of=True)
+    kept = key_frames(obj)
+    modes = modes_of(obj, kept[:-1])
+    assert reduction.segments == {mode: modes.count(mode) for mode in modes}
+    return kept, modes
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
+@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+@pytest.mark.parametrize("name", ["pivot", "throw"])
+def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, name, mode, rotation_mode):
+    obj = recorded(name, rotation_mode)
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
+    single, wanted = key_frames(obj), shell_error(read_poses(obj, frames), truth, RADIUS)
+    restore_keys(obj)
+    kept, modes = best_of(obj, mode)
+    assert kept.tolist() == single.tolist() == keys_of(obj, "rigid_motion.mode")
+    assert len(set(modes)) > 1
+    shown = read_poses(obj, frames)
+    keys = truth[np.isin(frames, kept)]
+    assert shell_error(shown, interpolate_by_segments(kept, keys, frames, modes), RADIUS).max() < 5e-6
+    error = shell_error(shown, truth, RADIUS)
+    assert np.mean(error**2) < np.mean(wanted**2)
+    assert error.max() <= TOLERANCE * (1.0 + 1e-5)
+    assert reduction_of(obj).largest_error == pytest.approx(error.max(), abs=1e-6)
+    for first, last, chosen in zip(kept[:-1], kept[1:], modes, strict=True):
+        inside = (frames > first) & (frames < last)
+        for other in KEYFRAME_MODES:
+            errors = shell_error(interpolate(kept, keys, frames[inside], other), truth[inside], RADIUS)
+            if inside.any() and errors.max() <= TOLERANCE:
+                least = np.sqrt(np.mean(errors**2))
+                assert np.sqrt(np.mean(error[inside] ** 2)) <= least + 5e-6, (first, chosen, other)
+
+
+def test_a_screw_and_a_straight_flight_get_their_own_modes(live_file):
+    frames = np.arange(1.0, 202.0)
+    turning, flying = np.minimum(frames - 1.0, 100.0), np.maximum(frames - 101.0, 0.0)
+    turn, place = twists.exponential(np.outer((0.01, 0.03, -0.01, 0.02, 0.01, 0.02), turning))
+    spin, _ = twists.exponential(np.outer((0.03, 0.0, 0.02, 0.0, 0.0, 0.0), flying))
+    poses = Poses(place.T + np.outer(flying, (0.05, 0.02, 0.01)), multiply(spin.T, turn.T))
+    obj = new_object()
+    bake_poses(obj, frames, poses)
+    kept, modes = best_of(obj, "pga_lerp", 0.02)
+    assert len(kept) > 4
+    for first, last, mode in zip(kept[:-1], kept[1:], modes, strict=True):
+        if last <= 101.0:
+            assert mode == "dq_sclerp"
+        if first >= 101.0:
+            assert mode == "lerp_slerp"
+
+
+def test_modes_that_are_one_motion_stay_the_one_that_was_asked_for(live_file):
+    _, modes = best_of(recorded("screw"), "pga_slerp")
+    assert "pga_slerp" in modes
+    assert not {"dq_sclerp", "cga_slerp"} & set(modes)
+
+
+def test_what_grows_gets_its_best_modes_too(live_file):
+    frames, poses = motion()
+    obj = new_object()
+    bake_poses(obj, frames, Poses(poses.positions, poses.quaternions, np.exp(0.01 * frames)))
+    truth = read_poses(obj, frames)
+    kept, modes = best_of(obj)
+    keys = truth[np.isin(frames, kept)]
+    shown = read_poses(obj, frames)
+    expected = interpolate_by_segments(kept, keys, frames, modes)
+    assert len(set(modes)) > 1
+    assert shell_error(shown, expected, RADIUS).max() < 1e-5
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+
+
+def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(live_file, monkeypatch):
+    # Seen with no motion yet; only cycles of different lengths could come to it.
+    monkeypatch.setattr(reducing, "_with_best_modes", lambda source, *_: replace(source, mode=1))
+    obj = recorded()
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    assert best_of(obj)[1][0] == "motor_spline"
+    assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
+
+
+def test_keys_with_the_best_modes_give_way_to_all_that_was_there(live_file):
+    obj = recorded()
+    set_mode(obj, "pga_lerp", [11.0])
+    before = snapshot(obj)
+    best_of(obj)
+    assert snapshot(obj) != before
+    restore_keys(obj)
+    assert snapshot(obj) == before
 
 
 def test_the_keys_are_those_of_the_mode_and_too_few_for_another(live_file):
@@ -278,7 +376,8 @@ def test_a_scale_that_differs_from_axis_to_axis_keeps_its_keys_and_the_motion_ke
     assert reduction.after == len(key_frames(obj)) < reduction.before
 
 
-def test_cycles_go_on_as_before(live_file):
+@pytest.mark.parametrize("best_of", [False, True])
+def test_cycles_go_on_as_before(live_file, best_of):
     obj = new_object()
     frames, poses = motion("screw")
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 500
@@ -287,8 +386,9 @@ def test_cycles_go_on_as_before(live_file):
         fcurve.modifiers.new("CYCLES")
     seen = np.arange(0.0, 501.0)
     truth = read_poses(obj, seen)
-    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS, best_of=best_of)
     assert reduction.after < 0.5 * reduction.before
+    assert (len(reduction.segments) > 1) == best_of
     assert off(obj, seen, truth) <= TOLERANCE * (1.0 + 1e-5)
 
 

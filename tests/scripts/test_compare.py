@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+import bpy
 import numpy as np
 import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
@@ -19,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
-from scripts.comparison.study import folder_name
+from scripts.comparison.study import folder_names
 from tests.recordings import RECORDINGS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,8 +32,18 @@ COLUMNS = (
 SMALL = ["--resolution", "160x90", "--fps", "6"]
 
 
+OWN = (".parts", ".workplan")
+"""Folders of the program's own in an output folder."""
+
+
 def run(*arguments: object) -> int:
-    return compare.main([str(argument) for argument in arguments])
+    """Run the program in this process, which is quicker for a little work."""
+    return compare.main(["--jobs", "0", *map(str, arguments)])
+
+
+def shown(folder: Path) -> list[Path]:
+    """What lies in an output folder for people."""
+    return sorted(path for path in folder.iterdir() if path.name not in (*OWN, "manifest.json"))
 
 
 def exit_code(*arguments: object) -> int:
@@ -220,9 +231,12 @@ def test_screws_are_pytransform3ds_between_the_written_keys(measured):
 
 def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_clip, tmp_path, capsys):
     assert run(short_clip, "--output", tmp_path, "--rates", "10", *SMALL) == 0
-    written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
+    files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
+    written = {str(path) for path in files if path.parts[0] not in OWN}
     tables = {f"toss/10/{name}.csv" for name in ("keys", *KEYFRAME_MODES)}
-    assert written == tables | {"metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend"}
+    assert written == tables | {
+        *("manifest.json", "metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend")
+    }
     assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
 
 
@@ -242,12 +256,12 @@ def test_clips_of_one_name_get_folders_of_their_own(short_clip, tmp_path):
     other.parent.mkdir()
     shutil.copy(short_clip, other)
     assert run(short_clip, other, short_clip, "--no-video", "--output", tmp_path / "out", "--rates", "5") == 0
-    assert sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir()) == ["Toss-2", "toss", "toss-3"]
+    assert [path.name for path in shown(tmp_path / "out") if path.is_dir()] == ["Toss-2", "toss", "toss-3"]
 
 
 @pytest.mark.parametrize("name", ["..", "a b", "con", "report.html", "<script>", "-", "übung", "x" * 300])
 def test_names_of_clips_are_safe(name):
-    folder = folder_name(name, [])
+    (folder,) = folder_names([name])
     assert re.fullmatch(r"[\w.-]{1,85}", folder)
     assert folder not in (".", "..", "con", "report.html")
 
@@ -349,14 +363,17 @@ def test_ctrl_c_while_rendering_leaves_a_report_and_no_half_video(tmp_path):
     command = [sys.executable, ROOT / "scripts" / "compare.py", "--output", tmp_path, "--rates", "5", "--fps", "60"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     waited = time.monotonic() + 120
-    while not list(tmp_path.glob("*/5/.*comparison.mp4")) and time.monotonic() < waited:
+    while not list(tmp_path.glob(".workplan/scratch/*/**/*.mkv")) and time.monotonic() < waited:
         assert process.poll() is None
         time.sleep(0.05)
+    interrupted = time.monotonic()
     process.send_signal(signal.SIGINT)
     printed, _ = process.communicate(timeout=60)
+    assert time.monotonic() - interrupted < 2.0
     assert process.returncode == 130
     assert Path(printed.splitlines()[-1]).is_file()
     assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
+    assert not (tmp_path / ".workplan" / "scratch").exists()
     assert len(list(tmp_path.rglob("*.mp4"))) < 4
 
 
@@ -384,3 +401,36 @@ def test_real_recordings_run(name, tmp_path, capsys):
         assert "gaps" in said
     for row in rows_of(tmp_path / "metrics.csv"):
         assert 0.0 < float(row["rms_shell_m"]) < 0.5
+
+
+def test_the_best_of_each_segment_is_compared_with_the_modes_it_is_made_of(short_clip, tmp_path):
+    asked = ("--decimate", "adaptive", "--tolerance", "5mm", "--rates", "8", "--modes", "best_of, all")
+    assert run(short_clip, "--no-video", "--output", tmp_path, *asked) == 0
+    rows = rows_of(tmp_path / "metrics.csv")
+    assert [row["mode"] for row in rows] == [*KEYFRAME_MODES, "best_of"] * 2
+    for choice in (rows[:8], rows[8:]):
+        *single, best = choice
+        same = [float(row["rms_shell_m"]) for row in single if row["keys"] == min(one["keys"] for one in single)]
+        assert float(best["rms_shell_m"]) <= min(same) * (1.0 + 1e-6)
+    assert float(rows[-1]["max_shell_m"]) <= 0.005 * (1.0 + 1e-9)
+    keys = rows_of(tmp_path / "toss" / "8" / "best_of.keys.csv")
+    assert {row["mode"] for row in keys[:-1]} <= set(KEYFRAME_MODES)
+    assert keys[-1]["mode"] == ""
+    # Which keys a mode needs is a question to single modes.
+    assert "best_of" not in {row["mode"] for row in rows_of(tmp_path / "keys_needed.csv")}
+
+
+def test_the_best_of_each_segment_has_a_lane_in_the_video(short_clip, tmp_path):
+    asked = ("--rates", "8", "--modes", "lerp_slerp,motor_spline,best_of")
+    assert run(short_clip, "--output", tmp_path, *asked, *SMALL) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "toss" / "8" / "comparison.blend"))
+    assert bpy.data.objects["best_of label"].data.body == "Best per Segment"
+    assert {"lerp_slerp", "motor_spline", "best_of"} <= set(bpy.data.objects.keys())
+
+
+@pytest.mark.parametrize("modes", ["best_of", "best_of,dq_sclerp"])
+def test_the_best_of_fewer_than_two_modes_is_refused(modes, capsys):
+    assert exit_code("--modes", modes) == 2
+    assert "best_of chooses among the other modes that are named: name two or more, or all,best_of" in (
+        capsys.readouterr().err
+    )

@@ -17,7 +17,7 @@ from addon.animation import (
     reduction_of,
     set_enabled,
 )
-from addon.motion import Poses, interpolate, shell_error
+from addon.motion import MODES, Poses, interpolate, shell_error
 from addon.ui.operators import CLASSES
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
@@ -241,6 +241,23 @@ def test_reducing_says_what_became_of_the_keys(extension, capfd):
     said = capfd.readouterr().out
     assert f"Tool: 251 keys became {reduction.after}, largest error " in said
     assert set(modes_of(obj, key_frames(obj))) == {"motor_spline"}
+
+
+def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension, capfd):
+    obj = recorded()
+    before = values(obj)
+    bpy.ops.ed.undo_push(message="recording")
+    assert operators.reduce_keys(mode="lerp_slerp", tolerance=0.1, radius=0.5, best_of=True) == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="reduction")
+    segments = reduction_of(obj).segments
+    assert sum(segments.values()) == len(key_frames(obj)) - 1
+    assert len(segments) > 1
+    said = capfd.readouterr().out
+    assert "; segments: " in said
+    for mode, count in segments.items():
+        assert f"{count} {MODES[mode].label}" in said
+    bpy.ops.ed.undo()
+    assert values(bpy.data.objects["Tool"]) == before
 
 
 def test_all_selected_objects_are_reduced_and_one_that_cannot_be_is_named(extension, capfd):

@@ -1,11 +1,12 @@
-"""A recording reduced to few keys by a button, with another tolerance in the redo panel, undone, and restored."""
+"""A recording reduced to few keys by a button, other settings in the redo panel, all of it undone, and restored."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-from addon.motion import Poses, interpolate
+from addon.animation import key_frames, modes_of
+from addon.motion import Poses, interpolate_by_segments
 from tests.animation.oracle import curves_of, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
@@ -15,6 +16,9 @@ CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-
 
 REDO_ROWS = 44
 """Pixels from the top of the redo panel to the middle of its first row."""
+
+REDO_ROW = 22
+"""Pixels from there to the next row."""
 
 
 def cube() -> bpy.types.Object:
@@ -26,6 +30,11 @@ def keys() -> int:
     return len(curves_of(cube())["location", 0].keyframe_points)
 
 
+def modes() -> set[str]:
+    """Those of all segments."""
+    return set(modes_of(cube(), key_frames(cube())[:-1]))
+
+
 def off(truth: np.ndarray) -> float:
     """How far any corner of the cube is off on any frame: by less than twice the error at three points as far out."""
     moved = (shown_worlds([cube()], FRAMES)[0] - truth) @ CORNERS
@@ -33,10 +42,11 @@ def off(truth: np.ndarray) -> float:
 
 
 def record() -> None:
-    """A key on every frame of the cube, as imported motion capture has it."""
+    """A key on every frame of the cube, as imported motion capture has it: first it swings, then it goes straight."""
     random = np.random.default_rng(3)
     poses = Poses(random.normal(size=(9, 3)), random.normal(size=(9, 4)))
-    moved = interpolate(np.linspace(1.0, 251.0, 9), poses, FRAMES, "motor_spline")
+    modes = ["motor_spline"] * 4 + ["lerp_slerp"] * 4
+    moved = interpolate_by_segments(np.linspace(1.0, 251.0, 9), poses, FRAMES, modes)
     obj = cube()
     obj.rotation_mode = "QUATERNION"
     for frame, position, quaternion in zip(FRAMES, moved.positions, moved.quaternions, strict=True):
@@ -76,6 +86,14 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.wait_until(lambda: keys() < fine, "a larger tolerance in the redo panel leaves fewer keys")
     assert 0.01 < off(truth) < 0.2
     yield from hand.picture("larger-tolerance")
+    assert modes() == {"motor_spline"}
+    few, single = keys(), off(truth)
+
+    yield from hand.click((redo.x + redo.width // 2, redo.y + redo.height - REDO_ROWS - 3 * REDO_ROW))
+    yield from hand.wait_until(lambda: len(modes()) > 1, "a box in the redo panel gives segments the best mode each")
+    assert keys() == few
+    assert off(truth) < 1.1 * single
+    yield from hand.picture("best-per-segment")
 
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("Z", ctrl=True)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.clips import Clip
+from scripts.comparison.modes import BEST_OF
 from scripts.comparison.study import reconstruct
 from tests.scripts.comparison.recordings import swinging_clip
 
@@ -112,3 +113,21 @@ def test_what_is_no_length_is_refused_with_the_way_out(written: str) -> None:
 def test_what_is_no_rate_is_refused_with_the_way_out(kind: type[Choice], written: str) -> None:
     with pytest.raises(ValueError, match=r"is no rate; give numbers such as 5,7\.5,10"):
         kind(written)
+
+
+@pytest.mark.parametrize("choice", [Uniform("3"), Budget("3"), Tolerance("10mm"), Tolerance("0.4")], ids=str)
+def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_what_they_were_chosen_for(choice) -> None:
+    clip = replace(swinging_clip(seed=4), metres_per_unit=0.1)
+    modes = ("lerp_slerp", "dq_sclerp", "motor_spline")
+    made = reconstruct(clip, choice, (*modes, BEST_OF), 0.1)
+    errors = {mode: np.sqrt(np.mean(own.shell**2)) for mode, own in made.errors.items()}
+    best = min(modes, key=lambda mode: (len(made.keys[mode]), errors[mode]))
+    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == (*modes, BEST_OF)
+    assert np.array_equal(made.keys[BEST_OF], made.keys[best])
+    assert len(made.segment_modes) == len(made.keys[best]) - 1
+    assert errors[BEST_OF] <= errors[best] * (1.0 + 1e-6)
+    if choice.decimation == "uniform":
+        assert len(set(made.segment_modes)) > 1
+        assert errors[BEST_OF] < errors[best]
+    elif isinstance(choice, Tolerance):
+        assert made.errors[BEST_OF].shell.max() <= choice.tolerance(clip) * (1.0 + 1e-9)

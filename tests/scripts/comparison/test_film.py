@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from scripts.comparison.film import render_film, save_blend
+from scripts.comparison.film import join_pieces, render_film, render_piece, save_blend
 from scripts.comparison.stage import StageSettings, build_stage
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
@@ -112,3 +112,25 @@ def test_the_saved_file_renders_the_same_picture_in_another_process(scene, tmp_p
     here, there = pixels_of(tmp_path / "here.png"), pixels_of(again)
     assert np.abs(here - there).max() < 0.02
     assert np.abs(here - pixels_of(tmp_path / "other.png")).max() > 0.1
+
+
+def test_a_film_that_was_rendered_in_pieces_is_the_same_to_the_bit(scene, tmp_path):
+    blend = tmp_path / "comparison.blend"
+    save_blend(blend)
+    render_film(scene, tmp_path / "whole.mp4")
+    seen = []
+    pieces = {tmp_path / "1.mkv": (1, 4), tmp_path / "5.mkv": (5, 5), tmp_path / "6.mkv": (6, 9)}
+    for path, (first, last) in pieces.items():
+        assert render_piece(blend, first, last, path, lambda done, total: seen.append((done, total))) > 0.0
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4), (1, 1), (1, 4), (2, 4), (3, 4), (4, 4)]
+    join_pieces(blend, list(pieces), tmp_path / "joined.mp4")
+    assert (tmp_path / "joined.mp4").read_bytes() == (tmp_path / "whole.mp4").read_bytes()
+
+
+def test_a_film_is_not_joined_while_a_piece_is_missing(scene, tmp_path):
+    blend = tmp_path / "comparison.blend"
+    save_blend(blend)
+    render_piece(blend, 1, 4, tmp_path / "1.mkv")
+    with pytest.raises(RuntimeError, match="its pieces have 4 frames of 9"):
+        join_pieces(blend, [tmp_path / "1.mkv"], tmp_path / "joined.mp4")
+    assert not (tmp_path / "joined.mp4").exists()

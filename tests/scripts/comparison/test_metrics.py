@@ -11,6 +11,7 @@ from addon.motion import KEYFRAME_MODES, Errors, Poses
 from scripts.comparison.choices import Budget, Tolerance, Uniform
 from scripts.comparison.clips import Clip
 from scripts.comparison.metrics import measure_reconstruction, write_metrics, write_poses, write_reconstruction
+from scripts.comparison.modes import BEST_OF
 from scripts.comparison.reconstructions import Reconstruction
 from scripts.comparison.study import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
@@ -146,3 +147,20 @@ def test_adaptive_keys_are_a_table_for_every_mode(tmp_path: Path) -> None:
         rows = read(tmp_path / f"{mode}.keys.csv")
         assert [float(row["t"]) for row in rows] == made.clip.times[keys].tolist()
         assert [float(row["qy"]) for row in rows] == made.clip.poses.quaternions[keys, 2].tolist()
+
+
+def test_a_mode_for_every_segment_costs_a_byte_a_key_and_is_a_column_of_the_keys(tmp_path: Path) -> None:
+    made = choose(swinging_clip(), Uniform("10"), ("lerp_slerp", "motor_spline", BEST_OF), 0.1)
+    *single, best = measure_reconstruction(made)
+    assert best.mode == BEST_OF
+    assert [best.bytes_per_s] == pytest.approx([57 / 56 * row.bytes_per_s for row in single[:1]])
+    write_reconstruction(tmp_path, made)
+    keys, all_keys = read(tmp_path / "best_of.keys.csv"), read(tmp_path / "keys.csv")
+    assert [row.pop("mode") for row in keys] == [*made.segment_modes, ""]
+    assert keys == all_keys
+    filled = {mode: read(tmp_path / f"{mode}.csv") for mode in made.poses}
+    ends = [float(row["t"]) for row in keys]
+    for first, last, mode in zip(ends[:-1], ends[1:], made.segment_modes, strict=True):
+        for own, row in zip(filled[mode], filled[BEST_OF], strict=True):
+            if first < float(row["t"]) < last:
+                assert [float(word) for word in row.values()] == pytest.approx([float(word) for word in own.values()])

@@ -4,10 +4,12 @@ import base64
 import hashlib
 import html
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from html.parser import HTMLParser
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +18,15 @@ import pytest
 from addon.motion import KEYFRAME_MODES
 from scripts.comparison.charts import GRID_X, GRID_Y
 from scripts.comparison.choices import Tolerance, Uniform
+from scripts.comparison.clip_section import COLUMNS
+from scripts.comparison.error_charts import errors_over_time
 from scripts.comparison.metrics import measure_reconstruction
+from scripts.comparison.modes import BEST_OF
 from scripts.comparison.needed import KeysNeeded, keys_needed
 from scripts.comparison.palette import colour_of
 from scripts.comparison.reconstructions import Reconstruction
-from scripts.comparison.report import COLUMNS, Settings, write_report
+from scripts.comparison.report import Settings, write_report
+from scripts.comparison.results import ClipFacts, ClipResults, Result
 from scripts.comparison.study import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
@@ -77,8 +83,21 @@ def assert_links_lead_somewhere(page: Page) -> list[str]:
     return links
 
 
+def results_of(runs: list[Reconstruction], needed: Sequence[KeysNeeded] = ()) -> list[ClipResults]:
+    """The results of some clips, of which those of one follow one another."""
+    of_clip = {one.clip: one for one in needed}
+    return [
+        ClipResults(
+            ClipFacts.of(clip),
+            tuple(Result.of(run, partial(errors_over_time, run)) for run in some),
+            of_clip.get(clip.name),
+        )
+        for clip, some in groupby(runs, key=lambda run: run.clip)
+    ]
+
+
 def report(folder: Path, runs: list[Reconstruction], films: dict[tuple[str, str], Path] | None = None) -> Page:
-    write_report(folder / "report.html", runs, films=films or {}, settings=SETTINGS)
+    write_report(folder / "report.html", results_of(runs), films=films or {}, settings=SETTINGS)
     return Page(folder / "report.html")
 
 
@@ -263,7 +282,7 @@ def adaptive(runs: list[Reconstruction], tmp_path_factory: pytest.TempPathFactor
     made = [choose(clip, choice, KEYFRAME_MODES, 0.1) for clip in clips for choice in choices]
     needed = [keys_needed(clip, KEYFRAME_MODES, 0.1) for clip in clips]
     path = tmp_path_factory.mktemp("adaptive") / "report.html"
-    write_report(path, made, films={}, settings=SETTINGS, needed=needed)
+    write_report(path, results_of(made, needed), films={}, settings=SETTINGS)
     return Page(path), needed
 
 
@@ -328,16 +347,12 @@ def test_a_cell_says_where_an_error_is_not_reached_or_there_is_none(tmp_path: Pa
     whole = keys_needed(runs[0].clip, ("lerp_slerp", "motor_spline"), 0.1)
     keys = whole.keys.copy()
     keys[1, 0, 0], keys[:, :, 1] = np.inf, np.nan
-    write_report(tmp_path / "one.html", runs[:1], films={}, settings=SETTINGS, needed=[replace(whole, keys=keys)])
+    one = results_of(runs[:1], [replace(whole, keys=keys)])
+    write_report(tmp_path / "one.html", one, films={}, settings=SETTINGS)
     rows = table_of(Page(tmp_path / "one.html"), "reach: keys needed to be as good as Vector + Quaternion")
     assert rows[2][2:4] == ["not reached", "n/a"]
-    write_report(
-        tmp_path / "two.html",
-        runs,
-        films={},
-        settings=SETTINGS,
-        needed=[replace(whole, keys=keys), replace(whole, clip="throw")],
-    )
+    two = results_of(runs, [replace(whole, keys=keys), replace(whole, clip="throw")])
+    write_report(tmp_path / "two.html", two, films={}, settings=SETTINGS)
     rows = table_of(Page(tmp_path / "two.html"), "Keys a second needed to be as good as Vector + Quaternion")
     assert rows[2][2].endswith("% on 1 of 2 clips")
     assert "clips" not in rows[2][3]
@@ -401,3 +416,23 @@ def test_an_adaptive_report_is_sound(adaptive: tuple[Page, list[KeysNeeded]]) ->
 def test_a_run_without_adaptive_keys_does_not_speak_of_the_keys_needed(page: Page) -> None:
     assert "Keys needed" not in page.source
     assert "#needed" not in page.source
+
+
+def test_the_best_of_each_segment_is_a_row_and_tells_which_modes_it_took(tmp_path: Path) -> None:
+    modes = ("lerp_slerp", "motor_spline", BEST_OF)
+    made = [choose(swinging_clip("reach", seed=4), choice, modes, 0.1) for choice in (Uniform("5"), Tolerance("5mm"))]
+    write_report(tmp_path / "report.html", results_of(made), films={}, settings=SETTINGS)
+    page = Page(tmp_path / "report.html")
+    names = [attributes["data-value"] for name, attributes, _ in page.elements if "data-value" in attributes]
+    assert names.count("Best per Segment") == 2 + len(made)
+    notes = ["".join(text) for name, attributes, text in page.elements if attributes.get("class") == "note"]
+    told = [note for note in notes if note.startswith("Best per Segment")]
+    assert len(told) == len(made)
+    for note, one in zip(told, made, strict=True):
+        counts = dict(re.findall(r"(Vector \+ Quaternion|Smooth Screw \(PGA\)) in (\d+)", note))
+        assert int(counts["Smooth Screw (PGA)"]) == one.segment_modes.count("motor_spline")
+        assert int(counts["Vector + Quaternion"]) == one.segment_modes.count("lerp_slerp")
+        changes = sum(a != b for a, b in zip(one.segment_modes[:-1], one.segment_modes[1:], strict=True))
+        assert f"the mode changes at {changes} key" in note
+        assert "Compared with Smooth Screw (PGA), the best single mode, its RMS shell error is " in note
+        assert "higher" not in note

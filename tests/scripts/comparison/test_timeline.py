@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from addon.motion import Poses, interpolate
+from scripts.comparison.choices import Uniform
+from scripts.comparison.modes import BEST_OF
+from scripts.comparison.study import reconstruct as choose
 from scripts.comparison.timeline import ShownMotion, Timeline
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
@@ -53,3 +56,15 @@ def test_a_recording_far_from_its_origin_is_shown_around_it(swing):
     motion = ShownMotion.of(reconstruct(far), Timeline.of(swing, 30, 1.0))
     assert np.abs(motion.recording.positions).max() < 1.0
     assert np.allclose(motion.centre, 1e4, atol=1.0)
+
+
+def test_the_best_of_each_segment_is_shown_by_the_mode_that_was_best_there():
+    made = choose(swinging_clip(seconds=1.2), Uniform("8"), ("lerp_slerp", "motor_spline", BEST_OF), 0.1)
+    assert len(set(made.segment_modes)) == 2
+    timeline = Timeline.of(made, 30, 1.0)
+    motion = ShownMotion.of(made, timeline)
+    times, key_times = timeline.times_of(timeline.fine_frames), made.clip.times[made.keys[BEST_OF]]
+    segment = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(key_times) - 2)
+    for number, mode in enumerate(made.segment_modes):
+        here = segment == number
+        assert np.allclose(motion.modes[BEST_OF].positions[here], motion.modes[mode].positions[here], atol=1e-12)

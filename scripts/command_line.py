@@ -1,0 +1,16 @@
+"""What command lines have in common, in Python and in Blender."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+def own_arguments(script: str) -> list[str]:
+    """The arguments that are meant for a script, given its `__file__`.
+
+    In Blender (`blender --background --python SCRIPT -- ARGUMENTS`) what is behind the "--", in Python everything.
+    """
+    if Path(sys.argv[0]).name == Path(script).name:
+        return sys.argv[1:]
+    return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []

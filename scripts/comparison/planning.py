@@ -1,0 +1,304 @@
+"""The plan of a comparison, in two parts: what the recordings hold is known only when they have been read.
+
+First a task for every source; then for every clip and choice of keys one that measures it, and for a film one that
+builds its stage, some that render a piece of it each, and one that joins the pieces; last the tables and the report.
+Everything goes into the plan that it depends on, so that a second run does only what is missing or has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from scripts.trajectories import TrajectoryError
+from scripts.trajectories.reading import split_source
+from scripts.workplan import Task
+
+from . import steps
+from .choices import Choice, choice_parts
+from .metrics import table_names
+from .report import ON_ONE_PAGE, Settings
+from .stage import StageSettings
+from .storage import ClipReference, file_names, read_facts, read_times
+from .study import folder_names
+from .subject import file_of_subject
+from .timeline import Timeline
+
+MODULE = steps.__name__
+
+PIECE = 120
+"""Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
+where one is interrupted."""
+
+SOURCES = ("blender_manifest.toml", "addon/motion", "addon/animation", "scripts/comparison", "scripts/trajectories")
+"""What the results depend on, of this program: see `workplan.code_version`."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is wanted of every clip."""
+
+    choices: tuple[Choice, ...]
+    modes: tuple[str, ...]
+    radius: float
+    """Of the shell, in metres."""
+
+    settings: Settings
+    """What the report says of the run."""
+
+    stage: StageSettings | None
+    """How to make the films; None for a run without."""
+
+    count_keys: bool
+    """Whether to find out how many keys every mode needs."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A clip, with the choices of keys that it is long enough for."""
+
+    clip: ClipReference
+    samples: int
+    choices: dict[Choice, tuple[float, float]]
+    """Each with the times of the first and the last key."""
+
+    @property
+    def parts(self) -> tuple[str, list[tuple[str, str]]]:
+        """As plain data, which is how tasks are told of many."""
+        return self.clip.name, [choice_parts(choice) for choice in self.choices]
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+
+
+def reading_tasks(sources: Iterable[str], axes: str) -> list[Task]:
+    """A task for every source, in their order; for a source that is named twice the same one twice."""
+    return [_reading(source, axes) for source in sources]
+
+
+def _reading(source: str, axes: str) -> Task:
+    digest = hashlib.sha256(json.dumps([source, axes]).encode()).hexdigest()[:16]
+    recording = steps.recording_of(digest)
+    try:
+        inputs = (str(split_source(source)[0]),)
+    except TrajectoryError:
+        inputs = ()  # Whoever reads it will say that there is no such file.
+    return Task(
+        name=f"read {digest}",
+        function=f"{MODULE}:read",
+        arguments={"source": source, "axes": axes, "recording": recording},
+        inputs=inputs,
+        outputs=file_names(recording),
+        title=source,
+        weight=0.3,
+    )
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the recordings hold."""
+
+    studies: tuple[Study, ...]
+    """Of the clips that are long enough for any choice of keys."""
+
+    notes: tuple[str, ...]
+    """What the user should know, a line each."""
+
+
+def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> Found:
+    """See what clips there are in the recordings that were read, in the order of the sources.
+
+    Parameters
+    ----------
+    output : Path
+        The output folder.
+    read : sequence of Task
+        Of `reading_tasks`, done. A task that is there twice gives its clips twice, under different names.
+    choices : sequence of Choice
+        That are wanted.
+    """
+    recordings = [task.arguments["recording"] for task in read]
+    known = {recording: read_facts(output, recording) for recording in dict.fromkeys(recordings)}
+    bodies = [(recording, body) for recording in recordings for body in range(len(known[recording].names))]
+    names = folder_names(known[recording].names[body] for recording, body in bodies)
+    notes = [known[recording].note for recording in recordings if known[recording].note]
+    studies = []
+    for (recording, body), name in zip(bodies, names, strict=True):
+        notes += [f"{name}: {repaired}" for repaired in known[recording].repairs[body]]
+    for (recording, body), name in zip(bodies, names, strict=True):
+        clip = ClipReference(name, recording, body)
+        times = read_times(output, clip)
+        ends = {choice: choice.ends(times) for choice in choices}
+        notes += [
+            f"{name}: too short for two keys at {choice.rate} a second; left out"
+            for choice, found in ends.items()
+            if found is None
+        ]
+        long_enough = {
+            choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
+        }
+        if long_enough:
+            studies.append(Study(clip, len(times), long_enough))
+    return Found(tuple(studies), tuple(notes))
+
+
+# -- comparing --------------------------------------------------------------------------------------------------------
+
+
+def comparison_tasks(studies: Sequence[Study], read: Sequence[Task], wanted: Wanted) -> list[Task]:
+    """All tasks of a comparison, those that read the recordings among them, in the order in which they are wanted."""
+    readers = {task.arguments["recording"]: task for task in read}
+    reader_of = {study.clip.name: readers[study.clip.recording].name for study in studies}
+    # All numbers first: they take seconds, and are there whatever becomes of the videos.
+    measures = [task for study in studies for task in _measures(study, reader_of[study.clip.name], wanted)]
+    tasks = [*readers.values(), *measures, _table(steps.METRICS, "tabulate", studies, measures)]
+    if wanted.count_keys:
+        counts = [_count(study, reader_of[study.clip.name], wanted) for study in studies]
+        tasks += [*counts, _table(steps.KEYS_NEEDED, "tabulate_keys", studies, [*measures, *counts])]
+    if wanted.stage:
+        tasks += [task for study in studies for task in _films(study, wanted, wanted.stage)]
+    return [*tasks, *_reports(studies, {task.name for task in tasks}, wanted)]
+
+
+def _measures(study: Study, reader: str, wanted: Wanted) -> Iterator[Task]:
+    clip = study.clip.name
+    for choice in study.choices:
+        folder = steps.folder_of(clip, choice)
+        tables = [f"{folder}/{name}" for name in table_names(choice, wanted.modes)]
+        adaptive = 1.0 if choice.decimation == "uniform" else 50.0
+        yield Task(
+            name=steps.measuring(clip, choice),
+            function=f"{MODULE}:measure",
+            arguments={
+                "clip": asdict(study.clip),
+                "choice": choice_parts(choice),
+                "modes": wanted.modes,
+                "radius": wanted.radius,
+            },
+            outputs=(*tables, *steps.result_of(clip, choice), steps.keys_of(clip, choice)),
+            after=(reader,),
+            title=f"{clip} {choice.phrase}",
+            weight=0.02 + 8e-6 * study.samples * len(wanted.modes) * adaptive,
+        )
+
+
+def _count(study: Study, reader: str, wanted: Wanted) -> Task:
+    clip = study.clip.name
+    return Task(
+        name=steps.counting(clip),
+        function=f"{MODULE}:count_keys",
+        arguments={"clip": asdict(study.clip), "modes": wanted.modes, "radius": wanted.radius},
+        outputs=(steps.needed_of(clip),),
+        after=(reader,),
+        title=f"{clip}, keys needed",
+        weight=0.01 * study.samples,
+    )
+
+
+def _table(path: str, function: str, studies: Sequence[Study], before: Iterable[Task]) -> Task:
+    return Task(
+        name=path,
+        function=f"{MODULE}:{function}",
+        arguments={"studies": [study.parts for study in studies]},
+        outputs=(path,),
+        after=tuple(task.name for task in before),
+        weight=0.01 * len(studies),
+        partial=True,
+    )
+
+
+def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]:
+    clip = study.clip.name
+    seconds_a_frame = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
+    for choice, (start, end) in study.choices.items():
+        count = Timeline.between(start, end, stage.fps, stage.slow_motion).count
+        pieces = math.ceil(count / PIECE)
+        firsts = [1 + count * number // pieces for number in range(pieces + 1)]
+        names = {first: f"render {clip}/{choice.name} from {first}" for first in firsts[:-1]}
+        building, title, parts = f"build {clip}/{choice.name}", f"{clip} {choice.phrase}", choice_parts(choice)
+        yield Task(
+            name=building,
+            function=f"{MODULE}:build",
+            arguments={
+                "clip": asdict(study.clip),
+                "choice": parts,
+                "radius": wanted.radius,
+                "stage": asdict(stage),
+            },
+            inputs=(str(file_of_subject(stage.subject)),),
+            outputs=(steps.blend_of(clip, choice),),
+            after=(steps.measuring(clip, choice),),
+            title=title,
+            weight=1.0,
+        )
+        for (first, name), following in zip(names.items(), firsts[1:], strict=True):
+            last = following - 1
+            yield Task(
+                name=name,
+                function=f"{MODULE}:render",
+                arguments={"clip": clip, "choice": parts, "first": first, "last": last},
+                outputs=(steps.piece_of(clip, choice, first),),
+                after=(building,),
+                title=title,
+                weight=seconds_a_frame * (last - first + 1),
+                temporary=True,
+            )
+        yield Task(
+            name=steps.filming(clip, choice),
+            function=f"{MODULE}:encode",
+            arguments={"clip": clip, "choice": parts, "firsts": firsts[:-1]},
+            outputs=(steps.film_of(clip, choice),),
+            after=(building, *names.values()),
+            title=title,
+            weight=seconds_a_frame * count * 0.06,
+        )
+
+
+def _reports(studies: Sequence[Study], names: set[str], wanted: Wanted) -> list[Task]:
+    """The report: of a few clips on one page, of more on a page each. `names` are of the tasks that there are."""
+    settings = {name: value for name, value in vars(wanted.settings).items() if name != "date"}
+    shared = {"settings": settings, "videos": wanted.stage is not None}
+    shown = {study.clip.name: _shown_of(study, names) for study in studies}
+    everything = [name for some in shown.values() for name in some]
+    parts = [study.parts for study in studies]
+    if len(studies) <= ON_ONE_PAGE:
+        return [_report(steps.REPORT, "report", {"studies": parts, **shared}, everything)]
+    pages = [
+        _report(
+            steps.page_of(study.clip.name),
+            "clip_page",
+            {"studies": [study.parts], **shared},
+            shown[study.clip.name],
+            steps.paging(study.clip.name),
+        )
+        for study in studies
+    ]
+    before = [*everything, *(page.name for page in pages)]
+    return [*pages, _report(steps.REPORT, "overview", {"studies": parts, "settings": settings}, before)]
+
+
+def _report(path: str, function: str, arguments: Mapping[str, Any], before: Sequence[str], name: str = "") -> Task:
+    return Task(
+        name=name or path,
+        function=f"{MODULE}:{function}",
+        arguments=arguments,
+        outputs=(path,),
+        after=tuple(before),
+        title=path,
+        weight=0.02 * len(arguments["studies"]),
+        partial=True,
+    )
+
+
+def _shown_of(study: Study, names: set[str]) -> list[str]:
+    """The tasks whose results a report shows of a clip."""
+    clip = study.clip.name
+    of_choices = [
+        name for choice in study.choices for name in (steps.measuring(clip, choice), steps.filming(clip, choice))
+    ]
+    return [name for name in (*of_choices, steps.counting(clip)) if name in names]

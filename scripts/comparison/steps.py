@@ -1,0 +1,303 @@
+"""The steps of a comparison: what the tasks of its plan (`planning`) do, each from files to files.
+
+What passes between tasks lies in `PARTS` of the output folder: recordings (`storage`), results (`results`), charts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from scripts.trajectories import TrajectoryError
+from scripts.workplan import Job, TaskError, step
+
+from . import needed
+from .choices import Choice, choice_from
+from .clip_section import Films
+from .error_charts import errors_over_time
+from .files import write_text
+from .metrics import Metrics, write_metrics, write_reconstruction
+from .modes import single_modes
+from .report import Settings, write_clip_page, write_overview, write_report
+from .results import ClipResults, Result, read_result, write_result
+from .storage import ClipReference, file_names, read_clip, read_keys, write_keys, write_recording
+from .study import read_source, reconstruct
+
+PARTS = ".parts"
+
+METRICS, KEYS_NEEDED, REPORT = "metrics.csv", "keys_needed.csv", "report.html"
+
+
+# -- where things are, and the tasks that make them -------------------------------------------------------------------
+
+
+def measuring(clip: str, choice: Choice) -> str:
+    """The task that measures a clip under a choice of keys."""
+    return f"measure {clip}/{choice.name}"
+
+
+def counting(clip: str) -> str:
+    """The task that finds the keys that a clip needs."""
+    return f"count keys {clip}"
+
+
+def filming(clip: str, choice: Choice) -> str:
+    """The task at the end of which there is a film."""
+    return f"encode {clip}/{choice.name}"
+
+
+def paging(clip: str) -> str:
+    """The task that writes the page of a clip."""
+    return f"page {clip}"
+
+
+def recording_of(digest: str) -> str:
+    """Where the recording of a source is, by a digest of how it is read."""
+    return f"{PARTS}/recordings/{digest}"
+
+
+def result_of(clip: str, choice: Choice) -> tuple[str, str]:
+    """The files of a result: the numbers, and the charts."""
+    return f"{PARTS}/clips/{clip}/{choice.name}.json", f"{PARTS}/clips/{clip}/{choice.name}.html"
+
+
+def keys_of(clip: str, choice: Choice) -> str:
+    """The file of the keys that the modes kept."""
+    return f"{PARTS}/clips/{clip}/{choice.name}.npz"
+
+
+def needed_of(clip: str) -> str:
+    """The file of the keys that a clip needs."""
+    return f"{PARTS}/clips/{clip}/needed.json"
+
+
+def folder_of(clip: str, choice: Choice) -> str:
+    """The folder of a clip under a choice of keys."""
+    return f"{clip}/{choice.name}"
+
+
+def piece_of(clip: str, choice: Choice, first: int) -> str:
+    """The file of a piece of a film."""
+    return f"{PARTS}/films/{clip}/{choice.name}/{first:06}.mkv"
+
+
+def film_of(clip: str, choice: Choice) -> str:
+    return f"{folder_of(clip, choice)}/comparison.mp4"
+
+
+def blend_of(clip: str, choice: Choice) -> str:
+    return f"{folder_of(clip, choice)}/comparison.blend"
+
+
+def page_of(clip: str) -> str:
+    """The page of a clip, where clips have pages of their own."""
+    return f"{clip}/{REPORT}"
+
+
+# -- numbers ----------------------------------------------------------------------------------------------------------
+
+
+@step
+def read(job: Job, *, source: str, axes: str, recording: str) -> None:
+    """Read a source, and repair its clips."""
+    try:
+        clips, note = read_source(source, axes)
+    except TrajectoryError as error:
+        raise TaskError(str(error)) from None
+    arrays, facts = file_names(recording)
+    write_recording(job.writes(arrays), job.writes(facts), clips, note)
+
+
+@step
+def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: Sequence[str], radius: float) -> None:
+    """Choose keys of a clip, let the modes fill them in, and measure what was lost."""
+    whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
+    made = reconstruct(whole, chosen, modes, radius)
+    if made is None:
+        raise TaskError(f"{whole.name}: too short for two keys {chosen.phrase}")
+    numbers, charts = result_of(whole.name, chosen)
+    write_reconstruction(job.writes(f"{folder_of(whole.name, chosen)}/{modes[0]}.csv").parent, made)
+    write_result(job.writes(numbers), whole, Result.of(made))
+    write_text(job.writes(charts), errors_over_time(made))
+    write_keys(job.writes(keys_of(whole.name, chosen)), made)
+
+
+@step
+def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radius: float) -> None:
+    """Find how many keys every mode needs on a clip."""
+    whole = read_clip(job.output, ClipReference(**clip))
+    found = needed.keys_needed(whole, single_modes(modes), radius, _counted(job, needed.RATES))
+    write_text(job.writes(needed_of(whole.name)), needed.to_json(found))
+
+
+@step
+def tabulate(job: Job, *, studies: Sequence[Any]) -> None:
+    """Write the tables of all clips."""
+    advance = _counted(job, studies)
+
+    def rows() -> Iterator[Metrics]:
+        for clip in Clips(job, studies):
+            for result in clip.results:
+                yield from result.rows
+            advance()
+
+    write_metrics(job.writes(METRICS), rows())
+
+
+@step
+def tabulate_keys(job: Job, *, studies: Sequence[Any]) -> None:
+    """Write the table of the keys that all clips need."""
+    found = [clip.needed for clip in Clips(job, studies) if clip.needed]
+    needed.write_keys_needed(job.writes(KEYS_NEEDED), found)
+
+
+# -- films ------------------------------------------------------------------------------------------------------------
+# Blender is loaded by those who need it.
+
+
+@step
+def build(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radius: float, stage: Mapping[str, Any]) -> None:
+    """Build the stage of a film, and save it."""
+    from .film import save_blend
+    from .stage import StageSettings, build_stage
+    from .subject import SubjectError
+
+    whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
+    made = read_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, radius)
+    try:
+        build_stage(made, StageSettings(**{**stage, "resolution": tuple(stage["resolution"])}))
+        save_blend(job.writes(blend_of(whole.name, chosen)))
+    except (RuntimeError, SubjectError) as error:
+        raise TaskError(f"{whole.name} {chosen.phrase}: no video: {error}") from None
+
+
+@step
+def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int) -> dict[str, float]:
+    """Render some frames of a film."""
+    from .film import render_piece
+
+    chosen = choice_from(*choice)
+    blend = job.reads(blend_of(clip, chosen))
+    path = job.writes(piece_of(clip, chosen, first))
+    try:
+        seconds = render_piece(blend, first, last, path, lambda done, of: job.progress(done, of, f"{done}/{of}"))
+    except RuntimeError as error:
+        raise TaskError(f"{clip} {chosen.phrase}: no video: {error}") from None
+    return {"rendering": seconds}
+
+
+@step
+def encode(job: Job, *, clip: str, choice: Sequence[str], firsts: Sequence[int]) -> dict[str, float]:
+    """Join the pieces of a film."""
+    from .film import join_pieces
+
+    chosen = choice_from(*choice)
+    pieces = [job.reads(piece_of(clip, chosen, first)) for first in firsts]
+    blend, path = job.reads(blend_of(clip, chosen)), job.writes(film_of(clip, chosen))
+    try:
+        seconds = join_pieces(blend, pieces, path, lambda done, of: job.progress(done, of, "encoding"))
+    except RuntimeError as error:
+        raise TaskError(f"{clip} {chosen.phrase}: no video: {error}") from None
+    return {"rendering": seconds}
+
+
+# -- reports ----------------------------------------------------------------------------------------------------------
+
+
+class Clips:
+    """The results that there are of some clips, read anew each time one goes through them.
+
+    Parameters
+    ----------
+    job : Job
+        Its `finished` tasks tell what there is.
+    studies : sequence of (name, choices)
+        Choices as plain data.
+    """
+
+    def __init__(self, job: Job, studies: Sequence[tuple[str, Sequence[Sequence[str]]]]) -> None:
+        self._job = job
+        self._studies = [(clip, [choice_from(*choice) for choice in choices]) for clip, choices in studies]
+
+    def __iter__(self) -> Iterator[ClipResults]:
+        for clip, choices in self._studies:
+            read = [
+                read_result(*map(self._job.reads, result_of(clip, choice)))
+                for choice in choices
+                if measuring(clip, choice) in self._job.finished
+            ]
+            if read:
+                facts = read[0][0]
+                yield ClipResults(facts, tuple(result for _, result in read), self._needed(clip))
+
+    def films(self) -> Films:
+        """The films of all of them."""
+        return {
+            (clip, choice.name): self._job.reads(film_of(clip, choice))
+            if filming(clip, choice) in self._job.finished
+            else None
+            for clip, choices in self._studies
+            for choice in choices
+        }
+
+    def pages(self) -> dict[str, str | None]:
+        """The pages of all of them."""
+        names = [clip for clip, _ in self._studies]
+        return {clip: page_of(clip) if paging(clip) in self._job.finished else None for clip in names}
+
+    def _needed(self, clip: str) -> needed.KeysNeeded | None:
+        if counting(clip) not in self._job.finished:
+            return None
+        return needed.from_json(self._job.reads(needed_of(clip)).read_text(encoding="utf-8"))
+
+
+@step
+def report(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], videos: bool) -> None:
+    """Write the report of a few clips on one page."""
+    clips = Clips(job, studies)
+    films = clips.films() if videos else {}
+    path = job.writes(REPORT)
+    write_report(
+        path, clips, films=films, settings=Settings(**settings), folder=job.output, advance=_counted(job, studies)
+    )
+
+
+@step
+def clip_page(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], videos: bool) -> None:
+    """Write the page of a clip, the only one of these studies."""
+    clips = Clips(job, studies)
+    (clip,) = clips
+    path = page_of(clip.facts.name)
+    write_clip_page(
+        job.writes(path),
+        clip,
+        films=clips.films() if videos else {},
+        settings=Settings(**settings),
+        folder=(job.output / path).parent,
+        overview=f"../{REPORT}",
+    )
+
+
+@step
+def overview(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any]) -> None:
+    """Write the page of many clips."""
+    clips = Clips(job, studies)
+    write_overview(
+        job.writes(REPORT),
+        clips,
+        pages=clips.pages(),
+        settings=Settings(**settings),
+        advance=_counted(job, studies),
+    )
+
+
+def _counted(job: Job, things: Sequence[Any]) -> Callable[[], None]:
+    """Something to call once for each of some things, that says how far the job is."""
+    done = 0
+
+    def advance() -> None:
+        nonlocal done
+        done += 1
+        job.progress(done, len(things))
+
+    return advance

@@ -1,0 +1,152 @@
+"""Plans: tasks that read one another's outputs, checked before anything is done, and written as JSON for others to run.
+
+A plan may have come from a file, so what it says of paths is not believed: no output lies outside the output folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path, PurePosixPath, PureWindowsPath
+
+from scripts.comparison.files import write_text
+
+from .tasks import FUNCTION, Task
+
+SCHEMA = 1
+
+OWN_NAMES = frozenset({".workplan", "manifest.json"})
+"""What lies in an output folder beside the outputs."""
+
+
+class PlanError(ValueError):
+    """What is wrong with a plan, and with which task."""
+
+
+class Plan:
+    """Tasks in an order in which they can be done.
+
+    Parameters
+    ----------
+    tasks : iterable of Task
+        In the order in which they are wanted; tasks that others read are done before these.
+    version : str
+        Of the program: where it changes, everything is done again (see `code_version`).
+    folder : Path, optional
+        Where relative inputs count from; the current one unless given.
+
+    Raises
+    ------
+    PlanError
+        For names or outputs that occur twice, outputs that are not below the output folder, tasks that wait for tasks
+        that do not exist, or for one another.
+    """
+
+    def __init__(self, tasks: Iterable[Task], version: str, folder: Path | None = None) -> None:
+        listed = list(tasks)
+        self.version = version
+        self.folder = Path.cwd() if folder is None else folder
+        self.tasks: Mapping[str, Task] = {task.name: task for task in listed}
+        _check_names(listed, self.tasks)
+        _check_outputs(listed)
+        self.order: tuple[str, ...] = _ordered(self.tasks)
+        self.readers: Mapping[str, tuple[str, ...]] = _readers(self.tasks)
+        """Task to the tasks that read its outputs."""
+
+    def write(self, path: Path) -> None:
+        """Write the plan as JSON."""
+        tasks = [self.tasks[name].as_json() for name in self.order]
+        content = {"schema": SCHEMA, "version": self.version, "folder": os.fspath(self.folder), "tasks": tasks}
+        write_text(path, json.dumps(content, indent=1) + "\n")
+
+    @classmethod
+    def read(cls, path: Path) -> Plan:
+        """Read a plan that was written.
+
+        Raises
+        ------
+        PlanError
+            Where the file is not such a plan.
+        OSError
+            Where it cannot be read.
+        """
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            if content["schema"] != SCHEMA:
+                raise PlanError(f"{path}: a plan of schema {content['schema']}; this program knows {SCHEMA}")
+            return cls((Task(**fields) for fields in content["tasks"]), content["version"], Path(content["folder"]))
+        except PlanError:
+            raise
+        except (ValueError, TypeError, KeyError) as error:
+            raise PlanError(f"{path}: this is not a plan ({error}); run the program that plans once more") from None
+
+
+def _check_names(listed: list[Task], tasks: Mapping[str, Task]) -> None:
+    for task in listed:
+        if not task.name or not task.name.isprintable():
+            raise PlanError(f"task {task.name!r}: a name is one line of text")
+        if tasks[task.name] is not task:
+            raise PlanError(f"task {task.name!r}: there are two of that name")
+        if not FUNCTION.fullmatch(task.function):
+            raise PlanError(f"task {task.name!r}: {task.function!r} is no function; write package.module:function")
+        if not task.outputs:
+            raise PlanError(f"task {task.name!r}: it makes nothing; name at least one output")
+        for before in task.after:
+            if before not in tasks:
+                raise PlanError(f"task {task.name!r}: there is no task {before!r} to come before it")
+            if tasks[before].temporary and task.partial:
+                raise PlanError(f"task {task.name!r}: {before!r} is temporary, and a partial task cannot ask for it")
+
+
+def _check_outputs(listed: list[Task]) -> None:
+    # Windows and macOS take "Hand" and "hand" for one name.
+    makers: dict[str, str] = {}
+    for task in listed:
+        for output in task.outputs:
+            _check_path(task, output)
+            folded = output.casefold()
+            if folded in makers:
+                raise PlanError(f"task {task.name!r}: {output!r} is made by {makers[folded]!r} already")
+            makers[folded] = task.name
+    for output, maker in makers.items():
+        for folder in map(str, PurePosixPath(output).parents):
+            if folder in makers:
+                raise PlanError(f"task {maker!r}: {output!r} lies in {folder!r}, which is a file of {makers[folder]!r}")
+
+
+def _check_path(task: Task, output: str) -> None:
+    path, windows = PurePosixPath(output), PureWindowsPath(output)
+    sound = output == str(path) and "\\" not in output and output.isprintable() and path.parts
+    inside = sound and not windows.drive and not windows.root and ".." not in path.parts and output != "."
+    if not inside:
+        raise PlanError(f"task {task.name!r}: {output!r} is no path below the output folder")
+    if path.parts[0].casefold() in OWN_NAMES:
+        raise PlanError(f"task {task.name!r}: {path.parts[0]!r} is where the work plan keeps its own files")
+
+
+def _ordered(tasks: Mapping[str, Task]) -> tuple[str, ...]:
+    """Every task behind those it reads from, and otherwise as they were listed."""
+    try:
+        TopologicalSorter({name: task.after for name, task in tasks.items()}).prepare()
+    except CycleError as error:
+        raise PlanError(f"tasks wait for one another: {', '.join(map(repr, error.args[1]))}") from None
+    order: dict[str, None] = {}
+    for name in tasks:
+        waiting = [name]
+        while waiting:
+            open_ones = [before for before in tasks[waiting[-1]].after if before not in order]
+            if open_ones:
+                waiting.extend(reversed(open_ones))
+            else:
+                order[waiting.pop()] = None
+    return tuple(order)
+
+
+def _readers(tasks: Mapping[str, Task]) -> dict[str, tuple[str, ...]]:
+    readers: dict[str, list[str]] = {name: [] for name in tasks}
+    for name, task in tasks.items():
+        for before in dict.fromkeys(task.after):
+            readers[before].append(name)
+    return {name: tuple(some) for name, some in readers.items()}

@@ -1,0 +1,169 @@
+"""Tasks, and the functions that do them.
+
+A task is plain data: it can be written to a file, sent to another process or to another machine. What it does is a
+function of this checkout that is marked as a `step`; nothing else can be named.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+ROOT = Path(__file__).resolve().parents[2]
+
+FUNCTION = re.compile(r"[a-z_]\w*(?:\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII)
+"""package.module:function"""
+
+Step = TypeVar("Step", bound=Callable[..., Mapping[str, Any] | None])
+
+
+class TaskError(Exception):
+    """Why a task cannot be done, in one line for the user: a recording that is damaged, a picture that is missing."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A piece of work.
+
+    Raises
+    ------
+    ValueError
+        For arguments that JSON cannot hold.
+    """
+
+    name: str
+    """Unique in its plan, in one line."""
+
+    function: str
+    """A `step`, as "package.module:function"."""
+
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    """Given to the function by name. Anything that JSON holds."""
+
+    inputs: tuple[str, ...] = ()
+    """Files from outside that it reads. When their content changes, the task is done again. Relative ones count from
+    the folder in which the program was started."""
+
+    outputs: tuple[str, ...] = ()
+    """All files that it makes: paths with "/" below the output folder, at least one."""
+
+    after: tuple[str, ...] = ()
+    """The tasks whose outputs it reads."""
+
+    title: str = ""
+    """What people read of it; the name unless given."""
+
+    weight: float = 1.0
+    """About how many seconds it takes beside the others: what progress and the time left are reckoned by."""
+
+    partial: bool = False
+    """Makes the best of what there is: it is done also where tasks before it failed or were stopped, once no more can
+    come. A report, for one."""
+
+    temporary: bool = False
+    """Nobody but the tasks after it wants its outputs: they are deleted when those tasks are done."""
+
+    def __post_init__(self) -> None:
+        # What came back from JSON is what a worker, or the next run, will be given.
+        object.__setattr__(self, "arguments", json.loads(json.dumps(self.arguments, allow_nan=False)))
+        for name in ("inputs", "outputs", "after"):
+            object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
+        object.__setattr__(self, "title", self.title or self.name)
+
+    def as_json(self) -> dict[str, Any]:
+        """Every field, for `Task(**fields)`."""
+        return asdict(self)
+
+
+def step(function: Step) -> Step:
+    """Mark a function that tasks may name.
+
+    It is called as `function(job, **arguments)` with a `Job`, writes every output of its task, and may return facts
+    about what it did, a dictionary for JSON that the manifest keeps. It raises `TaskError` for what is the input's
+    fault and not its own.
+    """
+    function.is_step = True
+    return function
+
+
+def find_step(name: str) -> Callable[..., Mapping[str, Any] | None]:
+    """The function of that name.
+
+    A plan may come from a file. So only modules of this checkout are imported, and only what they mark is called.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such step.
+    """
+    if not FUNCTION.fullmatch(name):
+        raise ValueError(f"{name!r} is no function; write package.module:function")
+    module_name, _, function_name = name.partition(":")
+    place = ROOT.joinpath(*module_name.split("."))
+    if not any(path.is_file() for path in (place.with_suffix(".py"), place / "__init__.py")):
+        raise ValueError(f"{name}: this checkout has no module {module_name}")
+    function = getattr(importlib.import_module(module_name), function_name, None)
+    if not getattr(function, "is_step", False):
+        raise ValueError(f"{name}: {module_name} has no step of that name; mark it with @step")
+    return function
+
+
+class Job:
+    """A task's view of its files while it is done.
+
+    Parameters
+    ----------
+    output : Path
+        The output folder.
+    scratch : Path
+        Where the outputs are written, until all of them are there.
+    outputs : iterable of str
+        Those of the task.
+    finished : iterable of str
+        The tasks before it that are done: all, but for a task that is `partial`.
+    progress : callable
+        Takes the share that is done and what is being done.
+    note : callable
+        Takes a line for the user.
+    """
+
+    def __init__(
+        self,
+        output: Path,
+        scratch: Path,
+        outputs: Iterable[str],
+        finished: Iterable[str] = (),
+        progress: Callable[[float, str], object] = lambda share, doing: None,
+        note: Callable[[str], object] = lambda text: None,
+    ) -> None:
+        self.output = output
+        self.finished = frozenset(finished)
+        self._scratch = scratch
+        self._outputs = frozenset(outputs)
+        self._progress = progress
+        self._note = note
+
+    def reads(self, path: str) -> Path:
+        """Where an output of a task before this one is."""
+        return self.output / path
+
+    def writes(self, path: str) -> Path:
+        """Where to write an output of this task. The folders are there."""
+        if path not in self._outputs:
+            raise ValueError(f"{path!r} is not among the outputs of this task: {', '.join(sorted(self._outputs))}")
+        place = self._scratch / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        return place
+
+    def progress(self, done: float, total: float = 1.0, doing: str = "") -> None:
+        """Say how far it is, and what is being done. Cheap enough to be called often."""
+        self._progress(min(done / total, 1.0) if total else 1.0, doing)
+
+    def note(self, text: str) -> None:
+        """Say something that the user should know, a line."""
+        self._note(text)

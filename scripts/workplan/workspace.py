@@ -1,0 +1,126 @@
+"""The output folder of a plan, opened for a run: locked, with its manifest, and cleared of what dead runs left.
+
+Beside the outputs it holds `manifest.json` and, as long as there is need, `.workplan/` with the lock, the records of
+tasks that are done, the plan, and a scratch folder for each task at work.
+"""
+
+from __future__ import annotations
+
+import shutil
+import uuid
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Self
+
+from .lock import FolderLock
+from .manifest import Manifest, Record
+from .performing import Made
+
+
+class Workspace:
+    """An output folder, as a context.
+
+    Parameters
+    ----------
+    output : Path
+        Made where it is missing, and taken away again where nothing came of it.
+    shared : bool
+        For a single task among others that run at the same time: nothing is cleared, and manifest.json is left to
+        those who have the folder for themselves.
+
+    Raises
+    ------
+    FolderInUse
+        On entering, where another run has the folder.
+    ManifestError
+        Where the manifest is of a newer program.
+    OSError
+        Where the folder cannot be written.
+    """
+
+    def __init__(self, output: Path, *, shared: bool = False) -> None:
+        self.output = output.absolute()
+        self.own = self.output / ".workplan"
+        self.plan_path = self.own / "plan.json"
+        self.done_here: set[str] = set()
+        """The tasks that were done since it was opened."""
+        self.manifest: Manifest
+        self._shared = shared
+        self._lock = FolderLock(self.own / "lock", output, shared=shared)
+        self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
+
+    def __enter__(self) -> Self:
+        self.own.mkdir(parents=True, exist_ok=True)
+        self._lock.__enter__()
+        try:
+            self.manifest = Manifest(self.output / "manifest.json", self.own / "records")
+            if not self._shared:
+                self._clear_scratch()
+                self.manifest.failures = {}
+        except BaseException:
+            self._lock.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            if not self._shared:
+                self._clear_scratch()
+                self.manifest.write()
+        finally:
+            self._lock.__exit__()
+            self._remove_if_empty()
+
+    def scratch(self) -> Path:
+        """A new folder's path for the outputs of a task at work, on the file system where they will be."""
+        return self.own / "scratch" / uuid.uuid4().hex[:12]
+
+    def put_in_place(self, name: str, key: str, made: Made, scratch: Path) -> Record:
+        """Move the outputs of a task to where they belong, and take down that it is done.
+
+        Raises
+        ------
+        OSError
+            Where that cannot be. What was moved is not counted as done.
+        """
+        for path in made.outputs:
+            place = self.output / path
+            place.parent.mkdir(parents=True, exist_ok=True)
+            (scratch / path).replace(place)
+        shutil.rmtree(scratch, ignore_errors=True)
+        record = Record(key, made.outputs, made.seconds, made.facts)
+        self.manifest.add(name, record)
+        self.done_here.add(name)
+        return record
+
+    def discard(self, outputs: Iterable[str]) -> None:
+        """Delete outputs that nobody wants any more, and the folders that are empty then."""
+        for path in outputs:
+            place = self.output / path
+            place.unlink(missing_ok=True)
+            for folder in place.parents:
+                if folder == self.output or not _removed(folder):
+                    break
+
+    def _clear_scratch(self) -> None:
+        shutil.rmtree(self.own / "scratch", ignore_errors=True)
+
+    def _remove_if_empty(self) -> None:
+        """Leave no trace of a run that made nothing."""
+        made = (self.output / "manifest.json").exists() or self._shared
+        if not made:
+            self.plan_path.unlink(missing_ok=True)
+        for folder in (self.own / "records", self.own / "scratch", self.own):
+            _removed(folder)
+        for folder in self._missing:
+            if not _removed(folder):
+                break
+
+
+def _removed(folder: Path) -> bool:
+    """Remove a folder if it is empty."""
+    try:
+        folder.rmdir()
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,188 @@
+"""The best mode of each segment: never worse than a single mode, right where the answer is known, no change in vain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from addon.motion import (
+    KEYFRAME_MODES,
+    Poses,
+    best_modes,
+    decimate,
+    interpolate,
+    interpolate_by_segments,
+    reduce_keys,
+    twists,
+)
+from addon.motion.best_of import least_errors
+from addon.motion.quaternions import multiply
+from tests.motion.cases import assert_same, random_quaternions
+from tests.motion.test_reduction import shell_errors, wandering
+
+RADIUS = 0.1
+
+
+def errors_by_segments(times, poses, keys, modes) -> np.ndarray:
+    """The shell error of a mixed motion at all samples from the first key to the last, by matrices."""
+    return np.concatenate(
+        [
+            shell_errors(times, poses, keys, mode)[first : last + (last == keys[-1])]
+            for first, last, mode in zip(keys[:-1], keys[1:], modes, strict=True)
+        ]
+    )
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.integers(3, 200),
+    st.integers(0, 2**16),
+    st.sampled_from((0.0, 1e-3)),
+    st.lists(st.sampled_from(tuple(KEYFRAME_MODES)), min_size=1, max_size=5, unique=True),
+    st.data(),
+)
+def test_it_is_never_further_off_than_any_of_its_modes(count, seed, noise, modes, data):
+    times, poses = wandering(count, seed, noise)
+    inner = data.draw(st.lists(st.integers(1, count - 2), unique=True, max_size=20))
+    keys = np.array(sorted({0, count - 1, *inner}))
+    chosen = best_modes(times, poses, keys, modes, RADIUS)
+    assert len(chosen) == len(keys) - 1
+    assert set(chosen) <= set(modes)
+    squares = np.sum(errors_by_segments(times, poses, keys, chosen) ** 2)
+    for mode in modes:
+        assert np.sqrt(squares) <= np.sqrt(np.sum(shell_errors(times, poses, keys, mode) ** 2)) * (1.0 + 2e-6) + 1e-9
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(3, 120), st.integers(0, 2**16), st.booleans(), st.data())
+def test_what_is_shown_is_in_each_segment_what_its_mode_shows(count, seed, scaled, data):
+    random = np.random.default_rng(seed)
+    key_times = np.cumsum(random.uniform(0.1, 1.0, 6))
+    scales = random.uniform(0.5, 2.0, 6) if scaled else None
+    keys = Poses(random.normal(size=(6, 3)), random_quaternions(random, 6), scales)
+    modes = data.draw(st.lists(st.sampled_from(tuple(KEYFRAME_MODES)), min_size=5, max_size=5))
+    times = random.uniform(key_times[0] - 0.5, key_times[-1] + 0.5, count)
+    shown = interpolate_by_segments(key_times, keys, times, modes)
+    segment = np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, 4)
+    for number, mode in enumerate(modes):
+        here = segment == number
+        if here.any():
+            assert_same(shown[here], interpolate(key_times, keys, times, mode)[here])
+
+
+def test_a_screw_gets_the_screw_and_a_straight_flight_the_straight_line():
+    """Five segments about an axis that stands still, and five of a body that tumbles as it flies."""
+    times = np.linspace(0.0, 10.0, 201)
+    screw = np.outer((0.2, 0.9, -0.4, 0.3, 0.1, 0.5), np.minimum(times, 5.0))
+    turn, place = twists.exponential(screw)
+    flight = np.maximum(times - 5.0, 0.0)
+    spin, _ = twists.exponential(np.outer((0.0, 0.0, 1.2, 0.0, 0.0, 0.0), flight))
+    poses = Poses(place.T + np.outer(flight, (0.7, 0.2, -0.3)), multiply(spin.T, turn.T))
+    keys = np.arange(0, 201, 20)
+    modes = ("lerp_slerp", "dq_sclerp", "pga_lerp")
+    assert best_modes(times, poses, keys, modes, RADIUS) == ("dq_sclerp",) * 5 + ("lerp_slerp",) * 5
+
+
+def test_a_bend_gets_the_spline_and_a_hit_does_not():
+    """A body that goes round evenly, stops dead and goes back straight."""
+    times = np.linspace(0.0, 8.0, 321)
+    angle = np.minimum(times, 4.0)
+    back = np.maximum(times - 4.0, 0.0)
+    positions = np.stack((np.sin(angle) - back, np.cos(angle), 0.0 * angle), axis=1)
+    poses = Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (321, 1)))
+    chosen = best_modes(times, poses, np.arange(0, 321, 20), ("lerp_slerp", "motor_spline"), RADIUS)
+    assert chosen[1:7] == ("motor_spline",) * 6
+    # In the segment after the hit the spline still bends; after that nothing tells them apart, and no key changes.
+    assert chosen[8:] == ("lerp_slerp",) * 8
+
+
+def test_modes_that_are_one_motion_are_not_told_apart_by_rounding():
+    times, poses = wandering(400, 3)
+    keys = decimate(times, 8.0)
+    one = ("dq_sclerp", "pga_slerp", "cga_slerp")
+    for order in (one, one[::-1]):
+        assert set(best_modes(times, poses, keys, order, RADIUS)) == {order[0]}
+        chosen = best_modes(times, poses, keys, ("lerp_slerp", *order, "motor_spline"), RADIUS)
+        assert set(chosen) & set(one) == {order[0]}
+
+
+def test_a_body_at_rest_changes_no_mode():
+    poses = Poses(np.ones((100, 3)), np.tile((0.5, 0.5, 0.5, 0.5), (100, 1)))
+    assert set(best_modes(np.arange(100.0), poses, np.arange(0, 100, 11))) == {"lerp_slerp"}
+
+
+@pytest.mark.parametrize(
+    ("errors", "chosen"),
+    [
+        ([[1, 1, 1, 1], [1, 1, 1, 1]], [0, 0, 0, 0]),
+        ([[1, 1, 2, 1], [2, 1, 1, 1]], [0, 0, 1, 1]),
+        ([[1, 2, 1, 2], [2, 1, 2, 1]], [0, 1, 0, 1]),
+        ([[1, 2, 2, 2], [1, 1, 2, 1], [1, 1, 1, 2]], [2, 2, 2, 1]),
+        ([[0, 0, 0, 0], [1e-7, 0, 0, 0]], [0, 0, 0, 0]),
+    ],
+)
+def test_of_equally_good_modes_the_one_that_changes_least_is_taken(errors, chosen):
+    """Four segments of two samples each; the keys are on the recording."""
+    shown = np.zeros((len(errors), 9))
+    shown[:, 1::2] = errors
+    assert least_errors(shown, np.arange(0, 9, 2)).tolist() == chosen
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.integers(1, 5), st.integers(1, 9), st.integers(0, 2**16))
+def test_no_choice_of_equally_good_modes_has_fewer_changes(modes, segments, seed):
+    random = np.random.default_rng(seed)
+    shown = np.zeros((modes, 2 * segments + 1))
+    shown[:, 1::2] = random.integers(1, 3, (modes, segments))
+    chosen = least_errors(shown, np.arange(0, 2 * segments + 1, 2))
+    costs = shown[:, 1::2]
+    assert np.array_equal(costs[chosen, np.arange(segments)], costs.min(axis=0))
+    # The fewest changes by going through all segments with the fewest that lead to each mode.
+    fewest = np.where(costs[:, 0] == costs[:, 0].min(), 0.0, np.inf)
+    for cost in costs.T[1:]:
+        fewest = np.where(cost == cost.min(), np.minimum(fewest, fewest.min() + 1.0), np.inf)
+    assert np.count_nonzero(np.diff(chosen)) == fewest.min()
+
+
+def test_a_mode_that_passes_the_tolerance_is_out_though_it_is_nearer_on_the_whole():
+    errors = np.array([[0.0, 2.0, 2.0, 2.0, 0.0], [0.0, 0.0, 0.0, 3.0, 0.0]])
+    keys = np.array([0, 4])
+    assert least_errors(errors, keys).tolist() == [1]
+    assert least_errors(errors, keys, tolerance=2.5).tolist() == [0]
+    # Where all pass it, the nearest is still to be preferred.
+    assert least_errors(errors, keys, tolerance=1.0).tolist() == [1]
+
+
+def test_samples_outside_of_the_keys_do_not_count():
+    times, poses = wandering(300, 8)
+    keys = np.arange(40, 260, 20)
+    inner = slice(40, 241)
+    assert best_modes(times, poses, keys) == best_modes(times[inner], poses[inner], keys - 40)
+
+
+def test_what_makes_no_sense_is_refused():
+    times, poses = wandering(30, 1)
+    with pytest.raises(ValueError, match="no mode to choose from"):
+        best_modes(times, poses, np.array([0, 29]), ())
+    with pytest.raises(ValueError, match="no mode 'bezier'"):
+        best_modes(times, poses, np.array([0, 29]), ("bezier",))
+    with pytest.raises(ValueError, match="2 modes do not fit 2 keys"):
+        interpolate_by_segments(times[:2], poses[:2], times, ("dq_sclerp", "dq_sclerp"))
+
+
+@pytest.mark.parametrize(
+    ("seed", "tolerance", "mode"), [(11, 0.03, "motor_spline"), (13, 0.01, "lerp_slerp"), (32, 0.03, "motor_spline")]
+)
+def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it(seed, tolerance, mode):
+    """There another mode is nearer on the whole, and passes it. The keys' own may be off by rounding more than it."""
+    times, poses = wandering(400, seed)
+    keys = reduce_keys(times, poses, mode, tolerance, RADIUS)
+    largest = shell_errors(times, poses, keys, mode).max()
+    free, bound = (
+        errors_by_segments(times, poses, keys, best_modes(times, poses, keys, KEYFRAME_MODES, RADIUS, allowed)).max()
+        for allowed in (None, largest * (1.0 - 1e-13))
+    )
+    assert free > 1.02 * tolerance
+    assert bound <= tolerance * (1.0 + 1e-9)
