@@ -75,12 +75,14 @@ class ObjectMotion(bpy.types.PropertyGroup):
         description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
         size=4,
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
     )
     own_location: FloatVectorProperty(
         name="Delta Location",
         description="The object's own delta location, to which the in-betweens are added",
         subtype="TRANSLATION",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=_refresh,
     )
     own_quaternion: FloatVectorProperty(
@@ -90,6 +92,7 @@ class ObjectMotion(bpy.types.PropertyGroup):
         default=(1.0, 0.0, 0.0, 0.0),
         subtype="QUATERNION",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=_refresh,
     )
     own_euler: FloatVectorProperty(
@@ -97,6 +100,7 @@ class ObjectMotion(bpy.types.PropertyGroup):
         description="The object's own delta rotation, to which the in-betweens are added",
         subtype="EULER",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=_refresh,
     )
     own_scale: FloatVectorProperty(
@@ -105,9 +109,10 @@ class ObjectMotion(bpy.types.PropertyGroup):
         default=(1.0, 1.0, 1.0),
         subtype="XYZ",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=_refresh,
     )
-    bakes: CollectionProperty(type=ChangedAction)
+    bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
 
 CLASSES = (SlotRecord, ActionMotion, ChangedAction, ObjectMotion)

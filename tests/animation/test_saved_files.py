@@ -5,8 +5,6 @@ That Blender is another process at factory settings, in which nothing of this pr
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,6 +15,7 @@ import pytest
 from addon import animation
 from addon.animation import is_baked, modes_of, refresh, set_enabled, set_mode
 from addon.motion import KEYFRAME_MODES
+from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.oracle import Own, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 
@@ -24,48 +23,6 @@ PLAYED = np.arange(-2.0, 44.0)
 """From before the first key until after the last."""
 
 ORDERS = ("QUATERNION", "XYZ", "ZYX", "YXZ")
-
-FARM = """
-import sys
-import bpy
-import numpy as np
-path, found, *names = sys.argv[1:]
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.ops.wm.open_mainfile(filepath=path)
-assert not hasattr(bpy.types.Object, "rigid_motion") and "addon" not in sys.modules
-graph, scene = bpy.context.evaluated_depsgraph_get(), bpy.context.scene
-worlds = lambda: [bpy.data.objects[name].evaluated_get(graph).matrix_world for name in names]
-opened = np.array(worlds())
-"""
-
-PLAY = """
-played = []
-for frame in np.load(found):
-    scene.frame_set(int(frame))
-    played.append(np.array(worlds()))
-np.savez(found.replace(".npy", ".npz"), opened=opened, played=np.array(played))
-"""
-
-
-def on_a_farm(program: str, *arguments: object) -> None:
-    """Run a program in a Blender that has never heard of the extension."""
-    done = subprocess.run(
-        [sys.executable, "-c", FARM + program, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        cwd=Path(str(arguments[0])).parent,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
-def played_on_a_farm(path: Path, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-    """World matrices as the file is opened (objects, 4, 4), and on all frames played (objects, frames, 4, 4)."""
-    frames = path.with_suffix(".npy")
-    np.save(frames, PLAYED)
-    on_a_farm(PLAY, path, frames, *names)
-    with np.load(frames.with_suffix(".npz")) as found:
-        return found["opened"], found["played"].swapaxes(0, 1)
 
 
 def save(path: Path) -> Path:
@@ -101,7 +58,7 @@ def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tm
     objects, owns = every_mode_and_kind()
     assert_shown(objects, PLAYED, owns)
     shown = shown_worlds(objects, PLAYED)
-    _, played = played_on_a_farm(save(tmp_path / "shot.blend"), [obj.name for obj in objects])
+    _, played = played_on_a_farm(save(tmp_path / "shot.blend"), [obj.name for obj in objects], PLAYED)
     assert_same(played, shown)
     for obj in objects:
         set_mode(obj, "BLENDER")
@@ -117,7 +74,7 @@ def test_a_file_opens_as_it_was_to_be_seen_on_the_frame_it_was_saved_on(live_fil
     set_mode(obj, "pga_slerp")
     live_file.scene.frame_set(int(frame), subframe=frame % 1.0)
     shown = np.array(obj.evaluated_get(live_file.evaluated_depsgraph_get()).matrix_world)
-    opened, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"])
+    opened, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"], PLAYED)
     assert_same(opened, [shown])
     assert_same(played, [expected_worlds(obj, PLAYED, {"Tool": own})], 1e-5)
 
@@ -185,7 +142,7 @@ def test_what_was_not_followed_is_caught_up_with_by_refresh_before_a_farm_gets_i
     try:
         key(obj, seed=5)
         assert refresh() == 1
-        _, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"])
+        _, played = played_on_a_farm(save(tmp_path / "shot.blend"), ["Tool"], PLAYED)
     finally:
         set_enabled(True)
     assert_same(played, [expected_worlds(obj, PLAYED)], 1e-5)
@@ -197,7 +154,7 @@ def test_a_baked_object_plays_alike_on_a_farm_and_can_be_un_baked_after_it_saved
     keys, wanted = snapshot(obj), expected_worlds(obj, PLAYED)
     animation.bake(obj)
     path = save(tmp_path / "shot.blend")
-    assert_same(played_on_a_farm(path, ["Tool"])[1], [wanted], 1e-5)
+    assert_same(played_on_a_farm(path, ["Tool"], PLAYED)[1], [wanted], 1e-5)
     on_a_farm("bpy.ops.wm.save_as_mainfile(filepath=found)", path, tmp_path / "farm.blend")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "farm.blend"))
     obj = bpy.data.objects["Tool"]

@@ -1,0 +1,479 @@
+"""Bake rigid in-betweens into real keys, or take that back, in .blend files and without a window.
+
+In every file each object with rigid-motion modes gets keys that any program plays; its own keys stay in the file for
+the way back. The result is a new file beside the old one, which stays as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+from scripts.hushing import hushed
+from scripts.system_libraries import way_out
+
+try:
+    with hushed():  # Where OCIO is set, it says so.
+        import bpy
+except ImportError as error:
+    print(f"bake.py: {error}\n{way_out(str(error), 'bake.py')}", file=sys.stderr)
+    sys.exit(2)
+
+import addon_utils
+
+from addon import animation
+from addon.animation import Refused
+from addon.animation.mode_keys import segment_modes
+from addon.animation.reading import read
+from addon.animation.slots import MODE_PATH, Curves, curves_in, slots_of
+from addon.motion import KEYFRAME_MODES
+from scripts.command_line import own_arguments
+from scripts.comparison.files import written_beside
+from scripts.comparison.progress import Progress
+
+EXTENSION = "rigid_motion"
+"""The id in blender_manifest.toml, which the name of the installed module ends with."""
+
+HERE = bpy.app.version[:2]
+"""The Blender that this runs in."""
+
+SMALLEST_STEP = 0.01
+"""Keys closer than that are one key to Blender."""
+
+EPILOG = """
+examples:
+  python scripts/bake.py shot.blend
+  python scripts/bake.py shots/*.blend --output farm
+  python scripts/bake.py shot.blend --objects 'Camera,Tool*' --step 0.25
+  python scripts/bake.py shot.blend --dry-run
+  python scripts/bake.py farm/shot-baked.blend --unbake
+  blender --background --python scripts/bake.py -- shot.blend
+
+what is written:
+  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. It takes its place when it is whole. A file
+  that is there already is left alone without --overwrite. With --in-place the file itself is saved, and Blender keeps
+  the one before as NAME.blend1. A file in which there is nothing to do is not written. What was written is printed on
+  the standard output at the end, a path a line; everything else is on the standard error.
+  Textures and libraries are found from the new place too. A relative output path of the render, and disk caches of
+  simulations (blendcache_NAME), go by the place and the name of the file, as after Save As.
+
+what is run:
+  Nothing of the files: scripts and Python expressions in them stay switched off, and stay in them. Where a farm
+  is to run them, it renders with `blender --enable-autoexec`. Baking reads keys, and needs none of them.
+
+Exit code: 0 done, 1 some objects or files could not be done, 2 a wrong option, or no file that could be read, 130
+stopped by Ctrl-C; files that were written by then are whole.
+"""
+
+
+class FileProblem(Exception):
+    """Why a file cannot be done, and the way out."""
+
+
+class Unreadable(FileProblem):
+    """Why a file cannot be opened, and the way out."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A file to be done."""
+
+    source: Path
+    output: Path
+    """The same where it is done in place."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """What is done to objects: baking, or un-baking."""
+
+    done: str
+    suffix: str
+    concerns: Callable[[bpy.types.Object], bool]
+    """Whether there is something to do to an object, possible or not."""
+
+    act: Callable[[bpy.types.Object], str]
+    """Do it, and say what came of it. May raise `Refused`."""
+
+
+@dataclass
+class Outcome:
+    """What became of a file."""
+
+    done: int = 0
+    refused: int = 0
+    failed: bool = False
+    unreadable: bool = False
+    written: Path | None = None
+    """Where to, or where it would have been."""
+
+    matched: set[str] = field(default_factory=set)
+    """Of the names and patterns that were asked for, those that there was an object for."""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = argparse.ArgumentParser(
+        prog="bake.py", description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.blend", help="files to bake")
+    parser.add_argument("--unbake", action="store_true", help="give baked objects their own keys back")
+    parser.add_argument(
+        "--objects",
+        type=_names,
+        metavar="NAME,...",
+        help="only these objects; * and ? stand for any letters, as in 'Tool*' (all with modes)",
+    )
+    parser.add_argument("--dry-run", action="store_true", help="do everything but write, and say what would be written")
+    keys = parser.add_argument_group("keys")
+    keys.add_argument(
+        "--step", type=_step, metavar="N", help="frames from key to key; 0.25 for keys between the frames (1)"
+    )
+    keys.add_argument(
+        "--first", type=_frame, metavar="FRAME", help="bake from here on, widened to whole segments (first key)"
+    )
+    keys.add_argument("--last", type=_frame, metavar="FRAME", help="bake up to here (last key)")
+    places = parser.add_argument_group("files")
+    places.add_argument("--output", type=Path, metavar="FOLDER", help="where to write (beside each file)")
+    places.add_argument("--overwrite", action="store_true", help="replace files of an earlier run")
+    places.add_argument("--in-place", action="store_true", help="save the files themselves")
+    options = parser.parse_args(arguments)
+    if options.unbake:
+        for option in ("step", "first", "last"):
+            if getattr(options, option) is not None:
+                parser.error(f"--{option} is for baking, and says nothing to --unbake: leave it out")
+    if None not in (options.first, options.last) and options.first > options.last:
+        parser.error(f"--last {options.last:g} is before --first {options.first:g}")
+    if options.in_place and options.output:
+        parser.error("--in-place saves the files themselves, --output writes others: give one of them")
+    if options.output and options.output.exists() and not options.output.is_dir():
+        parser.error(f"--output {options.output} is a file: give a folder")
+    options.action = _unbaking() if options.unbake else _baking(options.step or 1.0, options.first, options.last)
+    try:
+        options.jobs = jobs_of(options.files, options.action.suffix, options.output, in_place=options.in_place)
+    except ValueError as error:
+        parser.error(str(error))
+    return options
+
+
+def jobs_of(files: Sequence[Path], suffix: str, folder: Path | None, *, in_place: bool) -> list[Job]:
+    """What to read and where to write it; a file that is named twice is one.
+
+    Raises
+    ------
+    ValueError
+        Where two files would be written to one place, or one over another that is to be read.
+    """
+    sources: dict[str, Path] = {}
+    for path in files:
+        sources.setdefault(os.path.normcase(path.resolve()), path)
+    jobs, places = [], {}
+    for path in sources.values():
+        output = path if in_place else (folder or path.parent) / f"{path.stem}{suffix}.blend"
+        place = os.path.normcase(output.resolve())
+        if place in places:
+            raise ValueError(
+                f"{places[place]} and {path} would both be written to {output}: do them one after the other, with "
+                "another --output"
+            )
+        if not in_place and place in sources:
+            raise ValueError(f"{path} would be written over {output}, which is to be read too: leave one of them out")
+        places[place] = path
+        jobs.append(Job(path, output))
+    return jobs
+
+
+def main(arguments: list[str]) -> int:
+    """Do all files, and return the exit code."""
+    options = parse(arguments)
+    outcomes: list[Outcome] = []
+    interrupted = False
+    with Progress() as progress, _extension(), _ctrl_c_between_steps() as stop_if_asked:
+        run = _Run(options, progress.note, stop_if_asked)
+        try:
+            with progress.stage("Un-baking" if options.unbake else "Baking", len(options.jobs)) as stage:
+                for job in options.jobs:
+                    stage.say(job.source.name)
+                    outcomes.append(run.do(job))
+                    stage.advance()
+        except KeyboardInterrupt:
+            interrupted = True
+        else:
+            seen = [one for one in outcomes if not one.failed]
+            unmatched = set(options.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
+            for name in sorted(unmatched):
+                progress.note(f"bake.py: --objects {name}: no object of that name has anything to be {run.action.done}")
+    if not options.dry_run:
+        for one in outcomes:
+            if one.written is not None:
+                print(one.written, flush=True)
+    print(_summary(outcomes, len(options.jobs), options, interrupted=interrupted), file=sys.stderr, flush=True)
+    if interrupted:
+        return 130
+    if all(one.unreadable for one in outcomes):
+        return 2
+    return int(bool(unmatched) or any(one.refused or one.failed for one in outcomes))
+
+
+def _summary(outcomes: Sequence[Outcome], count: int, options: argparse.Namespace, *, interrupted: bool) -> str:
+    """What came of it all, in a line."""
+    action, would = options.action, "to be " if options.dry_run else ""
+    done, refused = sum(one.done for one in outcomes), sum(one.refused for one in outcomes)
+    written, failed = sum(one.written is not None for one in outcomes), sum(one.failed for one in outcomes)
+    idle = len(outcomes) - written - failed
+    parts = [f"{written} {would}written"]
+    parts += [f"{idle} left alone"] if idle else []
+    parts += [f"{failed} failed"] if failed else []
+    parts += [f"{count - len(outcomes)} not reached"] if interrupted else []
+    told = f"{_counted(done, 'object')} {would}{action.done}" + (f", {refused} not" if refused else "")
+    return f"{'Stopped. ' if interrupted else ''}{told}; {_counted(count, 'file')}: {', '.join(parts)}."
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+class _Run:
+    """Doing files, one after the other."""
+
+    def __init__(
+        self, options: argparse.Namespace, note: Callable[[str], None], stop_if_asked: Callable[[], None]
+    ) -> None:
+        self.options, self.action = options, options.action
+        self._note, self._stop_if_asked = note, stop_if_asked
+        self._would = "would be " if options.dry_run else ""
+
+    def do(self, job: Job) -> Outcome:
+        """Open a file, do its objects, and write it."""
+        outcome = Outcome()
+        try:
+            if job.output != job.source and job.output.exists() and not self.options.overwrite:
+                raise FileProblem(f"{job.output} is there already: add --overwrite, or another --output")
+            open_file(job.source)
+            self._stop_if_asked()
+            self._do_objects(job, outcome)
+            self._finish(job, outcome)
+        except FileProblem as problem:
+            outcome = Outcome(failed=True, unreadable=isinstance(problem, Unreadable), matched=outcome.matched)
+            self._note(f"{job.source}: {problem}")
+        except Exception as error:
+            # What nobody foresaw in one file must not keep the others from being done.
+            outcome = Outcome(failed=True, matched=outcome.matched)
+            self._note(f"{job.source}: not written, for this program failed ({type(error).__name__}: {error}):")
+            traceback.print_exc()
+        return outcome
+
+    def _do_objects(self, job: Job, outcome: Outcome) -> None:
+        for obj in list(bpy.data.objects):
+            matching = self._matching(obj.name)
+            if not matching or not self.action.concerns(obj):
+                continue
+            outcome.matched |= matching
+            name = obj.name
+            try:
+                _refuse_linked(obj)
+                told = self.action.act(obj)
+            except Refused as refusal:
+                outcome.refused += 1
+                reason = str(refusal).removeprefix(f"{name}: ")
+                self._note(f"{job.source}: {name}: not {self.action.done}: {reason}")
+            else:
+                outcome.done += 1
+                self._note(f"{job.source}: {name}: {self._would}{self.action.done}{told}")
+            self._stop_if_asked()
+
+    def _matching(self, name: str) -> set[str]:
+        """The names and patterns asked for that an object's name fits; without any it fits all the same."""
+        asked = self.options.objects
+        return {"*"} if asked is None else {one for one in asked if name == one or fnmatchcase(name, one)}
+
+    def _finish(self, job: Job, outcome: Outcome) -> None:
+        if not outcome.done:
+            why = "no object could be" if outcome.refused else "nothing to be"
+            self._note(f"{job.source}: {why} {self.action.done}; left alone")
+            return
+        if (before := bpy.data.version[:2]) < HERE:
+            self._note(
+                f"{job.source}: was saved by Blender {_version(before)}; what is written is of Blender {_version(HERE)}"
+            )
+        if not self.options.dry_run:
+            write_file(job, self._stop_if_asked)
+        self._note(f"{job.source}: {self._would}written to {job.output}")
+        outcome.written = job.output
+
+
+def open_file(path: Path) -> None:
+    """Open a .blend file, without running anything that is in it. Raises `Unreadable`."""
+    if path.is_dir():
+        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.blend'}")
+    try:
+        with hushed(errors=True):
+            bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=True, use_scripts=False)
+    except RuntimeError as error:
+        said = " ".join(str(error).split()).removeprefix("Error: ")
+        if "not supported" in said:
+            raise Unreadable("this is no .blend file") from None
+        if "Cannot read file" in said:
+            raise Unreadable(said.rpartition(": ")[2]) from None
+        raise Unreadable(f"Blender cannot read this file, which looks damaged ({said.rpartition(': ')[2]})") from None
+    if (newer := bpy.data.version[:2]) > HERE:
+        # Blender opens it all the same, and would leave out on saving what it does not know.
+        raise Unreadable(
+            f"this was saved by Blender {_version(newer)}, and this is {_version(HERE)}: take that one or a later one"
+        )
+
+
+def write_file(job: Job, stop_if_asked: Callable[[], None]) -> None:
+    """Save what is open, whole or not at all. Raises `FileProblem`."""
+    try:
+        with hushed(errors=True):
+            if job.output == job.source:
+                bpy.ops.wm.save_mainfile()
+                return
+            with written_beside(job.output) as beside:
+                bpy.ops.wm.save_as_mainfile(filepath=str(beside), copy=True, check_existing=False, relative_remap=True)
+                stop_if_asked()
+    except RuntimeError as error:
+        said = " ".join(str(error).split()).removeprefix("Error: ")
+        raise FileProblem(f"{job.output} could not be written ({said})") from None
+    except OSError as error:
+        raise FileProblem(f"{error.filename or job.output}: {error.strerror or error}") from None
+
+
+def _version(version: tuple[int, int]) -> str:
+    return ".".join(map(str, version))
+
+
+def _baking(step: float, first: float | None, last: float | None) -> Action:
+    def bake(obj: bpy.types.Object) -> str:
+        if problem := animation.problem_of(obj):
+            raise Refused(problem)
+        modes = _labels(obj)
+        begin, end = animation.bake(obj, step=step, first=first, last=last)
+        return f", frames {begin:g} to {end:g}, {', '.join(modes)}"
+
+    return Action("baked", "-baked", has_rigid_segments, bake)
+
+
+def _unbaking() -> Action:
+    def unbake(obj: bpy.types.Object) -> str:
+        animation.unbake(obj)
+        return f", {', '.join(_labels(obj))}"
+
+    return Action("un-baked", "-unbaked", animation.is_baked, unbake)
+
+
+def has_rigid_segments(obj: bpy.types.Object) -> bool:
+    """Whether an object is to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
+    for slot in slots_of([obj]):
+        curves = curves_in(slot.channelbag)
+        try:
+            if read(slot, curves).is_live:
+                return True
+        except ValueError:
+            if segment_modes(slot) and _has_mode(obj, curves):
+                return True
+    return False
+
+
+def _has_mode(obj: bpy.types.Object, curves: Curves) -> bool:
+    """Whether an object has any mode but Blender's own in a slot, also one that this version does not know."""
+    channel = curves.get((MODE_PATH, 0))
+    if channel is None or channel.mute or not len(channel.keyframe_points):
+        return obj.rigid_motion.mode != "BLENDER"
+    return any(not abs(key.co.y) < 0.5 for key in channel.keyframe_points)
+
+
+def _labels(obj: bpy.types.Object) -> list[str]:
+    """The modes of an object's segments as Blender's menus show them, each once."""
+    modes = dict.fromkeys(mode for slot in slots_of([obj]) for mode in segment_modes(replace(slot, users=(obj,))))
+    return [KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in modes]
+
+
+def _refuse_linked(obj: bpy.types.Object) -> None:
+    if obj.library is not None:
+        raise Refused(f"it is linked from {obj.library.filepath}: use --in-place on that file, or make it local")
+
+
+@contextmanager
+def _extension() -> Iterator[None]:
+    """What the extension keeps in files and follows, from this checkout, in place of one that is installed."""
+    enabled = [addon.module for addon in bpy.context.preferences.addons]
+    installed = [name for name in enabled if name.rpartition(".")[2] == EXTENSION]
+    for name in installed:
+        addon_utils.disable(name)
+    animation.register()
+    try:
+        yield
+    finally:
+        animation.unregister()
+        for name in installed:
+            addon_utils.enable(name)
+
+
+@contextmanager
+def _ctrl_c_between_steps() -> Iterator[Callable[[], None]]:
+    """A function that raises KeyboardInterrupt after Ctrl-C. Blender swallows what is raised while it works."""
+    pressed = False
+
+    def press(*_: object) -> None:
+        nonlocal pressed
+        pressed = True
+
+    def stop_if_asked() -> None:
+        if pressed:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield stop_if_asked
+    finally:
+        # None stands for the Blender program's own, which Python cannot put back.
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+
+
+def _names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise argparse.ArgumentTypeError("name an object, or several as in Camera,'Tool*'")
+    return names
+
+
+def _frame(text: str) -> float:
+    try:
+        frame = float(text)
+    except ValueError:
+        frame = math.nan
+    if not math.isfinite(frame):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a frame")
+    return frame
+
+
+def _step(text: str) -> float:
+    try:
+        step = float(text)
+    except ValueError:
+        step = math.nan
+    if not SMALLEST_STEP <= step < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of frames, {SMALLEST_STEP} or more")
+    return step
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(own_arguments(__file__)))
+    except KeyboardInterrupt:
+        sys.exit(130)

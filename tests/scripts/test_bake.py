@@ -1,0 +1,606 @@
+"""bake.py as people run it: what the files it writes play, what it leaves alone, what it says, how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import is_baked, set_mode
+from scripts import bake
+from tests.animation.farm import played_on_a_farm
+from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+
+ROOT = Path(__file__).resolve().parents[2]
+
+PLAYED = np.arange(0.0, 104.0)
+"""All frames of the scenes: from before the first key until after the last strip."""
+
+BAKED = ("Arm", "Camera", "Own", "Strips", "Tool", "Wheel")
+REFUSED = {
+    "Axis": "set its rotation mode to Quaternion first",
+    "Crane": "Location X is driven: remove the driver",
+    "Future": "has no mode that this version knows",
+    "Huge": "has keys too large to compute with",
+    "Noisy": "has a modifier of type Noise",
+    "Prop": "it is linked from //library.blend: use --in-place on that file, or make it local",
+}
+"""Objects of the shot that cannot be baked, and what is said of them."""
+
+
+def run(*arguments: object) -> int:
+    return bake.main([str(argument) for argument in arguments])
+
+
+def exit_code(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        run(*arguments)
+    return ended.value.code
+
+
+@contextmanager
+def extension() -> Iterator[None]:
+    """The extension switched on, as an animator has it; bake.py switches on its own."""
+    animation.register()
+    try:
+        yield
+    finally:
+        animation.unregister()
+
+
+def new_file() -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, int(PLAYED[-1])
+
+
+def save(path: Path, **options: object) -> Path:
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
+    return path
+
+
+def open_again(path: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+
+
+def one_object_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda obj: None, **options) -> Path:
+    """A file with one live object, and what is done to it."""
+    with extension():
+        new_file()
+        obj = key(new_object("Tool"))
+        set_mode(obj, "dq_sclerp")
+        edit(obj)
+        return save(path, **options)
+
+
+def baked_name(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-baked.blend")
+
+
+def frames_of_keys(obj: bpy.types.Object) -> list[float]:
+    return [point.co.x for point in curves_of(obj)["location", 0].keyframe_points]
+
+
+def fill_shot() -> None:
+    """Objects of every kind that can be baked, and of some that cannot."""
+    arm = key(new_object("Arm", "XYZ"), (1.0, 30.0), seed=9)
+    set_mode(arm, "dq_sclerp")
+    tool = key(new_object("Tool"), seed=1)
+    tool.parent, tool.matrix_parent_inverse = arm, np.eye(4) + 0.1 * np.eye(4, k=3)
+    set_mode(tool, "motor_spline")
+    set_mode(tool, "lerp_slerp", FRAMES[1:2])
+    set_mode(tool, "BLENDER", FRAMES[2:3])
+    bpy.context.scene.camera = key(new_object("Camera", "XYZ", bpy.data.cameras.new("Lens")), seed=2)
+    set_mode(bpy.context.scene.camera, "dq_sclerp")
+    wheel = key(new_object("Wheel"), (1.0, 13.0), seed=3)
+    set_mode(wheel, "dq_sclerp")
+    for fcurve in curves_of(wheel).values():
+        if fcurve.data_path.startswith(("location", "rotation")):
+            fcurve.modifiers.new("CYCLES")
+    strips = key(new_object("Strips"), seed=4)
+    strips.animation_data.nla_tracks.new().strips.new("Strip", 60, strips.animation_data.action)
+    strips.animation_data.action = None
+    key(strips, seed=5)
+    set_mode(strips, "cga_slerp")
+    own = new_object("Own")
+    give_own_deltas(own)
+    set_mode(key(own, scale="even"), "pga_lerp")
+    new_object("Still")
+    key(new_object("Plain"), seed=6)
+    refused = {name: key(new_object(name), seed=7) for name in REFUSED if name != "Prop"}
+    for obj in refused.values():
+        set_mode(obj, "dq_sclerp", FRAMES[:2])
+    refused["Axis"].rotation_mode = "AXIS_ANGLE"
+    refused["Crane"].driver_add("location", 0).driver.expression = "frame"
+    curves_of(refused["Future"])["rigid_motion.mode", 0].keyframe_points[1].co.y = 42.0
+    curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
+    curves_of(refused["Noisy"])["location", 0].modifiers.new("NOISE")
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with the objects of BAKED and REFUSED, the last of them linked, saved on frame 17."""
+    folder = tmp_path_factory.mktemp("shot")
+    with extension():
+        new_file()
+        set_mode(key(new_object("Prop")), "dq_sclerp")
+        library = save(folder / "library.blend")
+        new_file()
+        fill_shot()
+        shot = save(folder / "shot.blend")
+        with bpy.data.libraries.load(str(library), link=True, relative=True) as (there, here):
+            here.objects = there.objects
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        bpy.context.scene.frame_set(17)
+        bpy.ops.wm.save_mainfile()
+        (folder / "shot.blend1").unlink(missing_ok=True)
+    return shot
+
+
+@pytest.fixture(scope="module")
+def baked(shot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shot, baked into another folder."""
+    folder = tmp_path_factory.mktemp("baked")
+    assert run(shot, "--output", folder) == 1
+    return folder / "shot-baked.blend"
+
+
+def assert_same(worlds: np.ndarray, wanted: list[np.ndarray]) -> None:
+    for one, other in zip(worlds, wanted, strict=True):
+        assert np.abs(one - other).max() <= 1e-5 * max(1.0, np.abs(other).max())
+
+
+def live_worlds(path: Path, names: tuple[str, ...]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What a live file shows with the extension, as it is opened and on all frames."""
+    with extension():
+        open_again(path)
+        graph = bpy.context.evaluated_depsgraph_get()
+        objects = [bpy.data.objects[name] for name in names]
+        return [np.array(obj.evaluated_get(graph).matrix_world) for obj in objects], shown_worlds(objects, PLAYED)
+
+
+# What comes out
+
+
+def test_a_baked_file_plays_in_any_blender_as_the_live_one_does_with_the_extension(shot, baked):
+    moved = (name for name in REFUSED if name != "Huge")  # That one is nowhere, with or without the extension.
+    names = (*BAKED, *moved, "Still", "Plain")
+    opened, shown = live_worlds(shot, names)
+    opened_there, shown_there = played_on_a_farm(baked, names, PLAYED)
+    assert_same(opened_there, opened)
+    assert_same(shown_there, shown)
+
+
+def test_a_baked_file_has_keys_on_every_frame_and_no_delta_transforms(baked):
+    with extension():
+        open_again(baked)
+        for name in BAKED:
+            obj = bpy.data.objects[name]
+            frames = frames_of_keys(obj)
+            assert set(np.arange(frames[0], frames[-1] + 1.0)) <= set(frames)
+            assert not any(path.startswith("delta") for path, _ in curves_of(obj))
+            assert is_baked(obj)
+
+
+def test_un_baking_gives_back_exactly_the_keys_and_the_motion(shot, baked, tmp_path):
+    assert run(baked, "--unbake", "--output", tmp_path) == 0
+    names = (*BAKED, "Still", "Plain")
+    found = []
+    for path in (shot, tmp_path / "shot-baked-unbaked.blend"):
+        with extension():
+            open_again(path)
+            objects = [bpy.data.objects[name] for name in names]
+            modes = [obj.rigid_motion.mode for obj in objects]
+            found.append(([snapshot(obj) for obj in objects], modes, shown_worlds(objects, PLAYED)))
+    assert found[0][:2] == found[1][:2]
+    assert_same(found[1][2], found[0][2])
+
+
+def test_the_delta_transforms_of_an_object_itself_come_back_too(baked, shot, tmp_path):
+    assert run(baked, "--unbake", "--output", tmp_path) == 0
+    owns = []
+    for path in (shot, tmp_path / "shot-baked-unbaked.blend"):
+        with extension():
+            open_again(path)
+            obj = bpy.data.objects["Own"]
+            set_mode(obj, "BLENDER")
+            owns.append(own_deltas(obj))
+    assert owns[0] == owns[1]
+
+
+def test_keys_count_as_they_are_where_live_update_was_off(tmp_path):
+    def edit(obj: bpy.types.Object) -> None:
+        animation.set_enabled(False)
+        key(obj, seed=5)
+
+    try:
+        path = one_object_file(tmp_path / "shot.blend", edit)
+    finally:
+        animation.set_enabled(True)
+    with extension():
+        open_again(path)
+        wanted = expected_worlds(bpy.data.objects["Tool"], PLAYED[:43])
+    assert run(path) == 0
+    open_again(baked_name(path))
+    assert_same(shown_worlds([bpy.data.objects["Tool"]], PLAYED[:43]), [wanted])
+
+
+def test_a_library_override_is_baked_and_given_back(tmp_path):
+    with extension():
+        new_file()
+        give_own_deltas(key(new_object("Prop")))
+        library = save(tmp_path / "library.blend")
+        new_file()
+        with bpy.data.libraries.load(str(library), link=True, relative=False) as (there, here):
+            here.objects = there.objects
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        obj = here.objects[0].override_create(remap_local_usages=True)
+        obj.animation_data.action = obj.animation_data.action.copy()
+        set_mode(obj, "dq_sclerp")
+        bpy.context.scene.frame_set(17)
+        (wanted,), keys = shown_worlds([obj], PLAYED[:43]), snapshot(obj)
+        path = save(tmp_path / "shot.blend")
+    assert run(path, "--output", tmp_path / "farm") == 0
+    assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
+    for name in ("shot-baked", "shot-baked-unbaked"):
+        with extension():
+            open_again(tmp_path / "farm" / f"{name}.blend")
+            obj = next(obj for obj in bpy.data.objects if obj.override_library)
+            assert_same(shown_worlds([obj], PLAYED[:43]), [wanted])
+    assert snapshot(obj) == keys
+
+
+@pytest.mark.parametrize(
+    ("options", "wanted"),
+    [
+        (("--step", "0.5"), sorted({*np.arange(1.0, 40.5, 0.5)})),
+        (("--step", "7"), sorted({*np.arange(1.0, 40.5, 7.0), *FRAMES})),
+        (("--first", "12", "--last", "20"), [1.0, *np.arange(11.0, 25.0), 40.0]),
+    ],
+)
+def test_steps_and_ranges(tmp_path, options, wanted):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path, *options) == 0
+    open_again(baked_name(path))
+    assert frames_of_keys(bpy.data.objects["Tool"]) == wanted
+
+
+def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):
+    assert run(shot, "--output", tmp_path, "--objects", "Camera, [TW]*") == 0
+    with extension():
+        open_again(tmp_path / "shot-baked.blend")
+        assert {obj.name for obj in bpy.data.objects if is_baked(obj)} == {"Camera", "Tool", "Wheel"}
+
+
+def test_a_name_that_nothing_has_is_said(shot, tmp_path, capsys):
+    assert run(shot, "--output", tmp_path, "--objects", "Camera,Camra") == 1
+    assert "--objects Camra: no object of that name" in capsys.readouterr().err
+    assert (tmp_path / "shot-baked.blend").is_file()
+    assert run(shot, "--output", tmp_path, "--objects", "Camra") == 1
+    assert "Camra" not in capsys.readouterr().err, "a file that was not looked into may have it"
+
+
+# What it says
+
+
+def test_what_cannot_be_baked_is_named_with_the_way_out_and_the_others_go_on(shot, tmp_path, capsys):
+    assert run(shot, "--output", tmp_path) == 1
+    said = capsys.readouterr()
+    lines = said.err.splitlines()
+    for name, reason in REFUSED.items():
+        (line,) = (line for line in lines if line.startswith(f"{shot}: {name}: not baked: "))
+        assert reason in line
+    assert f"{shot}: Tool: baked, frames 1 to 40, Smooth Screw (PGA), Vector + Quaternion, Blender" in lines
+    assert lines[-1] == f"{len(BAKED)} objects baked, {len(REFUSED)} not; 1 file: 1 written."
+    assert said.out == f"{tmp_path / 'shot-baked.blend'}\n"
+    assert not any("Plain" in line or "Still" in line for line in lines)
+
+
+def test_a_dry_run_says_the_same_and_writes_nothing(shot, tmp_path, capsys):
+    assert run(shot, "--output", tmp_path / "farm", "--dry-run") == 1
+    said = capsys.readouterr()
+    assert "Tool: would be baked, frames 1 to 40" in said.err
+    assert "Crane: not baked" in said.err
+    assert f"would be written to {tmp_path / 'farm' / 'shot-baked.blend'}" in said.err
+    assert said.out == ""
+    assert not (tmp_path / "farm").exists()
+
+
+def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
+    new_file()
+    key(new_object("Plain"))
+    path = save(tmp_path / "plain.blend")
+    assert run(path) == run(path, "--unbake") == 0
+    assert "nothing to be baked; left alone" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == ["plain.blend"]
+
+
+def test_a_file_of_an_older_blender_is_said_to_be_of_this_one_afterwards(tmp_path, capsys, monkeypatch):
+    path = one_object_file(tmp_path / "shot.blend", compress=False)
+    with_version(path, "405", "0405")
+    monkeypatch.setattr(bake, "HERE", (9, 0))
+    assert run(path) == 0
+    assert "was saved by Blender 4.5; what is written is of Blender 9.0" in capsys.readouterr().err
+
+
+def with_version(path: Path, old_style: str, new_style: str) -> None:
+    """Let a file say that another Blender saved it: until 5.0 as in v405, and then as in v0500."""
+    content = path.read_bytes()
+    place = content.index(b"v") + 1
+    version = (old_style if content[7:9] == b"-v" else new_style).encode()
+    path.write_bytes(content[:place] + version + content[place + len(version) :])
+
+
+def text(path: Path) -> None:
+    path.write_text("not Blender's")
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(one_object_file(path).read_bytes()[:50_000])
+
+
+def newer(path: Path) -> None:
+    with_version(one_object_file(path, compress=False), "999", "9999")
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (text, "this is no .blend file"),
+        (Path.touch, "this is no .blend file"),
+        (cut, "Blender cannot read this file, which looks damaged"),
+        (newer, "and this is"),
+        (Path.mkdir, "this is a folder: name the files in it"),
+        (lambda path: None, "No such file or directory"),
+    ],
+    ids=["text", "empty", "cut off", "newer", "folder", "missing"],
+)
+def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capfd, make, problem):
+    bad, good = tmp_path / "bad.blend", one_object_file(tmp_path / "good.blend")
+    make(bad)
+    capfd.readouterr()
+    assert run(bad, good) == 1
+    said = capfd.readouterr()
+    (line,) = (line for line in said.err.splitlines() if "bad.blend" in line)
+    assert line.startswith(f"{bad}: ")
+    assert problem in line
+    assert said.out == f"{baked_name(good)}\n"
+    assert run(bad) == 2
+    assert not baked_name(bad).exists()
+
+
+def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, capsys, monkeypatch):
+    paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
+    real = animation.bake
+
+    def fail_in_a(obj: bpy.types.Object, **options: object) -> tuple[float, float]:
+        if bpy.data.filepath == str(paths[0]):
+            raise ZeroDivisionError("nobody knows why")
+        return real(obj, **options)
+
+    monkeypatch.setattr(animation, "bake", fail_in_a)
+    assert run(*paths) == 1
+    said = capsys.readouterr().err
+    assert f"{paths[0]}: not written, for this program failed (ZeroDivisionError: nobody knows why)" in said
+    assert "Traceback" in said
+    assert sorted(os.listdir(tmp_path)) == ["a.blend", "b-baked.blend", "b.blend"]
+
+
+# What is left alone, and what is kept
+
+
+def test_the_file_itself_is_not_touched_and_nothing_else_is_left(tmp_path):
+    path = one_object_file(tmp_path / "shot.blend")
+    before = path.read_bytes(), path.stat().st_mtime_ns
+    assert run(path) == 0
+    assert (path.read_bytes(), path.stat().st_mtime_ns) == before
+    assert sorted(os.listdir(tmp_path)) == ["shot-baked.blend", "shot.blend"]
+
+
+def test_a_file_that_is_there_is_left_alone_unless_it_may_be_overwritten(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    baked_name(path).write_text("precious")
+    assert run(path) == 1
+    assert "is there already: add --overwrite" in capsys.readouterr().err
+    assert baked_name(path).read_text() == "precious"
+    assert run(path, "--overwrite") == 0
+    open_again(baked_name(path))
+    assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
+
+
+def test_in_place_the_file_is_saved_and_the_one_before_kept_by_blender(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    before = path.read_bytes()
+    capsys.readouterr()
+    assert run(path, "--in-place") == 0
+    assert capsys.readouterr().out == f"{path}\n"
+    assert sorted(os.listdir(tmp_path)) == ["shot.blend", "shot.blend1"]
+    assert (tmp_path / "shot.blend1").read_bytes() == before
+    open_again(path)
+    assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    (tmp_path / "file").touch()
+    assert run(path, "--output", tmp_path / "file" / "folder") == 1
+    said = capsys.readouterr().err.splitlines()
+    assert any(line.startswith(f"{path}: {tmp_path / 'file'}") for line in said)
+    assert said[-1] == "0 objects baked; 1 file: 0 written, 1 failed."
+    assert sorted(os.listdir(tmp_path)) == ["file", "shot.blend"]
+
+
+def test_textures_and_libraries_are_found_from_another_folder(tmp_path):
+    (tmp_path / "shots" / "textures").mkdir(parents=True)
+    shots = tmp_path / "shots"
+    with extension():
+        new_file()
+        new_object("Prop")
+        library = save(shots / "library.blend")
+        new_file()
+        set_mode(key(new_object("Tool")), "dq_sclerp")
+        path = save(shots / "shot.blend")
+        image = bpy.data.images.new("Wood", 4, 4)
+        image.filepath_raw, image.file_format = str(shots / "textures" / "wood.png"), "PNG"
+        image.save()
+        image.filepath, image.use_fake_user = "//textures/wood.png", True
+        with bpy.data.libraries.load(str(library), link=True, relative=True) as (there, here):
+            here.objects = there.objects
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        bpy.ops.wm.save_mainfile()
+    assert run(path, "--output", tmp_path / "farm" / "night") == 0
+    open_again(tmp_path / "farm" / "night" / "shot-baked.blend")
+    image, library = bpy.data.images["Wood"], bpy.data.libraries[0]
+    assert image.filepath.startswith("//")
+    assert library.filepath.startswith("//")
+    assert Path(bpy.path.abspath(image.filepath)).samefile(shots / "textures" / "wood.png")
+    assert Path(bpy.path.abspath(library.filepath)).samefile(shots / "library.blend")
+    assert not bpy.data.objects["Prop"].is_missing
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_compressed_file_stays_compressed_and_another_not(tmp_path, compress):
+    path = one_object_file(tmp_path / "shot.blend", compress=compress)
+    assert run(path) == 0
+    assert (baked_name(path).read_bytes()[:7] == b"BLENDER") is not compress
+
+
+def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
+    trace = tmp_path / "trace"
+
+    def edit(obj: bpy.types.Object) -> None:
+        script = bpy.data.texts.new("run.py")
+        script.write(f"open({str(trace)!r}, 'w').close()")
+        script.use_module = True
+        obj.driver_add("hide_render").driver.expression = "__import__('os').getpid() > 0"
+
+    path = one_object_file(tmp_path / "shot.blend", edit)
+    preferences = bpy.context.preferences.filepaths
+    allowed = preferences.use_scripts_auto_execute
+    preferences.use_scripts_auto_execute = True
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=True)
+        assert trace.exists(), "this script does run where it may, or this test says nothing"
+        trace.unlink()
+        assert run(path) == 0
+    finally:
+        preferences.use_scripts_auto_execute = allowed
+    assert not trace.exists()
+    bpy.ops.wm.open_mainfile(filepath=str(baked_name(path)), use_scripts=False)
+    assert bpy.data.texts["run.py"].use_module
+    assert len(bpy.data.objects["Tool"].animation_data.drivers) == 1
+
+
+# How it ends
+
+
+@pytest.mark.parametrize("stopped_at", [1, 2])
+def test_ctrl_c_leaves_whole_files_only(tmp_path, capsys, monkeypatch, stopped_at):
+    paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
+    count, real = 0, animation.bake
+
+    def bake_and_press(obj: bpy.types.Object, **options: object) -> tuple[float, float]:
+        nonlocal count
+        count += 1
+        if count == stopped_at:
+            signal.raise_signal(signal.SIGINT)
+        return real(obj, **options)
+
+    monkeypatch.setattr(animation, "bake", bake_and_press)
+    before = signal.getsignal(signal.SIGINT)
+    assert run(*paths) == 130
+    assert signal.getsignal(signal.SIGINT) is before
+    assert sorted(os.listdir(tmp_path)) == ["a-baked.blend", "a.blend", "b.blend"][2 - stopped_at :][: stopped_at + 1]
+    assert capsys.readouterr().err.splitlines()[-1].startswith("Stopped. ")
+    assert not hasattr(bpy.types.Object, "rigid_motion")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ([], "FILE.blend"),
+        (["a.blend", "--step", "0"], "is not a number of frames"),
+        (["a.blend", "--step", "nan"], "is not a number of frames"),
+        (["a.blend", "--first", "inf"], "is not a frame"),
+        (["a.blend", "--first", "9", "--last", "3"], "--last 3 is before --first 9"),
+        (["a.blend", "--objects", ","], "name an object"),
+        (["a.blend", "--unbake", "--step", "2"], "--step is for baking"),
+        (["a.blend", "--unbake", "--first", "0"], "--first is for baking"),
+        (["a.blend", "--in-place", "--output", "x"], "give one of them"),
+        (["a.blend", "--output", __file__], "is a file: give a folder"),
+        (["a/shot.blend", "b/shot.blend", "--output", "x"], "would both be written to"),
+        (["shot.blend", "shot-baked.blend"], "would be written over shot-baked.blend"),
+    ],
+)
+def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
+    assert exit_code(*arguments) == 2
+    assert complaint in capsys.readouterr().err
+
+
+def test_a_file_that_is_named_twice_is_done_once():
+    jobs = bake.jobs_of([Path("a.blend"), Path("b.blend"), Path("x/../a.blend")], "-baked", None, in_place=False)
+    assert [job.source for job in jobs] == [Path("a.blend"), Path("b.blend")]
+
+
+def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
+    path = one_object_file(tmp_path / "shot.blend")
+    done = subprocess.run(
+        [sys.executable, ROOT / "scripts" / "bake.py", path.name],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tmp_path,
+    )
+    assert (done.returncode, done.stdout) == (0, "shot-baked.blend\n"), done.stderr
+
+
+BESIDE_AN_INSTALLED_EXTENSION = """
+import json, runpy, sys
+import bpy
+script, package, path = sys.argv[1:]
+bpy.ops.extensions.package_install_files(filepath=package, repo="user_default", enable_on_install=True)
+
+
+def state():
+    return [str(one) for one in bpy.app.handlers.depsgraph_update_post], dir(bpy.types.Object), dir(bpy.types.Action)
+
+
+before = state()
+assert "rigid_motion" in before[1]
+sys.argv = [script, path]
+try:
+    runpy.run_path(script, run_name="__main__")
+except SystemExit as ended:
+    code = ended.code
+print(json.dumps({"code": code, "as before": [len(one) for one in state()] == [len(one) for one in before]}))
+bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rigid_motion")
+"""
+
+
+def test_an_installed_extension_steps_aside_and_is_there_again_afterwards(extension_zip, tmp_path):
+    path = one_object_file(tmp_path / "shot.blend")
+    done = subprocess.run(
+        [sys.executable, "-c", BESIDE_AN_INSTALLED_EXTENSION, ROOT / "scripts" / "bake.py", extension_zip, path],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env=os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")},
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert json.loads(done.stdout.splitlines()[-1]) == {"code": 0, "as before": True}
+    assert "1 object baked; 1 file: 1 written." in done.stderr
+    assert "registered" not in done.stderr
+    shutil.copy(baked_name(path), tmp_path / "alone.blend")
+    open_again(tmp_path / "alone.blend")
+    assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40

@@ -1,0 +1,44 @@
+"""What is written by Python, by the system and by C is kept off the streams, and nothing else."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+
+import pytest
+
+from scripts.hushing import hushed
+
+
+def speak(words: str) -> None:
+    """On both streams by Python and by the system, and on the output by C, which holds it back."""
+    for stream, descriptor in ((sys.stdout, 1), (sys.stderr, 2)):
+        print(f"{words} by Python", file=stream)
+        os.write(descriptor, f"{words} by the system\n".encode())
+    (ctypes.CDLL("ucrtbase") if os.name == "nt" else ctypes.CDLL(None)).puts(f"{words} by C".encode())
+
+
+@pytest.mark.parametrize("errors", [False, True])
+def test_only_what_is_said_meanwhile_is_hushed(capfd, errors):
+    speak("before")
+    with hushed(errors=errors):
+        speak("meanwhile")
+    speak("after")
+    with hushed():
+        pass
+    output, said = capfd.readouterr()
+    for words in ("before", "after"):
+        for how in ("Python", "the system", "C"):
+            assert f"{words} by {how}\n" in output
+    assert "meanwhile" not in output
+    assert ("meanwhile by Python\nmeanwhile" in said) is not errors
+    assert "before by Python" in said
+    assert "after by Python" in said
+
+
+def test_an_error_goes_through_and_the_streams_are_back(capfd):
+    with pytest.raises(ZeroDivisionError), hushed(errors=True):
+        raise ZeroDivisionError
+    print("heard")
+    assert capfd.readouterr().out == "heard\n"
