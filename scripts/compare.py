@@ -84,7 +84,8 @@ choosing keys:
   everywhere, or --budget keys a second, on average over the clip, that make its RMS shell error small. Given neither,
   --rates are the budgets. Rates that are given beside adaptive keys are kept evenly as well, for comparison. The report
   then also shows the curve of error over keys, and how many keys every mode needs to be as good as lerp_slerp at 30,
-  20, 15 and 12 a second; that alone takes up to a second for every 100 samples.
+  20, 15 and 12 a second; that alone takes up to a second for every 100 samples. --fit adds how many it needs where they
+  need not be recorded poses, but are moved to where the motion follows the recording best; two to three times as long.
 
 choosing modes:
   best_of takes in every segment, from key to key, that of the other modes named which comes closest to the recording
@@ -148,6 +149,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--budget", type=_amounts(Budget), metavar="HZ,...", help="adaptive keys a second, on average over the clip"
     )
+    keys.add_argument("--fit", action="store_true", help="count the keys needed also where they are fitted")
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
@@ -197,7 +199,7 @@ def _choices(options: argparse.Namespace) -> list[Choice]:
     """All choices of keys of the run. Raises ValueError for options that do not go together."""
     rates, tolerance, budget = options.rates, options.tolerance, options.budget
     if options.decimate == "uniform":
-        for option, given in (("--tolerance", tolerance), ("--budget", budget)):
+        for option, given in (("--tolerance", tolerance), ("--budget", budget), ("--fit", options.fit)):
             if given:
                 raise ValueError(f"{option} is for keys that are chosen by the motion: add --decimate adaptive")
         return rates or _amounts(Uniform)(RATES)
@@ -306,6 +308,7 @@ class _Run:
             settings=settings,
             stage=None if options.no_video else stage,
             count_keys=options.decimate == "adaptive",
+            fit=options.fit,
         )
 
     def _say(self, outcome: Outcome, tasks: list[Task], seconds: float) -> None:

@@ -1,8 +1,9 @@
 """Keys needed: how few keys each mode can do with to be as good as the reference is with many, evenly spaced ones.
 
 As good means: the same RMS shell error, over the same samples. The reference is the paper's state of the art, sent at
-the rates of the paper's table; the others keep evenly spaced keys too, or those that `addon.motion.reduce_keys` finds.
-The same numbers are the points of the curve of error over keys a second. Errors are in metres.
+the rates of the paper's table; the others keep evenly spaced keys too, or those that `addon.motion.reduce_keys` finds,
+or fewer that `addon.motion.fit_keys` has moved: these are no samples, but have as many numbers. The same numbers are
+the points of the curve of error over keys a second. Errors are in metres.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.motion import decimate, interpolate, reduce_keys, rms, shell_error
+from addon.motion import Poses, decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
 
 from .clips import Clip
 from .files import write_text
@@ -29,7 +30,11 @@ RATES = ("30", "20", "15", "12", "8", "5")
 TABLE_RATES = RATES[:4]
 """Those of the paper's table; the lower ones make the curve longer."""
 
-DECIMATIONS = ("uniform", "adaptive")
+DECIMATIONS = ("uniform", "adaptive", "fitted")
+"""The ways to have fewer keys, of which the last is not always tried."""
+
+TRIES = 3
+"""How often fewer keys are fitted, to find how few will do."""
 
 COLUMNS = (
     *("clip", "mode", "decimation", "as_good_as_hz", "wanted_rms_shell_m"),
@@ -89,7 +94,7 @@ class KeysNeeded:
 
 
 def keys_needed(
-    clip: Clip, modes: Iterable[str], radius: float, advance: Callable[[], object] = lambda: None
+    clip: Clip, modes: Iterable[str], radius: float, *, fit: bool = False, advance: Callable[[], object] = lambda: None
 ) -> KeysNeeded:
     """Find the keys that each mode needs on a clip.
 
@@ -99,6 +104,8 @@ def keys_needed(
     modes : iterable of str
     radius : float
         Of the shell, in metres.
+    fit : bool
+        Whether to find fitted keys too, which takes two to three times as long.
     advance : callable
         Called once for each of `RATES`.
 
@@ -108,7 +115,7 @@ def keys_needed(
     the error fell with every key: the result is as good as the reference, one key fewer is not.
     """
     groups = same_motions(clip, tuple(modes), radius)
-    shape = len(groups), len(DECIMATIONS), len(RATES)
+    shape = len(groups), len(DECIMATIONS) if fit else 2, len(RATES)
     keys, reached = np.full(shape, np.nan), np.full(shape, np.nan)
     durations, reference_keys, targets = np.full((3, len(RATES)), np.nan)
     errors = np.full((len(groups), len(RATES)), np.nan)
@@ -132,10 +139,12 @@ def keys_needed(
                     radius / clip.metres_per_unit,
                     rms=True,
                 )
-                for column, found in enumerate((evenly, by_motion)):
-                    every = len(found) == len(stretch.times)
-                    keys[row, column, place] = np.inf if every else len(found)
-                    reached[row, column, place] = rms_error(stretch, found, group[0], radius)
+                ways = [(found, rms_error(stretch, found, group[0], radius)) for found in (evenly, by_motion)]
+                if fit:
+                    ways.append(_fewest_fitted(stretch, group[0], targets[place], radius, by_motion))
+                for column, (found, error) in enumerate(ways):
+                    keys[row, column, place] = np.inf if len(found) == len(stretch.times) else len(found)
+                    reached[row, column, place] = error
         advance()
     return KeysNeeded(clip.name, groups, RATES, durations, reference_keys, targets, keys, reached, errors)
 
@@ -145,9 +154,9 @@ def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:
     return decimate(clip.times, segments / float(clip.times[-1] - clip.times[0]))
 
 
-def rms_error(clip: Clip, keys: np.ndarray, mode: str, radius: float) -> float:
-    """The RMS shell error of a mode over all samples of a clip, in metres."""
-    filled = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
+def rms_error(clip: Clip, keys: np.ndarray, mode: str, radius: float, poses: Poses | None = None) -> float:
+    """The RMS shell error of a mode over all samples of a clip, in metres. The keys have these poses, or their own."""
+    filled = interpolate(clip.times[keys], clip.poses[keys] if poses is None else poses, clip.times, mode)
     return rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), radius))
 
 
@@ -170,6 +179,24 @@ def _fewest_evenly(clip: Clip, mode: str, target: float, radius: float, start: n
         else:
             too_few = middle
     return evenly_spaced(clip, enough)
+
+
+def _fewest_fitted(
+    clip: Clip, mode: str, target: float, radius: float, adaptive: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The fewest keys, and their error, that are within the target when fitted, searched from the adaptive ones on."""
+    best, reached = adaptive, rms_error(clip, adaptive, mode, radius)
+    keys, aim, scale = adaptive, target, clip.metres_per_unit
+    for _ in range(TRIES):
+        fitted = fit_keys(clip.times, clip.poses, keys, mode, radius / scale)
+        error = rms_error(clip, keys, mode, radius, fitted)
+        if error <= target and len(keys) <= len(best):
+            best, reached = keys, error
+        if error <= NOTHING:
+            break
+        aim *= target / error
+        keys = reduce_keys(clip.times, clip.poses, mode, aim / scale, radius / scale, rms=True)
+    return best, reached
 
 
 def _between(clip: Clip, keys: np.ndarray) -> Clip:

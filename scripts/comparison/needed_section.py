@@ -13,7 +13,7 @@ from .markup import Content, Markup, element
 from .needed import DECIMATIONS, TABLE_RATES, KeysNeeded, Overall, overall
 from .parts import curve, heading, is_best, label, missing_cell, mode_cell, number_cell, rounded, table, text_cell
 
-SPACINGS = {"uniform": "evenly spaced", "adaptive": "adaptive"}
+SPACINGS = {"uniform": "evenly spaced", "adaptive": "adaptive", "fitted": "adaptive and fitted"}
 """What the decimations are called."""
 
 HOW_TO_READ = (
@@ -31,6 +31,8 @@ def keys_section(clips: Sequence[KeysNeeded]) -> Markup:
         "of the column: keys that are evenly spaced too, or chosen by the motion. In per cent: of the keys of "
         f"{reference}."
     )
+    if together.shares.shape[1] == len(DECIMATIONS):
+        explained += " Fitted keys are no recorded poses, but moved to where the motion follows the recording best."
     if len(clips) > 1:
         explained += f" Geometric means over the {len(clips)} clips."
     return element(
@@ -50,13 +52,13 @@ def clip_part(name: str, clip: KeysNeeded) -> Markup:
 
 
 def savings(together: Overall) -> list[str]:
-    """What the table comes to, in a sentence for either decimation: the mode that did with the fewest keys."""
+    """What the table comes to, in a sentence for each decimation: the mode that did with the fewest keys."""
     rates = [rate for rate in TABLE_RATES if together.asked[together.rates.index(rate)]]
     columns = [together.rates.index(rate) for rate in rates]
     sentences: list[str] = []
     if not rates:
         return sentences
-    for decimation in (1, 0):
+    for decimation in reversed(range(together.shares.shape[1])):
         whole = (together.clips[:, decimation, columns] == together.asked[columns]).all(axis=1)
         shares = np.where(whole[:, None], together.shares[:, decimation, columns], np.nan)
         if not np.isfinite(shares).all(axis=1).any():
@@ -129,7 +131,7 @@ def _table(
             [cell((row, column, at), best[at]) for at in columns],
         )
         for row, group in enumerate(groups)
-        for column, decimation in enumerate(DECIMATIONS)
+        for column, decimation in enumerate(DECIMATIONS[: shares.shape[1]])
     ]
     return table(caption, head, body)
 

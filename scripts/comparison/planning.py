@@ -57,6 +57,9 @@ class Wanted:
     count_keys: bool
     """Whether to find out how many keys every mode needs."""
 
+    fit: bool = False
+    """And how many where they may be fitted."""
+
 
 @dataclass(frozen=True)
 class Study:
@@ -192,11 +195,11 @@ def _count(study: Study, reader: str, wanted: Wanted) -> Task:
     return Task(
         name=steps.counting(clip),
         function=f"{MODULE}:count_keys",
-        arguments={"clip": asdict(study.clip), "modes": wanted.modes, "radius": wanted.radius},
+        arguments={"clip": asdict(study.clip), "modes": wanted.modes, "radius": wanted.radius, "fit": wanted.fit},
         outputs=(steps.needed_of(clip),),
         after=(reader,),
         title=f"{clip}, keys needed",
-        weight=0.01 * study.samples,
+        weight=(0.03 if wanted.fit else 0.01) * study.samples,
     )
 
 

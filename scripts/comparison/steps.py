@@ -123,10 +123,10 @@ def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: 
 
 
 @step
-def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radius: float) -> None:
+def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radius: float, fit: bool) -> None:
     """Find how many keys every mode needs on a clip."""
     whole = read_clip(job.output, ClipReference(**clip))
-    found = needed.keys_needed(whole, single_modes(modes), radius, _counted(job, needed.RATES))
+    found = needed.keys_needed(whole, single_modes(modes), radius, fit=fit, advance=_counted(job, needed.RATES))
     write_text(job.writes(needed_of(whole.name)), needed.to_json(found))
 
 

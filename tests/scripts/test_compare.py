@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import os
 import re
 import shutil
@@ -21,6 +22,8 @@ from scipy.spatial.transform import Rotation
 from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
 from scripts.comparison.study import folder_names
+from scripts.workplan import Workspace
+from scripts.workplan import __main__ as workplan
 from tests.recordings import RECORDINGS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -293,8 +296,11 @@ def test_what_is_repaired_is_said(short_clip, tmp_path, capsys):
         (["--resolution", "big"], "1280x720"),
         (["--fps", "0"], "1 to 240"),
         (["--axes", "maya"], "unity"),
+        (["--jobs", "-1"], "no number of processes"),
+        (["--jobs", "many"], "no number of processes"),
         (["--tolerance", "5mm"], "--tolerance is for keys that are chosen by the motion: add --decimate adaptive"),
         (["--budget", "10"], "--budget is for keys that are chosen by the motion: add --decimate adaptive"),
+        (["--fit"], "--fit is for keys that are chosen by the motion: add --decimate adaptive"),
         (["--decimate", "adaptive", "--tolerance", "5mm", "--budget", "10"], "exclude one another"),
         (["--decimate", "adaptive", "--tolerance", "5 inches"], "give a length such as 5mm"),
         (["--decimate", "adaptive", "--tolerance", "0"], "give a length such as 5mm"),
@@ -375,6 +381,114 @@ def test_ctrl_c_while_rendering_leaves_a_report_and_no_half_video(tmp_path):
     assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
     assert not (tmp_path / ".workplan" / "scratch").exists()
     assert len(list(tmp_path.rglob("*.mp4"))) < 4
+
+
+def tasks_of(said: str) -> str:
+    return next(line for line in said.splitlines() if line.startswith("Tasks: "))
+
+
+def poses_and_metrics(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*.csv")}
+
+
+def test_workers_write_what_one_process_writes_to_the_byte(measured, tmp_path, capfd):
+    asked = ("--no-video", "--output", str(tmp_path), "--rates", "5,7.5,20")
+    assert compare.main([*asked, "--jobs", "2"]) == 0
+    assert poses_and_metrics(tmp_path) == poses_and_metrics(measured)
+    assert capfd.readouterr().out == f"{tmp_path / 'report.html'}\n"
+
+
+def test_a_second_run_does_nothing_and_another_rate_only_what_it_asks_for(short_clip, tmp_path, capsys):
+    asked = (short_clip, "--no-video", "--output", tmp_path)
+    assert run(*asked, "--rates", "10") == 0
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 done."
+    assert run(*asked, "--rates", "10") == 0
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 up to date."
+    written = (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns
+    assert run(*asked, "--rates", "10,20") == 0
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 3 done, 2 up to date."
+    assert (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns == written
+    assert {row["rate_hz"] for row in rows_of(tmp_path / "metrics.csv")} == {"10", "20"}
+    assert run(*asked, "--rates", "10,20", "--force") == 0
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 5 done."
+
+
+def test_a_recording_that_changed_is_read_and_measured_anew_and_the_others_are_not(short_clip, tmp_path, capsys):
+    other = tmp_path / "other.csv"
+    other.write_text(short_clip.read_text())
+    asked = (short_clip, other, "--no-video", "--output", tmp_path / "out", "--rates", "10")
+    assert run(*asked) == 0
+    capsys.readouterr()
+    other.write_text("\n".join(short_clip.read_text().splitlines()[:60]))
+    assert run(*asked) == 0
+    # Read, measured, and the two tables of all clips.
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 done, 2 up to date."
+
+
+def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, capsys):
+    bad = tmp_path / "bad.csv"
+    bad.write_text("t,x,y,z\n1,2,3,4\n")
+    asked = ("--no-video", "--output", tmp_path / "out", "--rates", "10")
+    assert run(bad, short_clip, tmp_path / "nowhere.csv", *asked) == 1
+    said = capsys.readouterr()
+    complaints = [line.split(": ")[1] for line in said.err.splitlines() if line.startswith("compare.py:")]
+    assert complaints == [f"{bad}:1", str(tmp_path / "nowhere.csv")]
+    assert tasks_of(said.err) == "Tasks: 4 done, 2 failed."
+    assert said.out.splitlines()[-1] == str(tmp_path / "out" / "report.html")
+    assert {row["clip"] for row in rows_of(tmp_path / "out" / "metrics.csv")} == {"toss"}
+
+
+def test_of_many_clips_each_has_a_page_and_one_leads_to_them(short_clip, tmp_path, monkeypatch):
+    monkeypatch.setattr("scripts.comparison.planning.ON_ONE_PAGE", 1)
+    assert run(short_clip, short_clip, "--no-video", "--output", tmp_path, "--rates", "10,20") == 0
+    overview = (tmp_path / "report.html").read_text()
+    assert "2 recorded clips" in overview
+    for clip in ("toss", "toss-2"):
+        assert f'href="{clip}/report.html"' in overview
+        page = (tmp_path / clip / "report.html").read_text()
+        assert 'href="../report.html"' in page
+        assert "20 keys/s" in page
+
+
+def test_two_runs_at_once_into_one_folder_are_refused(short_clip, tmp_path, capsys):
+    with Workspace(tmp_path / "out"):
+        assert run(short_clip, "--no-video", "--output", tmp_path / "out", "--rates", "10") == 2
+        assert "another run is at work in this folder" in capsys.readouterr().err
+    assert run(short_clip, "--no-video", "--output", tmp_path / "out", "--rates", "10") == 0
+
+
+def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, capsys, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "metrics.csv")
+
+    asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
+    with monkeypatch.context() as patch:
+        patch.setattr("scripts.comparison.steps.write_metrics", full)
+        assert run(*asked) == 2
+    said = capsys.readouterr()
+    assert "No space left on device; nothing that is done is lost" in said.err
+    assert said.out == ""
+    assert run(*asked) == 0
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 2 done, 2 up to date."
+
+
+def test_an_output_folder_that_cannot_be_made_is_said(short_clip, tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert run(short_clip, "--no-video", "--output", tmp_path / "file" / "out") == 2
+    assert f"compare.py: {tmp_path / 'file'}" in capsys.readouterr().err
+
+
+def test_a_task_of_a_run_can_be_done_alone(short_clip, tmp_path, capsys):
+    asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
+    assert run(*asked) == 0
+    keys = tmp_path / "toss" / "10" / "keys.csv"
+    content = keys.read_bytes()
+    keys.unlink()
+    assert workplan.main(["run", str(tmp_path), "measure toss/10"]) == 0
+    assert keys.read_bytes() == content
+    capsys.readouterr()
+    assert run(*asked) == 0
+    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 up to date."
 
 
 AXES = {

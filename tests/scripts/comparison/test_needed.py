@@ -97,6 +97,18 @@ def test_without_the_reference_among_the_modes_it_is_still_what_is_reached(swing
     assert np.array_equal(alone.keys[0], found.keys[1])
 
 
+def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> None:
+    shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
+    clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))
+    with_fitted = keys_needed(clip, ["motor_spline"], 0.1, fit=True)
+    assert with_fitted.keys.shape == (1, 3, len(RATES))
+    assert (with_fitted.reached[:, 2] <= with_fitted.targets * (1.0 + 1e-9)).all()
+    assert (with_fitted.keys[:, 2] <= with_fitted.keys[:, 1]).all()
+    assert with_fitted.keys[:, 2].sum() < 0.97 * with_fitted.keys[:, 1].sum()
+    assert overall([with_fitted, with_fitted]).shares == pytest.approx(with_fitted.shares)
+    assert found.keys.shape[1] == 2
+
+
 def test_the_unit_of_a_recording_makes_no_difference(swing: Clip, found: KeysNeeded) -> None:
     poses = Poses(swing.poses.positions * 1e2, swing.poses.quaternions)
     other = keys_needed(replace(swing, poses=poses, metres_per_unit=1e-2), KEYFRAME_MODES, 0.1)
