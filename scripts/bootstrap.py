@@ -2,6 +2,7 @@
 
     python scripts/bootstrap.py compare                     the main job, on the recordings in assets/
     python scripts/bootstrap.py compare hand.csv --axes unity
+    python scripts/bootstrap.py paper                       the paper's figures and its table, reproduced
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
@@ -28,6 +29,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
+    "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
     "test": (["-m", "pytest"], ("test",)),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),

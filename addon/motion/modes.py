@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
-from .poses import LARGEST, SHORTEST, Poses
+from .poses import LIMIT, SHORTEST, Poses
 from .segments import Curves, Segments, interpolate_along, interpolate_within
 
 
@@ -60,7 +60,7 @@ MODES: dict[str, Mode] = {
     ),
     "pga_lerp": Mode(
         "Motor Blend (PGA)",
-        "Nearly the screw motion, slower at the keys and faster half-way; the quickest to compute",
+        "Nearly the screw motion, slower at the keys and faster half-way",
         curves.motor_lerp,
         pga.pga_lerp,
     ),
@@ -221,14 +221,14 @@ def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
     if key_times.shape not in (keys.shape, keys.shape[-1:]):
         raise ValueError(f"key times of shape {key_times.shape} do not fit keys of shape {keys.shape}")
     lengths = np.sqrt(np.einsum("...i,...i->...", keys.quaternions, keys.quaternions))
-    _require(np.abs(key_times) < LARGEST, f"has a time that is not finite, or beyond {LARGEST:g}")
+    _require(np.abs(key_times) < LIMIT, f"has a time that is not finite, or beyond {LIMIT:g}")
     _require(np.diff(key_times, prepend=-np.inf) > SHORTEST, "is not later than the key before it")
-    _require(np.abs(keys.positions) < LARGEST, f"has a position that is not finite, or beyond {LARGEST:g}", 1)
+    _require(np.abs(keys.positions) < LIMIT, f"has a position that is not finite, or beyond {LIMIT:g}", 1)
     _require(np.isfinite(lengths), "has a quaternion that is not finite")
     _require(lengths > 0.0, "has a quaternion of length zero")
     if keys.scales is not None:
-        sound = (keys.scales > 1.0 / LARGEST) & (keys.scales < LARGEST)
-        _require(sound, f"has a scale that is not a positive number, or beyond {LARGEST:g}")
+        sound = (keys.scales > 1.0 / LIMIT) & (keys.scales < LIMIT)
+        _require(sound, f"has a scale that is not a positive number, or beyond {LIMIT:g}")
     return Poses(keys.positions, keys.quaternions / lengths[..., None], keys.scales)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from .quaternions import conjugate, multiply, rotate
 
-LARGEST = 1e40
+LIMIT = 1e40
 """A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
 
 SHORTEST = 1e-30

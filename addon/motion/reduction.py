@@ -20,7 +20,7 @@ import numpy as np
 
 from .measures import shell_error
 from .modes import MODES, in_betweens, interpolate
-from .poses import LARGEST, SHORTEST, Poses, beyond
+from .poses import LIMIT, SHORTEST, Poses, beyond
 from .quaternions import align_signs
 
 PEAK = 8
@@ -99,10 +99,10 @@ def reduce_keys(
     if times.shape != poses.shape:
         raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}")
     numbers = np.column_stack((times, poses.positions, poses.quaternions))
-    finite = (np.abs(numbers) < LARGEST).all(axis=1)
+    finite = (np.abs(numbers) < LIMIT).all(axis=1)
     if not finite.all():
-        raise ValueError(f"sample {int(np.argmin(finite))} is not finite, or has a number beyond {LARGEST:g}")
-    if poses.scales is not None and not (sound := (poses.scales > 1.0 / LARGEST) & (poses.scales < LARGEST)).all():
+        raise ValueError(f"sample {int(np.argmin(finite))} is not finite, or has a number beyond {LIMIT:g}")
+    if poses.scales is not None and not (sound := (poses.scales > 1.0 / LIMIT) & (poses.scales < LIMIT)).all():
         raise ValueError(f"sample {int(np.argmin(sound))} has a scale that is not a positive number")
     if np.any(early := np.diff(times) <= SHORTEST):
         raise ValueError(f"sample {int(np.argmax(early)) + 1} is not later than the one before it")

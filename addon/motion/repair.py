@@ -10,13 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .poses import LARGEST, SHORTEST, Poses
+from .poses import SHORTEST, Poses
 from .quaternions import align_signs, normalise
 
 GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
 
-LARGEST_SCALE = 1e12
+LARGEST = 1e30
+"""A number beyond this is damage, and well within what can be interpolated: splines shoot over."""
+
+LARGEST_SCALE = 1e6
 """A scale beyond this, or below its inverse, is damage: growth goes by powers, and would leave the range of floats."""
 
 UNIT_TOLERANCE = 1e-3

@@ -1,0 +1,252 @@
+"""The steps of the reproduction, for a work plan: each reads files, calls a room beside this one, and writes files.
+
+What is on the page comes from these files and from nowhere else. Paths are below the output folder.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from addon.motion import MODES
+from scripts.comparison.clips import Clip
+from scripts.comparison.files import write_text
+from scripts.comparison.film import render_film, render_still
+from scripts.comparison.findings import REFERENCE
+from scripts.comparison.study import folder_names, read_clips
+from scripts.workplan import Job, Plan, Task, step
+
+from . import bows, catching, engines, strips, table, timing, triangle
+from .bandwidths import Bandwidth, bandwidths
+from .motions import ASSETS, RECORDINGS, Motion, read_motion
+from .page import write_page
+from .results import Results
+from .rows import read_rows, write_rows
+
+ADAPTIVE = (REFERENCE, "motor_spline")
+"""Modes that are given keys where they need them as well."""
+
+PAGE = "paper.md"
+
+ALL = "all clips"
+
+
+def plan(
+    assets: Sequence[Path], recordings: Sequence[Path], *, pictures: bool, film: bool, rounds: int, version: str
+) -> Plan:
+    """Everything that is to be done.
+
+    Parameters
+    ----------
+    assets, recordings : sequence of Path
+        Files, each with a motion. The figures take `throw` and `reach` among the assets.
+    pictures, film : bool
+        Whether to render them.
+    rounds : int
+        Of the races.
+    version : str
+        Of the program.
+
+    Raises
+    ------
+    ValueError
+        Where one of those assets is missing.
+    """
+    asset = {path.stem: str(path) for path in assets}
+    for wanted in ("reach", "throw"):
+        if wanted not in asset:
+            raise ValueError(f"{wanted}.csv is not among the assets; python assets/make_assets.py makes it")
+    files = [(path, ASSETS) for path in assets] + [(path, RECORDINGS) for path in recordings]
+    names = folder_names(path.stem for path, _ in files)
+    tasks = [_measuring(name, path, of) for name, (path, of) in zip(names, files, strict=True)]
+    measuring = tuple(task.name for task in tasks)
+    tables = ("table.csv", "errors.csv", "bows.csv", "look_ahead.csv", "clips.csv", "run.json")
+    tasks += [
+        _task("Table 1", "tabulate", tables, measuring, arguments={"names": names}),
+        _task(
+            "running time",
+            "race",
+            ("timing.csv",),
+            ("Table 1",),
+            source=asset["reach"],
+            arguments={"rounds": rounds},
+            weight=40.0,
+        ),
+        _task("bytes", "count_bytes", ("bandwidth.csv",), source=asset["reach"]),
+        _task("catching", "view_catching", ("catching.csv",), source=asset["throw"]),
+        _task("engines", "draw_engines", ("paper/engines.svg",)),
+        _task("figures in numbers", "count_figures", ("triangle.csv", "strips.csv")),
+    ]
+    if pictures:
+        tasks += [
+            _task("triangle", "render_triangle", ("paper/triangle.png",), weight=5.0),
+            _task("strips", "render_strips", ("paper/strips.png",), weight=5.0),
+            _task(
+                "catching, a still", "render_catching", ("paper/catching.png",), ("catching",), source=asset["throw"]
+            ),
+        ]
+    if pictures and film:
+        outputs = ("paper/catching.mp4",)
+        tasks.append(
+            _task("catching, a film", "film_catching", outputs, ("catching",), source=asset["throw"], weight=90.0)
+        )
+    before = {task.name: task.outputs for task in tasks if task.name not in measuring}
+    tasks.append(_task("page", "write", (PAGE,), tuple(before), arguments={"files": before}, partial=True))
+    return Plan(tasks, version)
+
+
+def _task(
+    name: str,
+    function: str,
+    outputs: tuple[str, ...],
+    after: tuple[str, ...] = (),
+    *,
+    source: str = "",
+    arguments: dict[str, Any] | None = None,
+    **options: Any,
+) -> Task:
+    """A task of this module, that may read a clip."""
+    given = {"source": source} if source else {}
+    inputs = (source,) if source else ()
+    return Task(name, f"{__name__}:{function}", given | (arguments or {}), inputs, outputs, after, **options)
+
+
+def _measuring(name: str, path: Path, of: str) -> Task:
+    outputs = tuple(f"clips/{name}/{part}" for part in ("clip.csv", "errors.csv", "bows.csv"))
+    # A recording takes about 50 bytes to say a sample, and a second for 500 of them.
+    weight = 1.0 + path.stat().st_size / 25_000.0
+    arguments = {"name": name, "of": of}
+    return _task(f"measuring {name}", "measure", outputs, source=str(path), arguments=arguments, weight=weight)
+
+
+# -- the table ---------------------------------------------------------------------------------------------------------
+
+
+@step
+def measure(job: Job, *, name: str, source: str, of: str) -> None:
+    """Read a clip and measure all modes on it. One that cannot be read, or is at rest, is noted and does not count."""
+    motion, clip = read_motion(source, name, of)
+    points, found = [], []
+    if clip is None:
+        job.note(f"{name} does not count: {motion.left_out}")
+    else:
+        total = len(table.rates_for(clip)) + table.TOLERANCES[2]
+        done = iter(range(1, total + 1))
+        points = table.measure_clip(clip, tuple(MODES), ADAPTIVE, lambda: job.progress(next(done), total))
+        found = bows.bows_of(clip)
+    write_rows(job.writes(f"clips/{name}/clip.csv"), Motion, [motion])
+    write_rows(job.writes(f"clips/{name}/errors.csv"), table.Point, points)
+    write_rows(job.writes(f"clips/{name}/bows.csv"), bows.Bow, found)
+
+
+@step
+def tabulate(job: Job, *, names: list[str]) -> None:
+    """Bring the clips together, and find what each mode needs."""
+
+    def gathered(part: str, kind: type) -> list:
+        return [row for name in names for row in read_rows(job.reads(f"clips/{name}/{part}"), kind)]
+
+    motions, points = gathered("clip.csv", Motion), gathered("errors.csv", table.Point)
+    cells = table.needed_by(points)
+    members = {of: [one.clip for one in motions if one.of == of and not one.left_out] for of in (RECORDINGS, ASSETS)}
+    sets = {of: clips for of, clips in members.items() if clips}
+    if len(sets) > 1:
+        sets[ALL] = [clip for clips in sets.values() for clip in clips]
+    means = [cell for of, clips in sets.items() for cell in table.mean_over(cells, of, clips)]
+    waits = [row for of in sets for row in table.look_ahead(means, of)]
+    write_rows(job.writes("clips.csv"), Motion, motions)
+    write_rows(job.writes("errors.csv"), table.Point, points)
+    write_rows(job.writes("bows.csv"), bows.Bow, gathered("bows.csv", bows.Bow))
+    write_rows(job.writes("table.csv"), table.Needed, [*means, *cells])
+    write_rows(job.writes("look_ahead.csv"), table.LookAhead, waits)
+    run = {"Blender": bpy.app.version_string, "Python": platform.python_version(), "NumPy": np.__version__}
+    write_text(job.writes("run.json"), json.dumps(run, indent=1) + "\n")
+
+
+@step
+def race(job: Job, *, source: str, rounds: int) -> None:
+    """Race the engines, at equal rates, at those of the table, and at those of the paper."""
+    cells = read_rows(job.reads("table.csv"), table.Needed)
+    needed: dict[int, dict[str, float]] = {}
+    for one in cells:
+        kind = (one.clips, one.decimation, one.yardstick)
+        if kind == (cells[0].clips, table.UNIFORM, next(iter(table.YARDSTICKS))) and np.isfinite(one.needed):
+            needed.setdefault(one.updates, {})[one.mode] = one.needed
+    total = timing.RACES * rounds
+    done = iter(range(1, total + 1))
+    results = timing.races(_asset(source), needed, rounds, lambda: job.progress(next(done), total))
+    write_rows(job.writes("timing.csv"), timing.Timing, results)
+
+
+# -- the figures -------------------------------------------------------------------------------------------------------
+
+
+@step
+def count_bytes(job: Job, *, source: str) -> None:
+    """The example of the text."""
+    write_rows(job.writes("bandwidth.csv"), Bandwidth, bandwidths(_asset(source)))
+
+
+@step
+def count_figures(job: Job) -> None:
+    """The first two figures in numbers."""
+    write_rows(job.writes("triangle.csv"), triangle.Step, triangle.steps())
+    write_rows(job.writes("strips.csv"), strips.Instant, strips.instants())
+
+
+@step
+def draw_engines(job: Job) -> None:
+    """The sequence diagram."""
+    write_text(job.writes("paper/engines.svg"), engines.draw())
+
+
+@step
+def view_catching(job: Job, *, source: str) -> None:
+    """The last figure in numbers."""
+    write_rows(job.writes("catching.csv"), catching.View, catching.views(_asset(source)))
+
+
+@step
+def render_triangle(job: Job) -> None:
+    """The triangle."""
+    render_still(triangle.build(), job.writes("paper/triangle.png"))
+
+
+@step
+def render_strips(job: Job) -> None:
+    """The drill in strips."""
+    render_still(strips.build(), job.writes("paper/strips.png"))
+
+
+@step
+def render_catching(job: Job, *, source: str) -> None:
+    """The catch."""
+    views = read_rows(job.reads("catching.csv"), catching.View)
+    render_still(catching.build(_asset(source), views, film=False), job.writes("paper/catching.png"))
+
+
+@step
+def film_catching(job: Job, *, source: str) -> None:
+    """The throw and the catch."""
+    views = read_rows(job.reads("catching.csv"), catching.View)
+    scene = catching.build(_asset(source), views, film=True)
+    render_film(scene, job.writes("paper/catching.mp4"), lambda done, of: job.progress(done, of, f"{done}/{of}"))
+
+
+@step
+def write(job: Job, *, files: dict[str, list[str]]) -> None:
+    """The page, of the files that there are: those of each task before this one that is done."""
+    there = [path for task, paths in files.items() if task in job.finished for path in paths]
+    write_text(job.writes(PAGE), write_page(Results.read(job.output, there)))
+
+
+def _asset(source: str) -> Clip:
+    """A clip of our own."""
+    (clip,), _ = read_clips([source], "blender")
+    return clip

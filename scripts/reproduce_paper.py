@@ -1,0 +1,162 @@
+"""Reproduce the paper: its figures, its table and its example, from this program, with the paper's numbers beside them.
+
+Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table is made from the
+clips in assets/, and with --recordings from those in a folder as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+from scripts.system_libraries import missing_for_rendering, way_out
+
+try:
+    import bpy
+except ImportError as error:
+    print(f"reproduce_paper.py: {error}\n{way_out(str(error))}", file=sys.stderr)
+    sys.exit(2)
+
+import numpy as np
+
+from scripts.command_line import own_arguments
+from scripts.comparison.files import written_beside
+from scripts.comparison.progress import Progress
+from scripts.paper.motions import recordings_in
+from scripts.paper.steps import PAGE, plan
+from scripts.paper.timing import ROUNDS
+from scripts.trajectories import TrajectoryError
+from scripts.workplan import FolderInUse, Outcome, Plan, SerialExecutor, State, Workspace, code_version, run
+from scripts.workplan.manifest import ManifestError
+
+CODE = (
+    *("addon/animation", "addon/motion", "assets/making", "assets/models.blend"),
+    *("scripts/comparison", "scripts/paper", "scripts/streaming", "scripts/trajectories"),
+)
+"""What the results depend on."""
+
+EPILOG = """
+examples:
+  python scripts/reproduce_paper.py
+  python scripts/reproduce_paper.py --recordings ../recordings
+  python scripts/reproduce_paper.py --recordings ../recordings --docs
+  python scripts/reproduce_paper.py --no-video --output /tmp/paper
+  blender --background --python scripts/reproduce_paper.py -- --no-pictures
+
+It writes OUTPUT/paper.md, the page, with its pictures in OUTPUT/paper/, and every number of it in OUTPUT/*.csv. What is
+done is not done again: after Ctrl-C, or with more recordings, the same call goes on. A second run gives the same
+numbers, those of timing.csv aside. The last line it prints is the path of the page.
+Exit code: 0 done, 1 a part of it failed (the page holds the others), 2 a wrong input or option, 130 stopped by Ctrl-C.
+"""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = argparse.ArgumentParser(
+        prog="reproduce_paper.py",
+        description=__doc__,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="recordings to make the table from as well")
+    parser.add_argument(
+        "--output", type=Path, default=ROOT / "renders" / "paper", help="folder to write to (renders/paper)"
+    )
+    parser.add_argument(
+        "--docs",
+        type=Path,
+        nargs="?",
+        const=ROOT / "docs",
+        metavar="FOLDER",
+        help="copy the page and its pictures there (docs)",
+    )
+    parser.add_argument("--no-video", action="store_true", help="pictures, but no film")
+    parser.add_argument("--no-pictures", action="store_true", help="nothing that Blender has to render")
+    parser.add_argument("--rounds", type=_count, default=ROUNDS, metavar="N", help="of the races (%(default)s)")
+    parser.add_argument("--force", action="store_true", help="do everything again")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: list[str]) -> int:
+    """Reproduce the paper, and return the exit code."""
+    options = parse(arguments)
+    missing = None if options.no_pictures else missing_for_rendering()
+    if missing:
+        print(f"reproduce_paper.py: {way_out(missing)}\nOr go without pictures: --no-pictures", file=sys.stderr)
+        return 2
+    try:
+        work = _plan(options)
+        with Workspace(options.output) as workspace, Progress() as progress, SerialExecutor() as executor:
+            outcome = run(work, workspace, executor, force=options.force, progress=progress, title="Reproducing")
+        page = options.output / PAGE
+        if options.docs and outcome.states[work.order[-1]].there:
+            copy_page(work, outcome, options.output, options.docs)
+            page = options.docs / PAGE
+    except (TrajectoryError, ValueError, FolderInUse, ManifestError) as error:
+        print(f"reproduce_paper.py: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"reproduce_paper.py: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return _report(outcome, page)
+
+
+def copy_page(work: Plan, outcome: Outcome, output: Path, docs: Path) -> None:
+    """Copy the page, and the pictures that it shows, to another folder."""
+    shown = [
+        path
+        for name, task in work.tasks.items()
+        if outcome.states[name].there
+        for path in task.outputs
+        if path == PAGE or path.startswith("paper/")
+    ]
+    for path in shown:
+        with written_beside(docs / path) as beside:
+            shutil.copyfile(output / path, beside)
+
+
+def _plan(options: argparse.Namespace) -> Plan:
+    # Relative paths where that can be: the same output folder then serves a checkout that was moved.
+    assets = ROOT / "assets" if Path.cwd() != ROOT else Path("assets")
+    return plan(
+        sorted(assets.glob("*.csv")),
+        recordings_in(options.recordings) if options.recordings else [],
+        pictures=not options.no_pictures,
+        film=not options.no_video,
+        rounds=options.rounds,
+        version=f"{code_version(*CODE)} Blender {bpy.app.version_string} NumPy {np.__version__}",
+    )
+
+
+def _report(outcome: Outcome, page: Path) -> int:
+    """Say how it went, and where the page is."""
+    for name, problem in outcome.failures.items():
+        print(f"reproduce_paper.py: {name}: {problem}", file=sys.stderr)
+    print(f"{outcome}.", file=sys.stderr)
+    if outcome.problem:
+        print(f"reproduce_paper.py: {outcome.problem}", file=sys.stderr)
+        return 2
+    if outcome.interrupted:
+        print("Stopped; the same call goes on from here.", file=sys.stderr)
+    if page.is_file():
+        print(page.resolve(), flush=True)
+    return 130 if outcome.interrupted else int(outcome.count(State.FAILED) > 0)
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and 2 <= int(text) <= 10_000):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of rounds; give 2 to 10000")
+    return int(text)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(own_arguments(__file__)))
+    except KeyboardInterrupt:
+        sys.exit(130)
