@@ -77,7 +77,7 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     finite = _usable(times) & _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)
     if poses.scales is not None:
         finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
-    keep(finite, "dropped rows with numbers that are missing or not finite")
+    keep(finite, "dropped rows with numbers that are missing, not finite or beyond all measure")
     keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
     keep(_rising(times), "dropped rows whose time runs backwards")
     keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -19,10 +20,16 @@ from .reconstructions import Reconstruction, identical_modes
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
 
-NOT_FOLDERS = {"metrics.csv", "keys_needed.csv", "report.html", "manifest.json", *["con", "prn", "aux", "nul"]} | {
-    f"{device}{digit}" for device in ("com", "lpt") for digit in range(1, 10)
+MOST_BYTES = 240
+"""Of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
+
+NOT_FOLDERS = {"metrics.csv", "keys_needed.csv", "report.html", "manifest.json"}
+"""Names that the output needs itself."""
+
+DEVICES = {"con", "prn", "aux", "nul"} | {
+    f"{device}{digit}" for device in ("com", "lpt") for digit in "0123456789\u00b9\u00b2\u00b3"
 }
-"""Names that the output needs itself, or that Windows keeps for devices."""
+"""Names that Windows keeps for devices, whatever follows them after a dot."""
 
 PROBE = 4
 """Of so many samples one is a key where it is looked which modes are one motion."""
@@ -80,15 +87,17 @@ def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip
 def folder_names(wanted: Iterable[str]) -> list[str]:
     """Names like those wanted that are safe for folders on every system, each unlike all before it.
 
-    Letters and digits of any script stay, and so do dots inside, dashes and underscores. Case makes no difference.
+    Letters and digits of any script stay, and so do dots, dashes and underscores inside. Case makes no difference, nor
+    does how a letter with an accent is spelled in Unicode. No name begins with what spreadsheets take for a formula.
     """
     names: list[str] = []
     unavailable, numbers = set(NOT_FOLDERS), {}
     for name in wanted:
-        safe = re.sub(r"[^\w.-]+", "_", name)[:LONGEST_NAME].strip("._ ") or "clip"
+        safe = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", name)).strip("._-")[:LONGEST_NAME]
+        safe = safe.encode()[:MOST_BYTES].decode(errors="ignore").strip("._-") or "clip"
+        safe = f"clip-{safe}" if safe.casefold().split(".")[0] in DEVICES else safe
         folded = safe.casefold()
-        # Windows takes "nul.txt" for the device too.
-        if folded in unavailable or folded.split(".")[0] in NOT_FOLDERS:
+        if folded in unavailable:
             number = numbers.get(folded, 2)
             while f"{folded}-{number}" in unavailable:
                 number += 1

@@ -22,10 +22,13 @@ from .euler import quaternions_from_euler
 from .recordings import Selection, Trajectory, TrajectoryError, shown
 from .tables import read_text
 
+LARGEST_FILE = 1 << 28
+"""Bytes: two hours of a headset and two controllers at 90 Hz. All of a file is in memory, at ten times its size."""
+
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
     """The devices that were on. A recording of one device has the file's name."""
-    text = read_text(path)
+    text = read_text(path, LARGEST_FILE)
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .recordings import Selection, Trajectory, TrajectoryError
+from .recordings import Selection, Trajectory, TrajectoryError, shown
 
 if TYPE_CHECKING:
     import bpy
@@ -23,7 +23,7 @@ TRANSFORMS = ("location", "rotation_", "scale", "delta_")
 """How the data paths of the channels begin that move an object."""
 
 LAST_FRAME = 1048574
-"""Blender goes no further; a damaged file could."""
+"""Blender goes no further; a damaged file could, and would keep it at work for hours."""
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
@@ -32,15 +32,19 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
         import bpy  # noqa: F401
     except ImportError:
         raise TrajectoryError(path, "this needs Blender", "run it in Blender, or pip install bpy") from None
-    with _without_scripts(), _opened(path) as (objects, scenes):
-        if not scenes:
-            raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
-        animated = [name for name, obj in objects.items() if _frames_of_keys(obj) is not None]
-        still = [name for name in objects if name not in animated]
-        return [_sample(objects[name], scenes) for name in selection.of(animated, unlisted=still)]
+    try:
+        with _without_scripts(), _opened(path) as (objects, scenes):
+            if not scenes:
+                raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
+            animated = [name for name, obj in objects.items() if _frames_of_keys(obj) is not None]
+            still = [name for name in objects if name not in animated]
+            return [_sample(path, objects[name], scenes) for name in selection.of(animated, unlisted=still)]
+    except (UnicodeDecodeError, SystemError):
+        # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
+        raise TrajectoryError(path, "a name in this file is no text", "save it again from Blender") from None
 
 
-def _sample(obj: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
+def _sample(path: Path, obj: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
     import bpy
 
     from addon.animation import read_poses
@@ -48,7 +52,13 @@ def _sample(obj: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
     scene = next((scene for scene in scenes if scene in obj.users_scene), scenes[0])
     keyed = _frames_of_keys(obj)
     first, last = keyed if keyed and keyed[0] < keyed[1] else (scene.frame_start, scene.frame_end)
-    frames = np.arange(max(np.floor(first), -LAST_FRAME), min(np.ceil(last), LAST_FRAME) + 1.0)
+    if not -LAST_FRAME <= first <= last <= LAST_FRAME:
+        problem = f"{shown(obj.name)} moves from frame {first:g} to {last:g}, where Blender does not go"
+        raise TrajectoryError(path, problem, "delete the keys that are far off")
+    rate, base = scene.render.fps, scene.render.fps_base
+    if not (rate > 0 and base > 0.0):
+        raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
+    frames = np.arange(np.floor(first), np.ceil(last) + 1.0)
     # Blender evaluates a hidden object only for the sake of one that is shown: hence the probe.
     stage, probe = bpy.data.scenes.new("Reading"), bpy.data.objects.new("Probe", None)
     try:
@@ -61,7 +71,7 @@ def _sample(obj: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
         bpy.data.scenes.remove(stage)
     units = scene.unit_settings
     metres = 1.0 if units.system == "NONE" else units.scale_length
-    return Trajectory(obj.name, frames * scene.render.fps_base / scene.render.fps, poses, metres)
+    return Trajectory(obj.name, frames * base / rate, poses, metres)
 
 
 def _frames_of_keys(obj: bpy.types.Object) -> tuple[float, float] | None:

@@ -10,8 +10,10 @@ Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import NoReturn
 
@@ -22,9 +24,18 @@ from addon.motion.quaternions import multiply, rotate
 
 from .euler import quaternions_from_euler
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
-from .tables import parse_rows, read_lines
+from .tables import lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
+
+MOST_JOINTS = 100_000
+"""A thousand times what a skeleton has."""
+
+MOST_POSES = 50_000_000
+"""Of all joints together: a file may hold any number of joints and frames in little space."""
+
+LONGEST_NAME = 100
+"""Words of a joint's name."""
 
 
 @dataclass
@@ -42,64 +53,89 @@ class Joint:
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
     """The joints, the root first."""
-    lines = read_lines(path)
-    joints, line = _read_hierarchy(path, lines)
+    joints, motion = _read_hierarchy(path)
     taken = selection.of([joint.name for joint in joints])
-    values, frame_time = _read_motion(path, lines, line, joints)
-    times = np.arange(len(values)) * frame_time
+    values, frame_time = _read_motion(path, motion, joints)
+    if len(taken) * len(values) > MOST_POSES:
+        problem = f"{len(taken)} joints in {len(values)} frames are more than {MOST_POSES} poses"
+        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
     # What is not finite in the file is not in the poses either, and no news.
     with np.errstate(invalid="ignore", over="ignore"):
-        poses = world_poses(joints, values)
-    return [
-        Trajectory(joint.name, times, pose) for joint, pose in zip(joints, poses, strict=True) if joint.name in taken
-    ]
+        times = np.arange(len(values)) * frame_time
+        poses = world_poses(joints, values, taken)
+    return [Trajectory(name, times, poses[name]) for name in taken]
 
 
-def world_poses(joints: list[Joint], values: np.ndarray) -> list[Poses]:
-    """Forward kinematics: the world poses of every joint.
+def world_poses(joints: list[Joint], values: np.ndarray, wanted: Iterable[str]) -> dict[str, Poses]:
+    """Forward kinematics: the world poses of some joints.
 
     Parameters
     ----------
     joints : list of Joint
-        Parents before their children.
+        Parents before their children, names unique.
     values : array, shape (n, channels of all joints)
+    wanted : iterable of str
+        Names of joints.
 
     Returns
     -------
-    list of Poses, each of shape (n,)
+    dict of Poses, each of shape (n,)
+        By name, in the order of `joints`.
     """
-    world: list[Poses] = []
-    used = 0
-    for joint in joints:
-        own = values[:, used : used + len(joint.channels)]
-        used += len(joint.channels)
-        positions = np.tile(joint.offset, (len(values), 1))
-        turns = []
-        for column, (axis, kind) in enumerate(joint.channels):
-            if kind == "position":
-                positions[:, "XYZ".index(axis)] = own[:, column]
-            else:
-                turns.append(column)
-        order = "".join(joint.channels[column][0] for column in turns)
-        quaternions = quaternions_from_euler(np.radians(own[:, turns]), order)
-        if joint.parent is not None:
-            parent = world[joint.parent]
-            positions = parent.positions + rotate(parent.quaternions, positions)
-            quaternions = multiply(parent.quaternions, quaternions)
-        world.append(Poses(positions, quaternions))
-    return world
+    wanted = set(wanted)
+    begins = np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
+    children = Counter(_needed(joints, wanted))
+    world: dict[int, Poses] = {}
+    for index, joint in enumerate(joints):
+        if joint.name not in wanted and not children[index]:
+            continue
+        world[index] = _placed(joint, values[:, begins[index] : begins[index + 1]], world.get(joint.parent))
+        # An hour of a whole skeleton is much: what nothing more hangs on is let go.
+        children[joint.parent] -= 1
+        if joint.parent is not None and not children[joint.parent] and joints[joint.parent].name not in wanted:
+            del world[joint.parent]
+    return {joints[index].name: poses for index, poses in world.items()}
+
+
+def _needed(joints: list[Joint], wanted: set[str]) -> Iterator[int | None]:
+    """The parent of each joint that is wanted or carries a wanted one, once for each such joint."""
+    carrying = [joint.name in wanted for joint in joints]
+    for index in reversed(range(len(joints))):
+        if carrying[index]:
+            parent = joints[index].parent
+            yield parent
+            if parent is not None:
+                carrying[parent] = True
+
+
+def _placed(joint: Joint, own: np.ndarray, parent: Poses | None) -> Poses:
+    """A joint's world poses, from its own channels (n, channels) and what it hangs on."""
+    positions = np.tile(joint.offset, (len(own), 1))
+    turns = []
+    for column, (axis, kind) in enumerate(joint.channels):
+        if kind == "position":
+            positions[:, "XYZ".index(axis)] = own[:, column]
+        else:
+            turns.append(column)
+    order = "".join(joint.channels[column][0] for column in turns)
+    quaternions = quaternions_from_euler(np.radians(own[:, turns]), order)
+    if parent is not None:
+        positions = parent.positions + rotate(parent.quaternions, positions)
+        quaternions = multiply(parent.quaternions, quaternions)
+    return Poses(positions, quaternions)
 
 
 class _Words:
     """The words of the hierarchy, one after another, with the line that each is in."""
 
-    def __init__(self, path: Path, lines: list[str]) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.line = 1
-        self._words = self._split(lines)
+        self._words = self._split()
 
-    def _split(self, lines: list[str]) -> Iterator[str]:
-        for self.line, line in enumerate(lines, start=1):
+    def _split(self) -> Iterator[str]:
+        for number, line in lines_of(self.path):
+            self.line = number
             yield from line.replace("{", " { ").replace("}", " } ").split()
 
     def next(self, expected: str) -> str:
@@ -122,15 +158,17 @@ class _Words:
         words = []
         while (word := self.next("{")) != "{":
             words.append(word)
+            if len(words) > LONGEST_NAME:
+                self.fail("a { is missing behind a name")
         return "_".join(words)
 
     def fail(self, problem: str) -> NoReturn:
         raise TrajectoryError(self.path, problem, "export the BVH again", self.line)
 
 
-def _read_hierarchy(path: Path, lines: list[str]) -> tuple[list[Joint], int]:
+def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
     """The joints with unique names, and the line of the word MOTION."""
-    words = _Words(path, lines)
+    words = _Words(path)
     first = words.next("HIERARCHY")
     if first.upper() != "HIERARCHY":
         words.fail(f"a BVH file begins with HIERARCHY, not with {shown(first)}")
@@ -138,6 +176,8 @@ def _read_hierarchy(path: Path, lines: list[str]) -> tuple[list[Joint], int]:
     # The joints that are open, innermost last. An end site has no pose of its own and is None.
     opened: list[int | None] = []
     while (word := words.next("MOTION")).upper() != "MOTION":
+        if len(joints) > MOST_JOINTS:
+            words.fail(f"more than {MOST_JOINTS} joints")
         joint = joints[opened[-1]] if opened and opened[-1] is not None else None
         match word.upper():
             case "ROOT" if not opened:
@@ -182,20 +222,21 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
     return channels
 
 
-def _read_motion(path: Path, lines: list[str], line: int, joints: list[Joint]) -> tuple[np.ndarray, float]:
-    """The channels' values, shape (frames, channels), and the seconds between frames."""
-    rows = [(number, text.strip()) for number, text in enumerate(lines[line:], line + 1) if text.strip()]
-    settings, rows = rows[:2], rows[2:]
-    count = _read_setting(path, settings[:1], "Frames:", line)
-    frame_time = _read_setting(path, settings[1:], "Frame Time:", line)
-    if count != len(rows):
-        problem = f"Frames: says {count:g} and {len(rows)} rows follow"
-        raise TrajectoryError(path, problem, "correct the number or export the BVH again", settings[0][0])
+def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float]:
+    """The channels' values, shape (frames, channels), and the seconds between frames, from behind the line `motion`."""
+    rows = ((number, text.strip()) for number, text in lines_of(path, after=motion) if text.strip())
+    settings = list(islice(rows, 2))
+    count = _read_setting(path, settings[:1], "Frames:", motion)
+    frame_time = _read_setting(path, settings[1:], "Frame Time:", motion)
     labels = [f"{joint.name} {axis}{kind}" for joint in joints for axis, kind in joint.channels]
     if not labels:
-        raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", line)
+        raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", motion)
     columns = {label: index for index, label in enumerate(labels)}
-    return parse_rows(path, rows, None, columns, len(columns)), frame_time
+    values = parse_rows(path, rows, None, columns, len(columns))
+    if count != len(values):
+        problem = f"Frames: says {count:g} and {len(values)} rows follow"
+        raise TrajectoryError(path, problem, "correct the number or export the BVH again", settings[0][0])
+    return values, frame_time
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:

@@ -22,12 +22,15 @@ from addon.motion import Poses
 
 from .euler import quaternions_from_euler
 from .recordings import Selection, Trajectory, TrajectoryError, listed, shown, unique
-from .tables import cells_of, parse_rows, read_lines
+from .tables import cells_of, lines_of, parse_rows
 
 METRES = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001, "inches": 0.0254, "feet": 0.3048}
 
 ROTATION_TYPES = {"quaternion": "wxyz"} | {"".join(order): "".join(order) for order in permutations("xyz")}
 """Rotation Type to the axes of its columns, in the order of `Poses` or of the turns."""
+
+MOST_HEADER_ROWS = 20
+"""What is still no sample after so many rows will not be one. Motive writes about eight."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,7 @@ def recognises(head: list[str]) -> bool:
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
     """The rigid bodies of the take."""
-    lines = read_lines(path)
-    header = _read_header(path, lines)
+    header = _read_header(path)
     metres = METRES[_setting(path, header, "Length Units", "Meters", METRES)]
     usual = "Quaternion" if "w" in header.axes else "XYZ"
     rotation = ROTATION_TYPES[_setting(path, header, "Rotation Type", usual, ROTATION_TYPES)]
@@ -60,7 +62,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     columns = {"time": next((index for index, axis in enumerate(header.axes) if axis.startswith("time")), 1)}
     for name in taken:
         columns |= {f"{name} {content} {axis}": bodies[name][content, axis] for content, axis in wanted}
-    rows = [(number, line) for number, line in enumerate(lines[header.line :], header.line + 1) if line.strip(", ")]
+    rows = ((number, line) for number, line in lines_of(path, after=header.line) if line.strip(", "))
     numbers = parse_rows(path, rows, ",", columns, max(len(header.axes), len(header.types)))
     trajectories = []
     for name, part in zip(taken, np.split(numbers[:, 1:], len(taken), axis=1), strict=True):
@@ -71,14 +73,14 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     return trajectories
 
 
-def _read_header(path: Path, lines: list[str]) -> _Header:
+def _read_header(path: Path) -> _Header:
     rows: list[list[str]] = []
     last = 0
-    for number, line in enumerate(lines, start=1):
+    for number, line in lines_of(path):
         if not line.strip(", "):
             continue
         cells = cells_of(path, number, line, ",")
-        if cells[0].lstrip("-").isdecimal():
+        if cells[0].lstrip("-").isdecimal() or len(rows) == MOST_HEADER_ROWS:
             break
         rows.append(cells)
         last = number

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from . import aframe, blend, bvh, euroc, motive, named_csv, tum
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
-from .tables import decode
+from .tables import encoding_of
 
 HEAD = 65536
 """How many bytes of a file are looked at to tell its format."""
@@ -57,6 +57,12 @@ def read_trajectories(source: str) -> Recording:
     ------
     TrajectoryError
         One line: the file, the line in it, what is wrong and the way out.
+
+    Notes
+    -----
+    Tables take memory for their numbers and not for their text, JSON up to 30 times its size. Files beyond the limits
+    in `tables`, `bvh` and `aframe` are refused. Blender itself reads .blend files, and may crash on a damaged one:
+    where that must not happen, read them in a process of their own.
     """
     path, body = split_source(source)
     selection = Selection(path, body)
@@ -99,8 +105,9 @@ def _format_of(path: Path) -> Format:
         raise TrajectoryError(path, problem, f"known are {', '.join(extensions)}")
     if len(candidates) > 1:
         with path.open("rb") as file:
-            head = decode(file.read(HEAD), errors="replace").splitlines() or [""]
+            head = file.read(HEAD)
+        lines = head.decode(encoding_of(head), errors="replace").splitlines() or [""]
         for candidate in candidates[:-1]:
-            if candidate.recognises(head):
+            if candidate.recognises(lines):
                 return candidate
     return candidates[-1]

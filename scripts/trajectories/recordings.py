@@ -109,14 +109,16 @@ class Selection:
 def unique(names: Sequence[str]) -> list[str]:
     """The names, a repeated one numbered as Blender does: Hand, Hand.001, Hand.002."""
     result: list[str] = []
-    taken = set(names)
-    seen: set[str] = set()
+    unavailable = set(names)
+    numbers: dict[str, int] = {}
     for name in names:
-        candidate, count = name, 0
-        while candidate in seen or (count and candidate in taken):
-            count += 1
-            candidate = f"{name}.{count:03d}"
-        seen.add(candidate)
+        candidate = name
+        if name in numbers:
+            while candidate in unavailable:
+                numbers[name] += 1
+                candidate = f"{name}.{numbers[name]:03d}"
+            unavailable.add(candidate)
+        numbers.setdefault(name, 0)
         result.append(candidate)
     return result
 

@@ -1,17 +1,20 @@
 """Text files of numbers: lines, named columns, and rows parsed by NumPy's C parser.
 
-A row that cannot be parsed is looked for only after the parser has refused, so that a good file pays nothing for
-errors that name their line.
+A file is gone through piece by piece, so that it is the numbers that take memory and not the text, and nothing that
+a file says of itself is believed before it has been read. A row that cannot be parsed is looked for only after the
+parser has refused, so that a good file pays nothing for errors that name their line.
 """
 
 from __future__ import annotations
 
 import codecs
 import csv
+import io
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +27,27 @@ Columns = Mapping[str, Sequence[str]]
 """What a column means, to the names that it goes by."""
 
 SEPARATORS = (",", ";", "\t")
+
+LARGEST_FILE = 1 << 30
+"""Bytes. Files beyond are refused: an hour of a hundred bodies at 90 Hz has half as many."""
+
+MOST_ROWS = 20_000_000
+"""Files with more are refused: they would be two days at 100 Hz."""
+
+LONGEST_LINE = 1 << 22
+"""Characters. What has longer lines is no table."""
+
+MOST_COLUMNS = 100_000
+"""Ten thousand bodies have fewer."""
+
+PIECE = 1 << 18
+"""Bytes that are read at once."""
+
+BLOCK = 1 << 14
+"""Rows that are parsed at once."""
+
+MOST_COMMENTS = 100
+"""Lines. Behind so many no header is looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +64,15 @@ class Table:
     width: int
     """How many columns have a name."""
 
-    rows: list[tuple[int, str]]
-    """The rows with the numbers of their lines."""
+    header: int
+    """The line before the first row."""
 
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
         """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
+        stripped = ((number, line.strip(" ")) for number, line in lines_of(self.path, after=self.header))
+        rows = ((number, line) for number, line in stripped if line.strip() and not line.startswith("#"))
         return parse_rows(
-            self.path, self.rows, self.separator, {name: self.columns[name] for name in columns}, self.width, dtype
+            self.path, rows, self.separator, {name: self.columns[name] for name in columns}, self.width, dtype
         )
 
     def trajectory(self, name: str) -> Trajectory:
@@ -57,35 +83,75 @@ class Table:
         return Trajectory(name, numbers[:, 0], Poses(numbers[:, 1:4], numbers[:, 4:8], scales))
 
 
-def decode(data: bytes, errors: str = "strict") -> str:
+def encoding_of(head: bytes) -> str:
     """UTF-8 or, where the byte order mark says so, UTF-16."""
-    utf16 = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    return data.decode("utf-16" if utf16 else "utf-8-sig", errors)
+    return "utf-16" if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
 
 
-def read_text(path: Path) -> str:
-    """The text of the file, its line ends made `\\n`."""
-    data = path.read_bytes()
-    try:
-        text = decode(data)
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise TrajectoryError(
-            path, f"this is not text (byte 0x{data[error.start]:02x})", "save the file as UTF-8", line
-        ) from None
-    if "\0" in text:
-        line = text.count("\n", 0, text.index("\0")) + 1
-        raise TrajectoryError(path, "this is not text but binary data", "name a text file", line)
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+def read_text(path: Path, largest: int = LARGEST_FILE) -> str:
+    """The text of the file, its line ends made `\\n`.
+
+    Raises
+    ------
+    TrajectoryError
+        Where the file is no text, or has more bytes than the largest that is allowed.
+    """
+    return "".join(_pieces(path, largest))
 
 
-def read_lines(path: Path) -> list[str]:
-    """The lines of the file, without their ends."""
-    return read_text(path).split("\n")
+def lines_of(path: Path, after: int = 0) -> Iterator[tuple[int, str]]:
+    """The lines of the file, without their ends, and their numbers: all, or those after one.
+
+    Raises
+    ------
+    TrajectoryError
+        As `read_text`, and where a line is longer than any of a table.
+    """
+    number, begun = 0, ""
+    for piece in _pieces(path, LARGEST_FILE):
+        *lines, begun = (begun + piece).split("\n")
+        if len(begun) > LONGEST_LINE:
+            problem = f"this line is longer than {LONGEST_LINE} characters"
+            raise TrajectoryError(path, problem, "name a file of rows", number + len(lines) + 1)
+        for line in lines:
+            number += 1
+            if number > after:
+                yield number, line
+    if number >= after:
+        yield number + 1, begun
+
+
+def _pieces(path: Path, largest: int) -> Iterator[str]:
+    """The text of the file piece by piece, its line ends made `\\n`."""
+    lines = 0
+    with path.open("rb") as file:
+        size = path.stat().st_size
+        if size > largest:
+            problem = f"the file has {size >> 20} MiB, and {largest >> 20} can be read"
+            raise TrajectoryError(path, problem, "split the recording, or export fewer bodies")
+        decoder = codecs.getincrementaldecoder(encoding_of(file.read(2)))()
+        decoder = io.IncrementalNewlineDecoder(decoder, translate=True)
+        file.seek(0)
+        data = b"start"
+        while data:
+            data = file.read(PIECE)
+            try:
+                piece = decoder.decode(data, final=not data)
+            except UnicodeDecodeError as error:
+                line = lines + error.object.count(b"\n", 0, error.start) + 1
+                problem = f"this is not text (byte 0x{error.object[error.start]:02x})"
+                raise TrajectoryError(path, problem, "save the file as UTF-8", line) from None
+            if "\0" in piece:
+                line = lines + piece.count("\n", 0, piece.index("\0")) + 1
+                raise TrajectoryError(path, "this is not text but binary data", "name a text file", line)
+            lines += piece.count("\n")
+            yield piece
 
 
 def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[str]:
     """The cells of a header's line, without quotes and surrounding blanks."""
+    if line.count(separator or " ") >= MOST_COLUMNS:
+        raise TrajectoryError(path, f"more than {MOST_COLUMNS} columns", "export fewer bodies", number)
     if separator is None:
         return line.split()
     try:
@@ -110,16 +176,14 @@ def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[
     The header is the first line, or a comment before it, as `numpy.savetxt` and EuRoC have it. Blank lines and
     comments (`#`) between the rows are skipped.
     """
-    lines = read_lines(path)
     expected = ", ".join(aliases[0] for aliases in names.values())
-    if not any(line.strip() for line in lines):
-        raise TrajectoryError(path, "the file is empty", f"it needs the columns {expected}")
     partial: tuple[int, list[str]] | None = None
-    first = len(lines)
-    for number, line in enumerate(lines, start=1):
+    number = first = comments = 0
+    for number, line in lines_of(path):
         text = line.strip()
         if not text:
             continue
+        first = number
         header = text.lstrip("# \t")
         separator = max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
         cells = [cell.partition("[")[0].strip().lower() for cell in cells_of(path, number, header, separator)]
@@ -129,15 +193,19 @@ def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[
         if not missing:
             if repeated := [meaning for meaning in columns if meanings.count(meaning) > 1]:
                 raise TrajectoryError(path, f"two columns mean {repeated[0]}", "rename or delete one of them", number)
-            return Table(path, separator, columns, len(cells), _rows(lines, number))
+            return Table(path, separator, columns, len(cells), number)
         if columns and (partial is None or len(missing) < len(partial[1])):
             partial = number, missing
-        if not text.startswith("#"):
-            first = number
+        comments += 1
+        if not text.startswith("#") or comments > MOST_COMMENTS:
             break
+    else:
+        if not first:
+            raise TrajectoryError(path, "the file is empty", f"it needs the columns {expected}")
+        first = number
     if default and not (partial and partial[0] == first):
         columns = {meaning: index for index, meaning in enumerate(default)}
-        return Table(path, None, columns, len(default), _rows(lines, first - 1))
+        return Table(path, None, columns, len(default), first - 1)
     if partial is None:
         raise TrajectoryError(path, "no column has a known name", f"the first line has to name {expected}", first)
     number, missing = partial
@@ -149,14 +217,9 @@ def _meaning_of(cell: str, names: Columns) -> str | None:
     return next((meaning for meaning, aliases in names.items() if cell in aliases), None)
 
 
-def _rows(lines: Sequence[str], after: int) -> list[tuple[int, str]]:
-    stripped = ((number, line.strip(" ")) for number, line in enumerate(lines[after:], start=after + 1))
-    return [(number, line) for number, line in stripped if line.strip() and not line.startswith("#")]
-
-
 def parse_rows(
     path: Path,
-    rows: Sequence[tuple[int, str]],
+    rows: Iterable[tuple[int, str]],
     separator: str | None,
     columns: Mapping[str, int],
     width: int,
@@ -168,7 +231,7 @@ def parse_rows(
     ----------
     path : Path
         For the errors.
-    rows : sequence of (line number, line)
+    rows : iterable of (line number, line)
     separator : str or None
         None means white space. Where it is not a comma, a comma is taken as the decimal sign.
     columns : mapping from name to index
@@ -188,8 +251,24 @@ def parse_rows(
     TrajectoryError
         With the number of the line.
     """
-    if not rows:
-        return np.empty((0, len(columns)), dtype)
+    rows, blocks, count = iter(rows), [np.empty((0, len(columns)), dtype)], 0
+    while block := list(islice(rows, BLOCK)):
+        count += len(block)
+        if count > MOST_ROWS:
+            problem = f"more than {MOST_ROWS} rows"
+            raise TrajectoryError(path, problem, "split the recording, or export it at a lower rate", block[-1][0])
+        blocks.append(_parse_block(path, block, separator, columns, width, dtype))
+    return np.concatenate(blocks)
+
+
+def _parse_block(
+    path: Path,
+    rows: Sequence[tuple[int, str]],
+    separator: str | None,
+    columns: Mapping[str, int],
+    width: int,
+    dtype: type,
+) -> np.ndarray:
     needed = max(columns.values()) + 1
     empty = re.compile(f"(^|{separator}) *(?={separator}|$)")
     lines = []

@@ -11,6 +11,7 @@ import pytest
 from scripts.trajectories import read_trajectories
 
 bpy = pytest.importorskip("bpy")
+anim_utils = pytest.importorskip("bpy_extras.anim_utils")
 
 FPS = 50
 
@@ -202,3 +203,27 @@ def test_a_file_that_is_cut_short_is_told_in_one_line(saved, refusal) -> None:
     path.write_bytes(path.read_bytes()[:3000])
     _, message = refusal(str(path))
     assert message.startswith("Blender cannot open this file")
+
+
+@pytest.mark.parametrize("frame", [1.9e35, -2e6, float("inf")])
+def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) -> None:
+    drill = empty("Drill")
+    key(drill, 1, location=(0, 0, 0))
+    key(drill, 9, location=(1, 0, 0))
+    slot = anim_utils.action_get_channelbag_for_slot(drill.animation_data.action, drill.animation_data.action_slot)
+    slot.fcurves[0].keyframe_points[0 if frame < 0.0 else 1].co.x = frame
+    _, message = refusal(saved())
+    assert message.startswith("'Drill' moves from frame ")
+    assert message.endswith("where Blender does not go; delete the keys that are far off")
+
+
+def test_a_name_that_is_no_text_is_told(saved, refusal) -> None:
+    drill = empty("Drill")
+    key(drill, 1, location=(0, 0, 0))
+    key(drill, 9, location=(1, 0, 0))
+    bpy.context.preferences.filepaths.use_file_compression = False
+    path = Path(saved())
+    content = path.read_bytes()
+    assert b"OBDrill\0" in content
+    path.write_bytes(content.replace(b"OBDrill\0", b"OB\xff\xfell\xff\0"))
+    assert refusal(str(path))[1] == "a name in this file is no text; save it again from Blender"

@@ -102,6 +102,12 @@ def test_numbers_that_are_broken_are_kept_for_the_repair(write, number: str) -> 
         assert not (np.abs(trajectory.poses.positions[1]) < 1e300).all()
 
 
+def test_a_frame_time_beyond_all_measure_is_kept_for_the_repair_too(write) -> None:
+    text = ARM.replace("Time: 0.04", "Time: 1e308").replace("Frames: 2", "Frames: 3") + "0 0 0  0 0 0  0 0 0\n"
+    (shoulder,) = read_trajectories(write("arm.bvh", text)).trajectories
+    np.testing.assert_array_equal(shoulder.times, [0.0, 1e308, np.inf])
+
+
 def skeleton(random: np.random.Generator, frames: int) -> str:
     """A chain with a branch, every joint with its own order of channels, some with positions."""
     orders = ["".join(order) for order in permutations("XYZ")]

@@ -124,12 +124,16 @@ def test_a_file_that_may_not_be_read_is_told(write, refusal, monkeypatch: pytest
         raise PermissionError(13, "Permission denied")
 
     path = write("walk.bvh", BVH)
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     assert refusal(path)[1] == "this file cannot be read (Permission denied); check its permissions"
 
 
 def test_names_that_occur_twice_are_numbered_around_those_there_are() -> None:
     assert unique(["Hand", "Hand", "Hand.001", "Hand"]) == ["Hand", "Hand.002", "Hand.001", "Hand.003"]
+
+
+def test_a_hundred_thousand_equal_names_are_numbered_without_trying_every_number_for_each() -> None:
+    assert unique(["Hand"] * 100_000)[-1] == "Hand.99999"
 
 
 def test_a_list_too_long_to_read_is_cut() -> None:

@@ -1,0 +1,229 @@
+"""Damage: what transfers, editors, exporters and ill will do to a file of text, at random but the same every time.
+
+Every mutation is a function from the bytes of a file, and a source of chance, to other bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from random import Random
+
+PLAIN_NUMBERS = """
+0 -0 -1 1e308 -1e308 1.8e308 1e-308 5e-324 1e100 9e99 1e39 1e41 1e9999 -1e-9999 nan -nan NaN nan(0x1)
+inf -Infinity null true - + . 1. .5 1e 0x10 0b1 1_000 1,5 1;5 1d5 1j (1+0j) 1.5.5 --1 1% $1 #1
+1e9 1000000000 2147483648 4294967296 9223372036854775807 9223372036854775808 -9223372036854775808
+"""
+
+NUMBERS = (
+    *PLAIN_NUMBERS.split(),
+    *("", " ", "1 5", "\u0663", "\u00bd", "\uff11", '"1"', "'1'", "9" * 400, "9" * 5000),
+)
+"""In the place of numbers."""
+
+PLAIN_WORDS = r"""
+* .. ../../x { } {} [ ] [] , ; : " "" ' # \ \u0000 \ud800 null true --> <script>
+t qw s scale time timestamp p_RS_R_x [ns] HIERARCHY ROOT JOINT OFFSET CHANNELS MOTION Frames: Xposition
+Zrotation poses rotation Rotation Position Type XYZ Quaternion Meters
+"""
+
+WORDS = (
+    *PLAIN_WORDS.split(),
+    *("#timestamp [ns]", "Format Version", "Rigid Body", "Length Units", "End Site", "Frame Time:"),
+    *("CHANNELS 7", "CHANNELS 1e9", "Frames: 1000000000", "Frames: 1e9"),
+    *("", "\t", "\0", "\x1b[2J", "\u202e", "\ufeff", "\U0001f600", "x" * 300, "[" * 3000, "{" * 50, "}" * 50, '"' * 3),
+)
+"""In the place of words, and between them: what some reader gives a meaning to."""
+
+LINE_ENDS = (b"\n", b"\r\n", b"\r", b"\n\n", b"\x0b", b"\x0c", b"\x1c", b"\xc2\x85", b"\xe2\x80\xa8", b" \n", b",\n")
+
+SEPARATORS = (b",", b";", b"\t", b" ", b"  ", b", ", b",,", b"|")
+
+NUMBER = re.compile(rb"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+WORD = re.compile(rb"[^\s,;:\"]+")
+
+Mutation = Callable[[bytes, Random], bytes]
+
+
+def mutated(content: bytes, chance: Random) -> bytes:
+    """The content with one to four kinds of damage."""
+    for _ in range(chance.choice((1, 1, 1, 2, 2, 3, 4))):
+        content = chance.choice(MUTATIONS)(content, chance)
+    return content
+
+
+def in_place(content: bytes, chance: Random) -> bytes:
+    """The content with some bytes changed, and of the same length: of binary files little else is ever read far."""
+    for _ in range(chance.choice((1, 1, 2, 4))):
+        content = chance.choice((change_bytes, flip_bits))(content, chance)
+    return content
+
+
+def _span(content: bytes, chance: Random, longest: int = 40) -> tuple[int, int]:
+    first = chance.randint(0, len(content))
+    return first, min(len(content), first + chance.randint(1, longest))
+
+
+def change_bytes(content: bytes, chance: Random) -> bytes:
+    changed = bytearray(content)
+    for _ in range(chance.choice((1, 2, 10)) if changed else 0):
+        changed[chance.randrange(len(changed))] = chance.randrange(256)
+    return bytes(changed)
+
+
+def flip_bits(content: bytes, chance: Random) -> bytes:
+    changed = bytearray(content)
+    for _ in range(chance.choice((1, 3)) if changed else 0):
+        changed[chance.randrange(len(changed))] ^= 1 << chance.randrange(8)
+    return bytes(changed)
+
+
+def insert_bytes(content: bytes, chance: Random) -> bytes:
+    place = chance.randint(0, len(content))
+    return content[:place] + chance.randbytes(chance.randint(1, 6)) + content[place:]
+
+
+def delete_piece(content: bytes, chance: Random) -> bytes:
+    first, last = _span(content, chance)
+    return content[:first] + content[last:]
+
+
+def repeat_piece(content: bytes, chance: Random) -> bytes:
+    first, last = _span(content, chance)
+    return content[:last] + content[first:last] * chance.choice((1, 2, 200)) + content[last:]
+
+
+def move_piece(content: bytes, chance: Random) -> bytes:
+    (first, last), place = _span(content, chance), chance.randint(0, len(content))
+    return content[:place] + content[first:last] + content[place:]
+
+
+def truncate(content: bytes, chance: Random) -> bytes:
+    return content[: chance.randint(0, len(content))]
+
+
+def behead(content: bytes, chance: Random) -> bytes:
+    return content[chance.randint(0, len(content)) :]
+
+
+def empty(content: bytes, chance: Random) -> bytes:
+    return chance.choice(
+        (b"", b" ", b"\n", b"\n" * 1000, b"\xef\xbb\xbf", b"\xff\xfe", b"\0" * 100, b"#\n#", b"{}", b"[]")
+    )
+
+
+def replace_numbers(content: bytes, chance: Random) -> bytes:
+    return _replace(NUMBER, NUMBERS, content, chance)
+
+
+def replace_words(content: bytes, chance: Random) -> bytes:
+    return _replace(WORD, WORDS, content, chance)
+
+
+def _replace(pattern: re.Pattern[bytes], instead: tuple[str, ...], content: bytes, chance: Random) -> bytes:
+    found = list(pattern.finditer(content))
+    for match in sorted(chance.sample(found, min(len(found), chance.choice((1, 1, 3)))), key=re.Match.start)[::-1]:
+        content = content[: match.start()] + chance.choice(instead).encode() + content[match.end() :]
+    return content
+
+
+def insert_word(content: bytes, chance: Random) -> bytes:
+    place = chance.choice([0, len(content), *(match.end() for match in WORD.finditer(content))])
+    return content[:place] + chance.choice((b" ", b"", b"\n")) + chance.choice(WORDS).encode() + content[place:]
+
+
+def fill_with_one_number(content: bytes, chance: Random) -> bytes:
+    """Every number of a few lines the same: whole columns of 1e308, rows of zeros."""
+    number = chance.choice(NUMBERS).encode()
+    lines = content.splitlines(keepends=True)
+    some = set(chance.sample(range(len(lines)), min(len(lines), chance.choice((1, 3, 1000)))))
+    return b"".join(NUMBER.sub(number, line) if row in some else line for row, line in enumerate(lines))
+
+
+def delete_line(content: bytes, chance: Random) -> bytes:
+    lines = content.splitlines(keepends=True)
+    if lines:
+        del lines[chance.randrange(len(lines))]
+    return b"".join(lines)
+
+
+def repeat_line(content: bytes, chance: Random) -> bytes:
+    lines = content.splitlines(keepends=True)
+    if lines:
+        row = chance.randrange(len(lines))
+        lines[row : row + 1] = [lines[row]] * chance.choice((2, 3, 300))
+    return b"".join(lines)
+
+
+def swap_lines(content: bytes, chance: Random) -> bytes:
+    lines = content.splitlines(keepends=True)
+    if len(lines) > 1:
+        first, second = chance.sample(range(len(lines)), 2)
+        lines[first], lines[second] = lines[second], lines[first]
+    return b"".join(lines)
+
+
+def reverse_lines(content: bytes, chance: Random) -> bytes:
+    return b"\n".join(content.splitlines()[::-1])
+
+
+def join_lines(content: bytes, chance: Random) -> bytes:
+    return content.replace(b"\n", chance.choice((b"", b" ", b",")), chance.choice((1, 3, -1)))
+
+
+def swap_columns(content: bytes, chance: Random) -> bytes:
+    """Two columns of a table change places, one is lost, or one comes twice."""
+    separator = chance.choice(SEPARATORS[:4])
+    rows = [line.split(separator) for line in content.split(b"\n")]
+    first, second = chance.randrange(12), chance.randrange(12)
+    what = chance.choice(("swap", "lose", "twice"))
+    for row in rows:
+        if max(first, second) < len(row):
+            match what:
+                case "swap":
+                    row[first], row[second] = row[second], row[first]
+                case "lose":
+                    del row[first]
+                case "twice":
+                    row.insert(first, row[second])
+    return b"\n".join(separator.join(row) for row in rows)
+
+
+def change_separators(content: bytes, chance: Random) -> bytes:
+    return content.replace(chance.choice(SEPARATORS[:4]), chance.choice(SEPARATORS), chance.choice((1, 5, -1)))
+
+
+def change_line_ends(content: bytes, chance: Random) -> bytes:
+    every = chance.random() < 0.5
+    end = chance.choice(LINE_ENDS)
+    return b"".join(
+        line.rstrip(b"\r\n") + (end if every else chance.choice(LINE_ENDS))
+        for line in content.splitlines(keepends=True)
+    )
+
+
+def change_encoding(content: bytes, chance: Random) -> bytes:
+    encoding = chance.choice(("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1", "utf-7", "cp037"))
+    text = content.decode("utf-8", errors="replace")
+    if encoding == "latin-1":
+        text = text.replace("e", "é")
+    encoded = text.encode(encoding, errors="replace")
+    if chance.random() < 0.2:
+        encoded = encoded[:-1]
+    return b"\xff\xfe" + encoded if chance.random() < 0.1 else encoded
+
+
+def nest(content: bytes, chance: Random) -> bytes:
+    """Brackets around brackets."""
+    first, last = chance.choice(((b"[", b"]"), (b"{", b"}"), (b'{"poses":', b"}"), (b"JOINT x {", b"}"), (b"(", b")")))
+    depth = chance.choice((1, 2, 100, 20_000))
+    place = chance.choice((0, chance.randint(0, len(content))))
+    return content[:place] + first * depth + content[place:] + last * chance.choice((0, depth))
+
+
+MUTATIONS: tuple[Mutation, ...] = (
+    *(change_bytes, flip_bits, insert_bytes, delete_piece, repeat_piece, move_piece, truncate, behead, empty),
+    *(replace_numbers, replace_numbers, replace_words, insert_word, fill_with_one_number),
+    *(delete_line, repeat_line, swap_lines, reverse_lines, join_lines, swap_columns, change_separators),
+    *(change_line_ends, change_encoding, nest),
+)
