@@ -6,6 +6,9 @@
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
+    python scripts/bootstrap.py dask scheduler              many machines: Dask's own commands
+    python scripts/bootstrap.py bundle hand.csv             a comparison as a job for render farms
+    python scripts/bootstrap.py openjd run template.json    such a job, on this machine
     python scripts/bootstrap.py benchmark
     python scripts/bootstrap.py build                       dist/rigid_motion-VERSION.zip, the extension to install
 
@@ -30,9 +33,12 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
-    "test": (["-m", "pytest"], ("test",)),
+    "test": (["-m", "pytest"], ("test", "farm")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
+    "dask": (["-m", "dask"], ("farm",)),
+    "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
+    "openjd": (["-m", "openjd"], ("farm",)),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
@@ -63,8 +69,9 @@ def main(arguments: list[str]) -> int:
     python = install(blender, _requirements(project, blender, extras))
     if python is None or not _blender_starts(python):
         return 1
-    # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
-    return subprocess.call([python, *run, *rest], cwd=ROOT if command == "test" else None)
+    # Paths that a user gives count from where the user is; those of pytest from where its configuration is. Dask has to
+    # find this program as well.
+    return subprocess.call([python, *run, *rest], cwd=ROOT if command in ("test", "dask") else None)
 
 
 def install(blender: str, requirements: list[str]) -> Path | None:

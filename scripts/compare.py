@@ -28,21 +28,22 @@ except ImportError as error:
     print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
     sys.exit(2)
 
-import numpy as np
-
 from addon.motion import KEYFRAME_MODES, MODES
 from scripts.command_line import own_arguments
+from scripts.comparison import steps
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.modes import BEST_OF, single_modes
-from scripts.comparison.planning import SOURCES, Wanted, comparison_tasks, look_into, reading_tasks
+from scripts.comparison.planning import Wanted, comparison_tasks, look_into, reading_tasks
 from scripts.comparison.progress import Progress
 from scripts.comparison.report import Settings
 from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings
 from scripts.comparison.steps import KEYS_NEEDED, REPORT
 from scripts.comparison.subject import SubjectError, load_subject
+from scripts.comparison.version import program_version
 from scripts.trajectories.axes import AXES
 from scripts.workplan import (
     Executor,
+    ExecutorError,
     FolderInUse,
     ManifestError,
     Outcome,
@@ -52,7 +53,6 @@ from scripts.workplan import (
     State,
     Task,
     Workspace,
-    code_version,
     run,
 )
 
@@ -100,7 +100,8 @@ and comparison.blend. The last line it prints is the path of the report.
 many clips:
   The work is done in small tasks, by as many processes as --jobs says. What is done is kept: stopped by Ctrl-C, a full
   disk or worse, the same command goes on from there, and with other options it does what these ask for anew. A
-  recording that cannot be read, or a video that cannot be rendered, is reported, and the others go on.
+  recording that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With
+  --scheduler the processes are on all machines that a Dask scheduler knows; docs/farm.md says how.
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could, or a wrong option, 130 stopped by
 Ctrl-C; after that the report holds what was ready.
 """
@@ -129,8 +130,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--radius", type=_positive, default=0.1, metavar="M", help="of the shell error, in metres (%(default)s)"
     )
-    parser.add_argument(
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument(
         "--jobs", type=_jobs, metavar="N", help="processes that work; 0 for none but this one (one for each processor)"
+    )
+    workers.add_argument(
+        "--scheduler", metavar="ADDRESS", help="let the workers of a Dask scheduler do it: tcp://HOST:8786"
     )
     parser.add_argument("--force", action="store_true", help="do everything again, also what is done already")
     keys = parser.add_argument_group("choosing keys")
@@ -222,14 +227,34 @@ def main(arguments: list[str]) -> int:
     try:
         if not options.no_video:
             load_subject(options.object)
-        executor = SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs)
-        with Progress() as progress, Workspace(options.output) as workspace, executor:
+        with (
+            Progress() as progress,
+            Workspace(options.output) as workspace,
+            _executor(options, progress) as executor,
+        ):
             return _Run(options, workspace, executor, progress, shlex.join(["compare.py", *arguments])).run()
-    except (SubjectError, FolderInUse, ManifestError) as error:
+    except (SubjectError, FolderInUse, ManifestError, ExecutorError) as error:
         print(f"compare.py: {error}", file=sys.stderr)
     except OSError as error:
         print(f"compare.py: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
     return 2
+
+
+def _executor(options: argparse.Namespace, progress: Progress) -> Executor:
+    """Who does the work. Raises ExecutorError where Dask is wanted, and is not there."""
+    if options.scheduler is None:
+        return SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs)
+    try:
+        from scripts.workplan.dask_executor import DaskExecutor
+    except ImportError as error:
+        raise ExecutorError(f"--scheduler: {error}; `python scripts/bootstrap.py dask` installs it") from None
+    return DaskExecutor(
+        options.scheduler,
+        options.output,
+        identify=f"{steps.__name__}:{steps.identify.__name__}",
+        version=program_version(),
+        note=lambda text: progress.note(f"compare.py: {text}"),
+    )
 
 
 class _Run:
@@ -240,7 +265,7 @@ class _Run:
     ) -> None:
         self.options, self.workspace, self.executor, self.progress = options, workspace, executor, progress
         self.command = command
-        self.version = f"Blender {bpy.app.version_string}, NumPy {np.__version__}, {code_version(*SOURCES)}"
+        self.version = program_version()
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what came of it."""
@@ -263,7 +288,7 @@ class _Run:
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        tasks = comparison_tasks(found.studies, there, self._wanted())
+        tasks = comparison_tasks(found.studies, there, wanted(self.options, self.command))
         outcome = self._do(tasks, "Comparing")
         outcome.states |= read.states
         self._say(outcome, tasks, time.perf_counter() - started)
@@ -286,31 +311,6 @@ class _Run:
             )
         return outcome
 
-    def _wanted(self) -> Wanted:
-        options, stage = self.options, self.options.stage
-        manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
-        settings = Settings(
-            radius=options.radius,
-            program=f"{manifest['name']} {manifest['version']}",
-            blender=bpy.app.version_string,
-            command=self.command,
-            details={}
-            if options.no_video
-            else {
-                "Videos": f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s",
-                "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
-            },
-        )
-        return Wanted(
-            choices=tuple(options.choices),
-            modes=tuple(options.modes),
-            radius=options.radius,
-            settings=settings,
-            stage=None if options.no_video else stage,
-            count_keys=options.decimate == "adaptive",
-            fit=options.fit,
-        )
-
     def _say(self, outcome: Outcome, tasks: list[Task], seconds: float) -> None:
         """What came of it, and last the path of the report."""
         records = self.workspace.manifest.tasks
@@ -327,6 +327,33 @@ class _Run:
             print(line, file=sys.stderr)
         if outcome.states[REPORT].there:
             print(report, flush=True)
+
+
+def wanted(options: argparse.Namespace, command: str) -> Wanted:
+    """What is wanted of every clip, by these options of that command."""
+    stage = options.stage
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    settings = Settings(
+        radius=options.radius,
+        program=f"{manifest['name']} {manifest['version']}",
+        blender=bpy.app.version_string,
+        command=command,
+        details={}
+        if options.no_video
+        else {
+            "Videos": f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s",
+            "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
+        },
+    )
+    return Wanted(
+        choices=tuple(options.choices),
+        modes=tuple(options.modes),
+        radius=options.radius,
+        settings=settings,
+        stage=None if options.no_video else stage,
+        count_keys=options.decimate == "adaptive",
+        fit=options.fit,
+    )
 
 
 def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:

@@ -153,11 +153,6 @@ class Curves:
     bends: np.ndarray | None = None
     """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
 
-    @property
-    def block(self) -> int:
-        """How many samples to work on at once, for the processor's caches: bent curves need more room for each."""
-        return BLOCK if self.bends is None else BLOCK // 4
-
     @cached_property
     def matrices(self) -> np.ndarray:
         """P and Q of each segment in one matrix, shape (S, ROWS, functions in b and c)."""
@@ -233,7 +228,7 @@ def _fill(
         def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
             multiply(coefficients[piece], series.powers(s), counts, out)
 
-    _evaluate(fill, mode.block, numbers, bounds, position, out.reshape(ROWS, -1))
+    _evaluate(fill, numbers, bounds, position, out.reshape(ROWS, -1))
 
 
 def interpolate_within(
@@ -249,7 +244,7 @@ def interpolate_within(
     out = np.empty((ROWS, progress.size))
     within = progress.size == 0 or bool(progress.min() >= 0.0 and progress.max() <= 1.0)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
-    _evaluate(_filler(mode, within), mode.block, no_numbers, bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
+    _evaluate(_filler(mode, within), no_numbers, bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
     return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
 
 
@@ -259,7 +254,6 @@ Fill = Callable[[slice, np.ndarray, np.ndarray, np.ndarray], None]
 
 def _evaluate(
     fill: Fill,
-    block: int,
     numbers: np.ndarray,
     bounds: np.ndarray,
     position: Callable[..., np.ndarray],
@@ -270,7 +264,7 @@ def _evaluate(
     `position` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
     """
     all_counts = np.diff(bounds)
-    for segment, sample in blocks(bounds, block):
+    for segment, sample in blocks(bounds, BLOCK if is_dense(all_counts) else BLOCK // 2):
         counts = all_counts[segment]
         fill(segment, position(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
 
@@ -305,7 +299,6 @@ def _series(mode: Curves, pieces: int) -> np.ndarray:
     bounds = moments.size * np.arange(count + 1)
     _evaluate(
         _filler(mode, True),
-        mode.block,
         np.empty((0, count)),
         bounds,
         lambda sample: np.resize(moments, sample.stop - sample.start),

@@ -35,9 +35,6 @@ PIECE = 120
 """Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
 where one is interrupted."""
 
-SOURCES = ("blender_manifest.toml", "addon/motion", "addon/animation", "scripts/comparison", "scripts/trajectories")
-"""What the results depend on, of this program: see `workplan.code_version`."""
-
 
 @dataclass(frozen=True)
 class Wanted:

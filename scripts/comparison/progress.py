@@ -94,7 +94,8 @@ class Progress:
         if not self._stages:
             self._stage_started = self._clock()
         self._stages.append((stage, weight))
-        self._redraw(now=len(self._stages) == 1 and total > 0.0)
+        if total:
+            self._redraw(now=len(self._stages) == 1)
         try:
             yield stage
             stage.done = total

@@ -289,7 +289,7 @@ def _opening_of_clips(choices: Sequence[Choice], count: int) -> str:
                 element("caption", caption),
                 element("thead", element("tr", head)),
                 element("tbody"),
-                class_="numbers sortable",
+                class_="numbers sortable clips",
             ),
             class_="scroll",
             role="region",

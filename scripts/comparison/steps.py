@@ -22,6 +22,7 @@ from .report import Settings, write_clip_page, write_overview, write_report
 from .results import ClipResults, Result, read_result, write_result
 from .storage import ClipReference, file_names, read_clip, read_keys, write_keys, write_recording
 from .study import read_source, reconstruct
+from .version import program_version
 
 PARTS = ".parts"
 
@@ -92,6 +93,15 @@ def blend_of(clip: str, choice: Choice) -> str:
 def page_of(clip: str) -> str:
     """The page of a clip, where clips have pages of their own."""
     return f"{clip}/{REPORT}"
+
+
+# -- workers ----------------------------------------------------------------------------------------------------------
+
+
+@step
+def identify(job: Job, *, path: str) -> None:
+    """Write which version of the program this is."""
+    write_text(job.writes(path), program_version())
 
 
 # -- numbers ----------------------------------------------------------------------------------------------------------

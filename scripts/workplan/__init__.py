@@ -23,7 +23,7 @@ Whatever happens to the program, its processes or the machine, what is in place 
 the plan is whole, and the same call goes on from there.
 """
 
-from .executors import Executor, SerialExecutor
+from .executors import Executor, ExecutorError, SerialExecutor
 from .hashing import code_version
 from .lock import FolderInUse
 from .manifest import ManifestError
@@ -35,6 +35,7 @@ from .workspace import Workspace
 
 __all__ = [
     "Executor",
+    "ExecutorError",
     "FolderInUse",
     "Job",
     "ManifestError",

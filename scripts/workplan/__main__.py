@@ -2,10 +2,12 @@
 
     python -m scripts.workplan list OUTPUT          what there is to do, and what is done
     python -m scripts.workplan run OUTPUT TASK      do one task, if it is not done
+    python -m scripts.workplan finish OUTPUT        when all have run: clear up, and say how many are done
+    python -m scripts.workplan check OUTPUT STEP    whether this is the version of the program that planned
 
 Any number of tasks may run at the same time, on any machines that share the folder. What they did is in the manifest
-when the program that made the plan runs again, or `list` does. Exit code: 0 the outputs are there, 1 the task failed,
-2 it cannot be begun.
+when the program that made the plan runs again, or `list` or `finish` does. Exit code: 0 the outputs are there, 1 the
+task failed, or not all are done, 2 it cannot be begun.
 """
 
 from __future__ import annotations
@@ -13,11 +15,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 from .lock import FolderInUse
 from .manifest import ManifestError
-from .performing import Failed, Message, Noted, Told, perform
+from .performing import Failed, Message, Noted, Order, Told, perform
 from .plan import Plan, PlanError
 from .running import Keys, order_for
 from .workspace import Workspace
@@ -31,55 +34,120 @@ def main(arguments: list[str]) -> int:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     listing = commands.add_parser("list", help="the tasks of a plan, and which are done")
     running = commands.add_parser("run", help="do one task")
-    for command in (listing, running):
+    finishing = commands.add_parser("finish", help="clear up when all tasks have run")
+    checking = commands.add_parser("check", help="whether this is the version that planned")
+    for command in (listing, running, finishing, checking):
         command.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
+        command.add_argument("--plan", type=Path, metavar="FILE", help="the plan (that in the output folder)")
+        command.add_argument("--inputs", type=Path, metavar="FOLDER", help="where its relative inputs are (as planned)")
     running.add_argument("task", metavar="TASK", help="its name, as list prints it")
+    running.add_argument(
+        "--openjd",
+        action="store_true",
+        help="talk as Open Job Description has it, and end with code 0 also where the input is at fault: a farm would "
+        "not go on with what does not need it; finish counts it",
+    )
+    checking.add_argument("step", metavar="STEP", help="package.module:function, which writes the version")
     options = parser.parse_args(arguments)
+    output = options.output.absolute()
+    plan_path = options.plan or output / ".workplan" / "plan.json"
     try:
-        with Workspace(options.output, shared=True) as workspace:
-            plan = Plan.read(workspace.plan_path)
-            os.chdir(plan.folder)
-            if options.command == "list":
-                return _list(plan, workspace)
-            return run_one(plan, workspace, options.task)
+        plan = Plan.read(plan_path, options.inputs and options.inputs.absolute())
+        if options.command == "check":
+            return _check(plan, options.step)
+        os.chdir(plan.folder)
+        if options.command == "run":
+            if options.task not in plan.tasks:
+                return _cannot(f"{plan_path}: there is no task {options.task!r}; see list")
+            with Workspace(output, shared=True, only=_concerned(plan, options.task)) as workspace:
+                return _run(plan, workspace, options.task, openjd=options.openjd)
+        with Workspace(output, shared=options.command == "list") as workspace:
+            return _list(plan, workspace) if options.command == "list" else _finish(plan, workspace)
     except (PlanError, ManifestError, FolderInUse) as error:
         return _cannot(error)
     except OSError as error:
-        return _cannot(f"{error.filename or options.output}: {error.strerror or error}")
+        return _cannot(f"{error.filename or output}: {error.strerror or error}")
 
 
-def run_one(plan: Plan, workspace: Workspace, name: str) -> int:
-    """Do one task, in this process, and return the exit code."""
-    if name not in plan.tasks:
-        return _cannot(f"{workspace.output}: its plan has no task {name!r}; see list")
+def _run(plan: Plan, workspace: Workspace, name: str, *, openjd: bool) -> int:
+    """Do one task, in this process."""
     task, keys, there = plan.tasks[name], Keys(plan), []
     for before in _all_before(plan, name):
         if _is_there(before, keys, plan, workspace):
             there.append(before)
-    missing = [before for before in task.after if before not in there]
-    if missing and not (task.partial and len(missing) < len(task.after)):
-        return _cannot(f"{name}: first do {', '.join(map(repr, missing))}")
     finished = [before for before in task.after if before in there]
-    key = keys.with_those(name, finished)
+    key = keys.with_those(name, finished if task.partial else task.after)
     record = workspace.manifest.tasks.get(name)
-    if record and record.holds(key, workspace.output):
+    if (record and record.holds(key, workspace.output)) or _is_spent(name, keys, plan, workspace):
         print(f"{task.title}: up to date", flush=True)
         return 0
+    missing = [before for before in task.after if before not in there]
+    if missing and not (task.partial and finished):
+        code = _cannot(f"{name}: first do {', '.join(map(repr, missing))}")
+        return 0 if openjd else code
     order = order_for(task, keys.seen(name), finished, workspace)
-    done = perform(order, _tell)
+    done = perform(order, _tell_openjd if openjd else _tell)
     if isinstance(done, Failed):
-        print(f"{task.title}: {done.message}\n{done.details}".rstrip(), file=sys.stderr)
-        return 1
+        print(f"{task.title}: {done.message}\n{done.details}".rstrip(), file=sys.stderr, flush=True)
+        if openjd:
+            print(f"openjd_status: {_line(done.message)}", flush=True)
+        if record is None or record.key != key:
+            # What is there under its name was made of something else.
+            workspace.discard(task.outputs)
+        return 0 if openjd and not done.details else 1
     workspace.put_in_place(name, key, done, Path(order.scratch))
     print(f"{task.title}: done in {done.seconds:.1f} s", flush=True)
     return 0
 
 
 def _list(plan: Plan, workspace: Workspace) -> int:
-    keys = Keys(plan)
-    for name in plan.order:
-        print(f"{'done' if _is_there(name, keys, plan, workspace) else 'to do':6}{name}")
+    for name, done in _states(plan, workspace).items():
+        print(f"{'done' if done else 'to do':6}{name}")
     return 0
+
+
+def _finish(plan: Plan, workspace: Workspace) -> int:
+    """Delete what was only made for other tasks, and name the tasks that are not done."""
+    states = _states(plan, workspace)
+    for name, task in plan.tasks.items():
+        if task.temporary and all(states[reader] for reader in plan.readers[name]):
+            workspace.discard(task.outputs)
+    for name in plan.order:
+        if not states[name]:
+            print(f"not done: {name}", file=sys.stderr)
+    done = sum(states.values())
+    print(f"Tasks: {done} done, {len(states) - done} not done.", flush=True)
+    return 0 if done == len(states) else 1
+
+
+def _check(plan: Plan, function: str) -> int:
+    with tempfile.TemporaryDirectory() as folder:
+        order = Order("check", function, {"path": "version"}, {}, ("version",), folder, os.path.join(folder, "scratch"))
+        done = perform(order, _tell)
+        if isinstance(done, Failed):
+            return _cannot(done.message)
+        version = Path(order.scratch, "version").read_text(encoding="utf-8")
+    if version != plan.version:
+        return _cannot(f"this is {version}, and the plan was made by {plan.version}; bring both to the same version")
+    return 0
+
+
+def _states(plan: Plan, workspace: Workspace) -> dict[str, bool]:
+    """Whether there is nothing to do any more for each task."""
+    keys = Keys(plan)
+    there = {name: _is_there(name, keys, plan, workspace) for name in plan.order}
+    return {name: there[name] or _is_spent(name, keys, plan, workspace) for name in plan.order}
+
+
+def _is_spent(name: str, keys: Keys, plan: Plan, workspace: Workspace) -> bool:
+    """Whether a task is temporary, and those that its outputs were for are done."""
+    readers = plan.readers[name]
+    return plan.tasks[name].temporary and all(_is_there(reader, keys, plan, workspace) for reader in readers)
+
+
+def _concerned(plan: Plan, name: str) -> set[str]:
+    """The tasks that have a say in whether, and from what, one is done."""
+    return {name, *_all_before(plan, name), *(plan.readers[name] if plan.tasks[name].temporary else ())}
 
 
 def _all_before(plan: Plan, name: str) -> list[str]:
@@ -105,6 +173,20 @@ def _tell(message: Message) -> None:
         print(message.text, file=sys.stderr, flush=True)
     elif isinstance(message, Told):
         print(f"{message.share:4.0%} {message.doing}".rstrip(), flush=True)
+
+
+def _tell_openjd(message: Message) -> None:
+    if isinstance(message, Noted):
+        print(f"openjd_status: {_line(message.text)}", flush=True)
+    elif isinstance(message, Told):
+        print(f"openjd_progress: {100.0 * message.share:.1f}", flush=True)
+        if message.doing:
+            print(f"openjd_status: {_line(message.doing)}", flush=True)
+
+
+def _line(text: str) -> str:
+    """Text without line ends: what a line begins with would be taken for a message."""
+    return " ".join(text.split())
 
 
 def _cannot(reason: object) -> int:

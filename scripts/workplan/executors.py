@@ -13,6 +13,10 @@ from typing import Protocol, Self
 from .performing import Message, Order, perform
 
 
+class ExecutorError(Exception):
+    """Why an executor can do nothing, in one line, and the way out."""
+
+
 class Executor(Protocol):
     """Does orders. A context: leaving it ends all that it started."""
 

@@ -51,7 +51,12 @@ class FolderLock:
 
     def __enter__(self) -> Self:
         while self._file is None:
-            opened = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+            # Who had the folder before may be taking it away.
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                opened = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+            except FileNotFoundError:
+                continue
             try:
                 _lock(opened, self._shared)
             except OSError:

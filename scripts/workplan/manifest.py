@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -54,6 +54,8 @@ class Manifest:
         Of manifest.json.
     records : Path
         The folder of the records that are not in it yet.
+    only : iterable of str, optional
+        The tasks that anybody will ask about; all unless given. There may be very many records.
 
     Raises
     ------
@@ -63,21 +65,19 @@ class Manifest:
         Where a file cannot be read.
     """
 
-    def __init__(self, path: Path, records: Path) -> None:
+    def __init__(self, path: Path, records: Path, only: Iterable[str] | None = None) -> None:
         self._path, self._records = path, records
         self.tasks: dict[str, Record] = {}
         self.failures: dict[str, dict[str, str]] = {}
         """Of the last run: task to what was said, and the details."""
         if path.is_file():
             self._take(path)
-        for record in sorted(records.glob("*.json")) if records.is_dir() else ():
+        for record in sorted(records.glob("*.json")) if only is None else filter(Path.is_file, map(self._place, only)):
             self._take(record)
 
     def add(self, name: str, record: Record) -> None:
         """Take down that a task is done, for good."""
-        # The name of a task is any line of text, and no name for a file.
-        path = self._records / f"{hashlib.sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:32]}.json"
-        write_text(path, json.dumps(_content({name: record}, {}), indent=1) + "\n")
+        write_text(self._place(name), json.dumps(_content({name: record}, {}), indent=1) + "\n")
         self.tasks[name] = record
 
     def write(self) -> None:
@@ -89,6 +89,10 @@ class Manifest:
         write_text(self._path, json.dumps(content, indent=1) + "\n")
         for record in records:
             record.unlink(missing_ok=True)
+
+    def _place(self, name: str) -> Path:
+        """Where the record of a task is: its name is any line of text, and no name for a file."""
+        return self._records / f"{hashlib.sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:32]}.json"
 
     def _take(self, path: Path) -> None:
         try:

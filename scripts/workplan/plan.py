@@ -62,8 +62,14 @@ class Plan:
         write_text(path, json.dumps(content, indent=1) + "\n")
 
     @classmethod
-    def read(cls, path: Path) -> Plan:
+    def read(cls, path: Path, folder: Path | None = None) -> Plan:
         """Read a plan that was written.
+
+        Parameters
+        ----------
+        path : Path
+        folder : Path, optional
+            Where relative inputs count from here; where they did when it was written unless given.
 
         Raises
         ------
@@ -76,7 +82,8 @@ class Plan:
             content = json.loads(path.read_text(encoding="utf-8"))
             if content["schema"] != SCHEMA:
                 raise PlanError(f"{path}: a plan of schema {content['schema']}; this program knows {SCHEMA}")
-            return cls((Task(**fields) for fields in content["tasks"]), content["version"], Path(content["folder"]))
+            tasks = (Task(**fields) for fields in content["tasks"])
+            return cls(tasks, content["version"], folder or Path(content["folder"]))
         except PlanError:
             raise
         except (ValueError, TypeError, KeyError) as error:

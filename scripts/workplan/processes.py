@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -46,6 +47,8 @@ class ProcessExecutor:
         After how many tasks a worker is replaced.
     largest_worker : int
         Above how many bytes of memory, at its peak, it is.
+    folder : Path, optional
+        Which one relative paths count from in the processes; the current one unless given.
     """
 
     def __init__(
@@ -54,18 +57,20 @@ class ProcessExecutor:
         *,
         tasks_per_worker: int = TASKS_PER_WORKER,
         largest_worker: int = LARGEST_WORKER,
+        folder: Path | None = None,
     ) -> None:
-        self.capacity = jobs or processors()
+        self.jobs = jobs or processors()
+        # A worker goes on with the next task while what it has just made is put in place.
+        self.capacity = 2 * self.jobs
         self._tasks_per_worker, self._largest_worker = tasks_per_worker, largest_worker
+        self._folder = folder
         self._answers: queue.SimpleQueue[tuple[_Worker, str | None]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
+        self._waiting: deque[Order] = deque()
 
     def submit(self, order: Order) -> None:
-        idle = next((worker for worker in self._workers if worker.order is None), None)
-        if idle is None:
-            idle = _Worker(self._answers, threads=max(1, processors() // self.capacity))
-            self._workers.append(idle)
-        idle.begin(order)
+        self._waiting.append(order)
+        self._distribute()
 
     def wait(self, tell: Callable[[Message], object], seconds: float) -> None:
         try:
@@ -77,6 +82,7 @@ class ProcessExecutor:
             return
 
     def stop(self) -> None:
+        self._waiting.clear()
         workers, self._workers = self._workers, []
         for worker in workers:
             worker.process.kill()
@@ -98,6 +104,15 @@ class ProcessExecutor:
         """The ids of the processes there are."""
         return [worker.process.pid for worker in self._workers]
 
+    def _distribute(self) -> None:
+        """Give orders that are waiting to workers that are not, and start these where there may be more."""
+        idle = [worker for worker in self._workers if worker.order is None]
+        while self._waiting and (idle or len(self._workers) < self.jobs):
+            if not idle:
+                idle = [_Worker(self._answers, max(1, processors() // self.jobs), self._folder)]
+                self._workers += idle
+            idle.pop().begin(self._waiting.popleft())
+
     def _take(self, worker: _Worker, line: str | None, tell: Callable[[Message], object]) -> None:
         """Take a line of a worker, None for its end."""
         if worker not in self._workers:
@@ -105,6 +120,7 @@ class ProcessExecutor:
         if line is None:
             self._workers.remove(worker)
             worker.close()
+            self._distribute()
             if worker.order:
                 tell(Lost(worker.order.name, worker.last_words()))
             return
@@ -119,13 +135,16 @@ class ProcessExecutor:
                 self._workers.remove(worker)
                 worker.dismiss()
                 worker.close()
+            self._distribute()
         tell(from_json(content))
 
 
 class _Worker:
     """A process, its pipes, and the order that it is at."""
 
-    def __init__(self, answers: queue.SimpleQueue[tuple[_Worker, str | None]], threads: int) -> None:
+    def __init__(
+        self, answers: queue.SimpleQueue[tuple[_Worker, str | None]], threads: int, folder: Path | None
+    ) -> None:
         self.order: Order | None = None
         self.tasks = 0
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the worker lives
@@ -135,6 +154,7 @@ class _Worker:
             stdout=subprocess.PIPE,
             stderr=self._errors,
             env=_environment(threads),
+            cwd=folder,
             encoding="ascii",
             errors="replace",
         )
@@ -200,8 +220,10 @@ def _environment(threads: int) -> dict[str, str]:
 
 
 def _end_of(errors: IO[bytes]) -> str:
-    """The last line of what a process said on its standard error."""
+    """What a process died of by its standard error: how Python puts it, or the last line."""
     errors.seek(0, os.SEEK_END)
     errors.seek(max(0, errors.tell() - 4096))
     lines = errors.read().decode("utf-8", "replace").strip().splitlines()
-    return lines[-1].strip() if lines else ""
+    # Behind that, Python lists where it was, and all modules that were loaded.
+    fatal = [line for line in lines if line.startswith("Fatal Python error: ")]
+    return (fatal or lines or [""])[-1].strip()

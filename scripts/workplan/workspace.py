@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import uuid
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Self
 
@@ -27,6 +28,8 @@ class Workspace:
     shared : bool
         For a single task among others that run at the same time: nothing is cleared, and manifest.json is left to
         those who have the folder for themselves.
+    only : iterable of str, optional
+        The tasks that it will be asked about; all unless given.
 
     Raises
     ------
@@ -38,22 +41,23 @@ class Workspace:
         Where the folder cannot be written.
     """
 
-    def __init__(self, output: Path, *, shared: bool = False) -> None:
+    def __init__(self, output: Path, *, shared: bool = False, only: Iterable[str] | None = None) -> None:
         self.output = output.absolute()
         self.own = self.output / ".workplan"
         self.plan_path = self.own / "plan.json"
         self.done_here: set[str] = set()
         """The tasks that were done since it was opened."""
         self.manifest: Manifest
-        self._shared = shared
+        self._shared, self._only = shared, only
+        # Removing folders takes longer than all else on some file systems; nobody need wait for it.
+        self._cleaner = ThreadPoolExecutor(1)
         self._lock = FolderLock(self.own / "lock", output, shared=shared)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
 
     def __enter__(self) -> Self:
-        self.own.mkdir(parents=True, exist_ok=True)
         self._lock.__enter__()
         try:
-            self.manifest = Manifest(self.output / "manifest.json", self.own / "records")
+            self.manifest = Manifest(self.output / "manifest.json", self.own / "records", self._only)
             if not self._shared:
                 self._clear_scratch()
                 self.manifest.failures = {}
@@ -64,6 +68,7 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         try:
+            self._cleaner.shutdown()
             if not self._shared:
                 self._clear_scratch()
                 self.manifest.write()
@@ -87,7 +92,7 @@ class Workspace:
             place = self.output / path
             place.parent.mkdir(parents=True, exist_ok=True)
             (scratch / path).replace(place)
-        shutil.rmtree(scratch, ignore_errors=True)
+        self._cleaner.submit(shutil.rmtree, scratch, ignore_errors=True)
         record = Record(key, made.outputs, made.seconds, made.facts)
         self.manifest.add(name, record)
         self.done_here.add(name)

@@ -74,6 +74,29 @@ def test_a_stage_within_a_stage_is_one_step_of_it_or_as_many_as_it_weighs() -> N
         assert progress.fraction == 1.0
 
 
+def test_work_that_many_do_is_counted_as_a_whole_and_may_be_lost_again() -> None:
+    progress = Progress(Terminal(), environ=PLAIN)
+    with progress, progress.stage("Rendering", 4) as stage:
+        stage.reach(2.5, "two at once")
+        assert progress.fraction == pytest.approx(0.625)
+        stage.reach(2.0)
+        assert progress.fraction == pytest.approx(0.5)
+        assert stage.doing == "two at once"
+        stage.reach(9.0)
+        assert progress.fraction == 1.0
+
+
+def test_the_time_that_is_left_is_reckoned_from_the_stage_and_not_from_what_came_before() -> None:
+    clock, terminal = Clock(), Terminal()
+    with Progress(terminal, clock=clock, environ=PLAIN) as progress:
+        with progress.stage("Reading", 1):
+            clock.now += 100.0
+        with progress.stage("Rendering", 4) as stage:
+            clock.now += 10.0
+            stage.advance(1)
+            assert "1:50, 0:30 left  Rendering" in terminal.lines()[-1]
+
+
 def test_a_log_gets_a_plain_line_every_ten_seconds_at_most() -> None:
     clock, log = Clock(), io.StringIO()
     with Progress(log, clock=clock, environ={}) as progress, progress.stage("Rendering", 100) as stage:

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import html
 import re
+import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -21,11 +22,11 @@ from scripts.comparison.choices import Tolerance, Uniform
 from scripts.comparison.clip_section import COLUMNS
 from scripts.comparison.error_charts import errors_over_time
 from scripts.comparison.metrics import measure_reconstruction
-from scripts.comparison.modes import BEST_OF
+from scripts.comparison.modes import BEST_OF, label_of
 from scripts.comparison.needed import KeysNeeded, keys_needed
 from scripts.comparison.palette import colour_of
 from scripts.comparison.reconstructions import Reconstruction
-from scripts.comparison.report import Settings, write_report
+from scripts.comparison.report import Settings, write_clip_page, write_overview, write_report
 from scripts.comparison.results import ClipFacts, ClipResults, Result
 from scripts.comparison.study import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
@@ -436,3 +437,67 @@ def test_the_best_of_each_segment_is_a_row_and_tells_which_modes_it_took(tmp_pat
         assert f"the mode changes at {changes} key" in note
         assert "Compared with Smooth Screw (PGA), the best single mode, its RMS shell error is " in note
         assert "higher" not in note
+
+
+def test_many_clips_are_a_table_that_leads_to_their_pages(tmp_path: Path, runs: list[Reconstruction]) -> None:
+    clips = results_of(runs)
+    pages = {"reach": "re ach/report.html", "throw": None}
+    write_overview(tmp_path / "report.html", clips, pages=pages, settings=SETTINGS)
+    page = Page(tmp_path / "report.html")
+    links = assert_links_lead_somewhere(page)
+    assert [link for link in links if not link.startswith("#")] == ["re%20ach/report.html"]
+    assert [text for _, text in page.find("h2")] == ["Summary", "Modes and measures", "Clips", "This run"]
+    rows = table_of(page, "All 2 clips")
+    assert [row[0] for row in rows] == ["reach", "throw"]
+    for row, clip in zip(rows, clips, strict=True):
+        assert row[1:4] == ["3.00", "271", str(len(clip.facts.repairs))]
+        for cell, result in zip(row[4:], clip.results, strict=True):
+            errors = {metrics.mode: metrics.rms_shell_m for metrics in result.rows}
+            best = min(errors, key=errors.__getitem__)
+            number, share = cell.split(label_of(best))
+            assert float(number) == pytest.approx(errors["lerp_slerp"] * 1e3, rel=0.006)
+            assert float(share) == pytest.approx(errors[best] / errors["lerp_slerp"], abs=0.006)
+
+
+def test_a_clip_that_has_not_every_choice_has_gaps_in_the_table(tmp_path: Path, runs: list[Reconstruction]) -> None:
+    write_overview(tmp_path / "report.html", results_of(runs[:4]), pages={}, settings=SETTINGS)
+    assert table_of(Page(tmp_path / "report.html"), "All 2 clips")[1][5:] == ["too short", "too short"]
+
+
+def test_the_page_of_a_clip_leads_back_and_shows_its_film(tmp_path: Path, runs: list[Reconstruction]) -> None:
+    film = tmp_path / "reach" / "5" / "comparison.mp4"
+    film.parent.mkdir(parents=True)
+    film.write_bytes(b"film")
+    films = {("reach", "5"): film, ("reach", "7.5"): None, ("reach", "20"): None}
+    clip = results_of(runs[:3])[0]
+    scratch = tmp_path / "elsewhere" / "report.html"
+    write_clip_page(scratch, clip, films=films, settings=SETTINGS, folder=tmp_path / "reach", overview="../report.html")
+    page = Page(scratch)
+    links = assert_links_lead_somewhere(page)
+    assert [link for link in links if not link.startswith("#")] == ["../report.html", "5/comparison.mp4"]
+    assert [text for _, text in page.find("h2")] == ["reach"]
+    assert page.source.count("There is no video with these keys.") == 2
+    assert len(list(page.find("script", type="text/plain"))) == 1
+
+
+def test_a_report_reads_its_clips_one_at_a_time(tmp_path: Path, runs: list[Reconstruction]) -> None:
+    class Clips:
+        """Clips that are made when they are asked for, and counted while they are held."""
+
+        alive = most = 0
+
+        def __iter__(self) -> Iterator[ClipResults]:
+            for clip in results_of(runs * 3):
+                held = replace(clip, facts=replace(clip.facts))
+                weakref.finalize(held, self.gone)
+                self.alive += 1
+                self.most = max(self.most, self.alive)
+                yield held
+                del held
+
+        def gone(self) -> None:
+            self.alive -= 1
+
+    clips = Clips()
+    write_report(tmp_path / "report.html", clips, films={}, settings=SETTINGS)
+    assert clips.most <= 2

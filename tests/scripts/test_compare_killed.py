@@ -1,0 +1,95 @@
+"""compare.py under processes that die: whatever is killed, and whenever, the same command goes on and ends the same."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+pytestmark = pytest.mark.skipif(
+    not Path("/proc/self/task").exists(), reason="kills, and looks for processes where Linux shows them"
+)
+
+MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "3"))
+"""How many times a run is killed, half of them the program and half of them one of its workers."""
+
+OPTIONS = ("--rates", "5,10", "--resolution", "160x90", "--fps", "12", "--jobs", "2")
+
+
+def start(output: Path, clip: Path) -> subprocess.Popen:
+    command = [sys.executable, ROOT / "scripts" / "compare.py", clip, "--output", output, *OPTIONS]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def outputs(folder: Path) -> dict[str, bytes]:
+    """All that is the same each time: a report has its date, and a .blend has addresses of memory in it."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
+        for path in folder.rglob("*")
+        if path.is_file() and path.relative_to(folder).parts[0] not in (".parts", ".workplan", "manifest.json")
+    }
+
+
+def workers_of(process: int) -> list[int]:
+    try:
+        return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    except FileNotFoundError:
+        return []
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    lines = (ROOT / "assets" / "throw.csv").read_text().splitlines()
+    path = tmp_path_factory.mktemp("clips") / "toss.csv"
+    path.write_text("\n".join(lines[:1] + lines[90:181]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
+    """The output folder of a run that nobody disturbed, and the seconds that it took."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    started = time.monotonic()
+    process = start(folder, clip)
+    _, said = process.communicate(timeout=300)
+    assert process.returncode == 0, said
+    return folder, time.monotonic() - started
+
+
+def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
+    clip: Path, undisturbed: tuple[Path, float], tmp_path: Path
+) -> None:
+    reference, seconds = undisturbed
+    wanted = outputs(reference)
+    assert sum(path.endswith(".mp4") for path in wanted) == 2
+    chance = random.Random(7)
+    for number in range(MOMENTS):
+        process = start(tmp_path, clip)
+        time.sleep(chance.uniform(0.1, 0.9) * seconds)
+        workers = workers_of(process.pid)
+        if number % 2 and workers:
+            os.kill(chance.choice(workers), signal.SIGKILL)
+            _, said = process.communicate(timeout=300)
+            assert process.returncode == 0, said
+            # The next one is to have something to do.
+            for path in [*tmp_path.rglob("*.mp4"), *tmp_path.rglob("keys.csv")]:
+                path.unlink()
+        else:
+            process.kill()
+            process.communicate()
+        found = outputs(tmp_path)
+        half = [path for path, content in found.items() if content not in (wanted.get(path), b"")]
+        assert half == [], f"half-written after kill {number}"
+    process = start(tmp_path, clip)
+    _, said = process.communicate(timeout=300)
+    assert process.returncode == 0, said
+    assert outputs(tmp_path) == wanted
+    assert sorted(os.listdir(tmp_path / ".workplan")) == ["plan.json"]
