@@ -11,6 +11,7 @@ import numpy as np
 
 from addon.motion import best_modes, measure, repair
 from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
+from scripts.trajectories.recordings import shown
 
 from .choices import Choice, Uniform
 from .clips import Clip
@@ -65,14 +66,25 @@ def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]
 
 
 def read_source(source: str, axes: str) -> tuple[list[Clip], str]:
-    """The clips of one source, repaired but not yet told apart by their names, and a note on it, which may be empty."""
+    """The clips of one source, repaired but not yet told apart by their names, and a note on it, which may be empty.
+
+    Of several bodies those are left out, with a note, that there are no two poses of. Raises TrajectoryError where the
+    source cannot be read, or nothing of it is left.
+    """
     recording = read_trajectories(source)
     stem, several = recording.path.stem, len(recording.trajectories) > 1
-    clips = [
-        make_clip(trajectory, source, f"{stem}-{trajectory.name}" if several else stem, axes)
-        for trajectory in recording.trajectories
-    ]
-    return clips, recording.note
+    clips, notes = [], [recording.note] if recording.note else []
+    for trajectory in recording.trajectories:
+        name = f"{stem}-{trajectory.name}" if several else stem
+        try:
+            clips.append(make_clip(trajectory, source, name, axes))
+        except TrajectoryError as error:
+            if not several:
+                raise
+            notes.append(f"{shown(trajectory.name)} is left out: {error.problem}")
+    if not clips:
+        raise TrajectoryError(source, "; ".join(notes), "record at least 2 poses of a body")
+    return clips, "; ".join(notes)
 
 
 def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip:

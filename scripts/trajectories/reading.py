@@ -56,7 +56,7 @@ def read_trajectories(source: str) -> Recording:
     Raises
     ------
     TrajectoryError
-        One line: the file, the line in it, what is wrong and the way out.
+        One line: the file, the line in it, what is wrong and the way out. Also where no body has two samples.
 
     Notes
     -----
@@ -71,10 +71,9 @@ def read_trajectories(source: str) -> Recording:
     except OSError as error:
         problem = f"this file cannot be read ({error.strerror})"
         raise TrajectoryError(path, problem, "check its permissions") from None
-    for trajectory in trajectories:
-        if len(trajectory.times) < 2:
-            problem = f"{shown(trajectory.name)} has {len(trajectory.times)} samples"
-            raise TrajectoryError(path, problem, "a trajectory needs at least 2")
+    if all(len(trajectory.times) < 2 for trajectory in trajectories):
+        problem = ", ".join(f"{shown(one.name)} has {len(one.times)} samples" for one in trajectories[:3])
+        raise TrajectoryError(path, problem, "a trajectory needs at least 2")
     return selection.recording(trajectories)
 
 

@@ -55,6 +55,7 @@ class TrajectoryError(ValueError):
 
     def __init__(self, path: Path | str, problem: str, way_out: str, line: int | None = None) -> None:
         where = f"{path}:{line}" if line else f"{path}"
+        self.problem = printable(problem)
         super().__init__(printable(f"{where}: {problem}; {way_out}"))
 
 
