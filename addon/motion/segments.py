@@ -203,7 +203,6 @@ def _fill(
     Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
     """
     segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
-    bounds = _sample_bounds(key_times, times, len(keys))
     samples = np.broadcast_to(times, out.shape[1:]).ravel()
     outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
 
@@ -221,14 +220,13 @@ def _fill(
     if mode.bends is not None and within and samples.size >= DENSE * pieces * segments.start.size:
         coefficients = _series(mode, pieces)
         key_times = _divided(key_times, pieces)
-        bounds = _sample_bounds(key_times, times, len(keys))
         start = np.broadcast_to(key_times[:, :-1], (len(keys), key_times.shape[-1] - 1)).ravel()
         numbers = np.stack((start, pieces * segments.rate.repeat(pieces)))
 
         def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
             multiply(coefficients[piece], series.powers(s), counts, out)
 
-    _evaluate(fill, numbers, bounds, position, out.reshape(ROWS, -1))
+    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), position, out.reshape(ROWS, -1))
 
 
 def interpolate_within(

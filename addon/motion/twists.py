@@ -16,9 +16,6 @@ from .quaternions import conjugate, cross, multiply, rotate
 SMALLEST = 1e-200
 """Stands for the square of an angle of zero, where only ratios count."""
 
-SERIES_BELOW = 0.03
-"""Below this angle power series serve, whose next terms are below 1e-16."""
-
 
 def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The motions (n) of twists (6, n): unit quaternions (4, n) and translations (3, n)."""
@@ -31,30 +28,27 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     quaternions = np.empty((4, twists.shape[1]))
     np.cos(half, out=quaternions[0])
     np.multiply(sine / angle, turn, out=quaternions[1:])
-    # (1 - cos(a)) / a^2 and (a - sin(a)) / a^3. For small angles the second has few digits, of a product that is none.
-    first = 2.0 * sine * sine / squared
-    second = (angle - 2.0 * sine * quaternions[0]) / (angle * squared)
-    across = cross(turn, advance)
-    return quaternions, advance + first * across + second * cross(turn, across)
+    # Of the angle a: sin(a) / a, (1 - cos(a)) / a^2 and (1 - sin(a) / a) / a^2. For small angles the last has few
+    # digits, of a product that is next to nothing.
+    along = 2.0 * sine * quaternions[0] / angle
+    translations = cross(turn, advance)
+    translations *= 2.0 * sine * sine / squared
+    translations += along * advance
+    translations += np.einsum("kn,kn->n", turn, advance) * (1.0 - along) / squared * turn
+    return quaternions, translations
 
 
 def logarithm(quaternions: np.ndarray, translations: np.ndarray) -> np.ndarray:
     """The twists (6, n) of motions: unit quaternions (4, n) of either sign and translations (3, n)."""
     sine = np.sqrt(np.einsum("kn,kn->n", quaternions[1:], quaternions[1:]))
-    angle = 2.0 * np.arctan2(sine, np.abs(quaternions[0]))
-    sign = np.where(quaternions[0] < 0.0, -1.0, 1.0)
-    small = angle < SERIES_BELOW
-    squared = angle * angle
-    ratio = np.where(small, 2.0 + squared * (1.0 / 12.0 + squared * 7.0 / 2880.0), angle / np.where(small, 1.0, sine))
-    far = np.where(small, 1.0, angle)
-    # (1 - (a / 2) cot(a / 2)) / a^2
-    bend = np.where(
-        small,
-        1.0 / 12.0 + squared * (1.0 / 720.0 + squared / 30240.0),
-        (1.0 - 0.5 * far / np.tan(0.5 * far)) / (far * far),
-    )
-    turn = sign * ratio * quaternions[1:]
+    np.maximum(sine, np.sqrt(SMALLEST), out=sine)
+    cosine = np.abs(quaternions[0])
+    angle = 2.0 * np.arctan2(sine, cosine)
+    ratio = angle / sine
+    turn = np.where(quaternions[0] < 0.0, -ratio, ratio) * quaternions[1:]
     across = cross(turn, translations)
+    # Of the angle a: (1 - (a / 2) cot(a / 2)) / a^2. For small angles it has few digits, as in `exponential`.
+    bend = (1.0 - 0.5 * ratio * cosine) / (angle * angle)
     return np.concatenate((turn, translations - 0.5 * across + bend * cross(turn, across)))
 
 
