@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.scripts.comparing import outputs, write_toss
+
 ROOT = Path(__file__).resolve().parents[2]
 
 pytestmark = pytest.mark.skipif(
@@ -29,15 +31,6 @@ def start(output: Path, clip: Path) -> subprocess.Popen:
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def outputs(folder: Path) -> dict[str, bytes]:
-    """All that is the same each time: a report has its date, and a .blend has addresses of memory in it."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
-        for path in folder.rglob("*")
-        if path.is_file() and path.relative_to(folder).parts[0] not in (".parts", ".workplan", "manifest.json")
-    }
-
-
 def workers_of(process: int) -> list[int]:
     try:
         return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
@@ -47,10 +40,7 @@ def workers_of(process: int) -> list[int]:
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    lines = (ROOT / "assets" / "throw.csv").read_text().splitlines()
-    path = tmp_path_factory.mktemp("clips") / "toss.csv"
-    path.write_text("\n".join(lines[:1] + lines[90:181]))
-    return path
+    return write_toss(tmp_path_factory.mktemp("clips") / "toss.csv", samples=90)
 
 
 @pytest.fixture(scope="module")
