@@ -41,8 +41,8 @@ from addon.animation.reading import read
 from addon.animation.slots import MODE_PATH, Curves, curves_in, slots_of
 from addon.motion import KEYFRAME_MODES
 from scripts.command_line import own_arguments
-from scripts.comparison.files import written_beside
-from scripts.comparison.progress import Progress
+from scripts.files import written_beside
+from scripts.progress import Progress
 
 EXTENSION = "rigid_motion"
 """The id in blender_manifest.toml, which the name of the installed module ends with."""

@@ -26,7 +26,7 @@ except ImportError as error:
     print(f"build_extension.py: {error}\n{way_out(str(error))}", file=sys.stderr)
     sys.exit(2)
 
-from scripts.comparison.files import written_beside
+from scripts.files import written_beside
 
 EPILOG = """
 examples:

@@ -34,12 +34,12 @@ from scripts.comparison import steps
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.modes import BEST_OF, single_modes
 from scripts.comparison.planning import Wanted, comparison_tasks, look_into, reading_tasks
-from scripts.comparison.progress import Progress
 from scripts.comparison.report import Settings
 from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings
 from scripts.comparison.steps import KEYS_NEEDED, REPORT
 from scripts.comparison.subject import SubjectError, load_subject
 from scripts.comparison.version import program_version
+from scripts.progress import Progress
 from scripts.trajectories.axes import AXES
 from scripts.workplan import (
     Executor,

@@ -25,11 +25,11 @@ if str(ROOT) not in sys.path:
 from scripts import compare
 from scripts.command_line import own_arguments
 from scripts.comparison import steps
-from scripts.comparison.files import write_text
 from scripts.comparison.planning import comparison_tasks, look_into, reading_tasks
-from scripts.comparison.progress import Progress
 from scripts.comparison.subject import MODELS, SubjectError, file_of_subject, load_subject
 from scripts.comparison.version import program_version
+from scripts.files import write_text
+from scripts.progress import Progress
 from scripts.trajectories import TrajectoryError
 from scripts.trajectories.reading import split_source
 from scripts.workplan import Plan, ProcessExecutor, SerialExecutor, Workspace, run

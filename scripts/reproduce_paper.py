@@ -26,18 +26,18 @@ except ImportError as error:
 import numpy as np
 
 from scripts.command_line import own_arguments
-from scripts.comparison.files import written_beside
-from scripts.comparison.progress import Progress
+from scripts.files import written_beside
 from scripts.paper.motions import recordings_in
 from scripts.paper.steps import PAGE, plan
 from scripts.paper.timing import ROUNDS
+from scripts.progress import Progress
 from scripts.trajectories import TrajectoryError
 from scripts.workplan import FolderInUse, Outcome, Plan, SerialExecutor, State, Workspace, code_version, run
 from scripts.workplan.manifest import ManifestError
 
 CODE = (
     *("addon/animation", "addon/motion", "assets/making", "assets/models.blend"),
-    *("scripts/comparison", "scripts/paper", "scripts/streaming", "scripts/trajectories"),
+    *("scripts/comparison", "scripts/files.py", "scripts/paper", "scripts/streaming", "scripts/trajectories"),
 )
 """What the results depend on."""
 

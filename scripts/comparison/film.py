@@ -15,8 +15,9 @@ from pathlib import Path
 
 import bpy
 
+from scripts.files import written_beside
+
 from ..hushing import hushed
-from .files import written_beside
 
 LOSSLESS = "HUFFYUV", "MKV", ".mkv"
 """Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""

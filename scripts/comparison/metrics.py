@@ -16,9 +16,9 @@ import numpy as np
 
 from addon.motion import Poses
 from addon.motion.measures import rms
+from scripts.files import replacing
 
 from .choices import Choice
-from .files import replacing
 from .modes import BEST_OF
 from .reconstructions import Reconstruction
 

@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from addon.motion import Poses, decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
+from scripts.files import write_text
 
 from .clips import Clip
-from .files import write_text
 from .findings import NOTHING, REFERENCE
 from .study import same_motions
 

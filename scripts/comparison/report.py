@@ -18,9 +18,10 @@ from string import Template
 from typing import TextIO
 from urllib.parse import quote
 
+from scripts.files import replacing
+
 from .choices import Budget, Choice, Tolerance, Uniform
 from .clip_section import Films, clip_section, film_name
-from .files import replacing
 from .findings import NOTHING, REFERENCE, Summary, listed, summarise
 from .markup import Content, Markup, element, escape, join
 from .modes import description_of, label_of, single_modes

@@ -13,9 +13,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from scripts.files import write_text
+
 from .choices import Choice, choice_from, choice_parts
 from .clips import Clip
-from .files import write_text
 from .markup import Markup
 from .metrics import Metrics, measure_reconstruction
 from .modes import BEST_OF

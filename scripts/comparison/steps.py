@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from scripts.files import write_text
 from scripts.trajectories import TrajectoryError
 from scripts.workplan import Job, TaskError, step
 
@@ -15,7 +16,6 @@ from . import needed
 from .choices import Choice, choice_from
 from .clip_section import Films
 from .error_charts import errors_over_time
-from .files import write_text
 from .metrics import Metrics, write_metrics, write_reconstruction
 from .modes import single_modes
 from .report import Settings, write_clip_page, write_overview, write_report

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from addon.motion import Poses
+from scripts.files import write_text, written_beside
 
 from .choices import Choice
 from .clips import Clip
-from .files import write_text, written_beside
 from .reconstructions import Reconstruction
 from .study import fill_in
 

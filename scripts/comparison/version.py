@@ -6,7 +6,10 @@ import numpy as np
 
 from scripts.workplan import code_version
 
-SOURCES = ("blender_manifest.toml", "addon/motion", "addon/animation", "scripts/comparison", "scripts/trajectories")
+SOURCES = (
+    *("blender_manifest.toml", "addon/motion", "addon/animation"),
+    *("scripts/comparison", "scripts/files.py", "scripts/trajectories"),
+)
 """Of this program: see `workplan.code_version`."""
 
 

@@ -9,7 +9,7 @@ from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TypeVar
 
-from scripts.comparison.files import write_text
+from scripts.files import write_text
 
 Row = TypeVar("Row")
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from addon.motion import MODES
 from scripts.comparison.clips import Clip
-from scripts.comparison.files import write_text
 from scripts.comparison.film import render_film, render_still
 from scripts.comparison.findings import REFERENCE
 from scripts.comparison.study import folder_names, read_clips
+from scripts.files import write_text
 from scripts.workplan import Job, Plan, Task, step
 
 from . import bows, catching, engines, strips, table, timing, triangle

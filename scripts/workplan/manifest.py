@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.files import write_text
+from scripts.files import write_text
 
 from .hashing import FileState
 

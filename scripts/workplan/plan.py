@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-from scripts.comparison.files import write_text
+from scripts.files import write_text
 
 from .tasks import FUNCTION, Task
 

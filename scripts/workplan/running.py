@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.progress import Progress, Stage
+from scripts.progress import Progress, Stage
 
 from .executors import Executor
 from .hashing import FileState, task_key

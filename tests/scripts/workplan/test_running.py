@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.comparison.progress import Progress
+from scripts.progress import Progress
 from scripts.workplan import FolderInUse, ManifestError, Outcome, Plan, SerialExecutor, State, Task, Workspace, run
 from scripts.workplan.hashing import code_version
 from tests.scripts.workplan.plans import (

@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from scripts.comparison.progress import Progress
+from scripts.progress import Progress
 
 
 class Clock:
