@@ -23,13 +23,16 @@ def written_beside(path: Path) -> Iterator[Path]:
     OSError
         Where the folder cannot be written, or (on Windows) another program has `path` open.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.resolve().with_name(f".{os.getpid()}.{path.name}")
+    if not path.parent.is_dir():
+        path.parent.mkdir(parents=True, exist_ok=True)
+    target = path.resolve() if path.is_symlink() else path
+    beside = target.with_name(f".{os.getpid()}.{path.name}")
     try:
         yield beside
         beside.replace(path)
-    finally:
+    except BaseException:
         beside.unlink(missing_ok=True)
+        raise
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -110,4 +110,8 @@ class Manifest:
 
 
 def _content(tasks: Mapping[str, Record], failures: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
-    return {"schema": SCHEMA, "tasks": {name: asdict(record) for name, record in tasks.items()}, "failures": failures}
+    records = {
+        name: vars(record) | {"outputs": {path: vars(state) for path, state in record.outputs.items()}}
+        for name, record in tasks.items()
+    }
+    return {"schema": SCHEMA, "tasks": records, "failures": failures}

@@ -12,7 +12,7 @@ import shutil
 import time
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +46,7 @@ class Order:
 
     def as_json(self) -> dict[str, Any]:
         """Every field, for `Order(**fields)`."""
-        return asdict(self)
+        return dict(vars(self))
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,10 @@ KINDS = {kind.__name__: kind for kind in (Told, Noted, Made, Failed, Lost)}
 
 def as_json(message: Message) -> dict[str, Any]:
     """A message as plain data."""
-    return {"kind": type(message).__name__, **asdict(message)}
+    content = {"kind": type(message).__name__, **vars(message)}
+    if isinstance(message, Made):
+        content["outputs"] = {path: vars(state) for path, state in message.outputs.items()}
+    return content
 
 
 def from_json(content: Mapping[str, Any]) -> Message:

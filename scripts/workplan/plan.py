@@ -9,7 +9,8 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from itertools import accumulate
+from pathlib import Path
 
 from scripts.files import write_text
 
@@ -118,19 +119,18 @@ def _check_outputs(listed: list[Task]) -> None:
                 raise PlanError(f"task {task.name!r}: {output!r} is made by {makers[folded]!r} already")
             makers[folded] = task.name
     for output, maker in makers.items():
-        for folder in map(str, PurePosixPath(output).parents):
+        for folder in accumulate(output.split("/")[:-1], "{}/{}".format):
             if folder in makers:
                 raise PlanError(f"task {maker!r}: {output!r} lies in {folder!r}, which is a file of {makers[folder]!r}")
 
 
 def _check_path(task: Task, output: str) -> None:
-    path, windows = PurePosixPath(output), PureWindowsPath(output)
-    sound = output == str(path) and "\\" not in output and output.isprintable() and path.parts
-    inside = sound and not windows.drive and not windows.root and ".." not in path.parts and output != "."
-    if not inside:
+    parts = output.split("/")
+    # A colon in the first part would be a drive of Windows, and in another a stream of a file.
+    if not output.isprintable() or any(character in output for character in "\\:") or {"", ".", ".."} & {*parts}:
         raise PlanError(f"task {task.name!r}: {output!r} is no path below the output folder")
-    if path.parts[0].casefold() in OWN_NAMES:
-        raise PlanError(f"task {task.name!r}: {path.parts[0]!r} is where the work plan keeps its own files")
+    if parts[0].casefold() in OWN_NAMES:
+        raise PlanError(f"task {task.name!r}: {parts[0]!r} is where the work plan keeps its own files")
 
 
 def _ordered(tasks: Mapping[str, Task]) -> tuple[str, ...]:

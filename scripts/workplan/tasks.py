@@ -10,7 +10,7 @@ import importlib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -77,7 +77,7 @@ class Task:
 
     def as_json(self) -> dict[str, Any]:
         """Every field, for `Task(**fields)`."""
-        return asdict(self)
+        return dict(vars(self))
 
 
 def step(function: Step) -> Step:

@@ -6,6 +6,7 @@ tasks that are done, the plan, and a scratch folder for each task at work.
 
 from __future__ import annotations
 
+import os
 import shutil
 import uuid
 from collections.abc import Iterable
@@ -88,11 +89,14 @@ class Workspace:
         OSError
             Where that cannot be. What was moved is not counted as done.
         """
+        there, beside = os.fspath(self.output), os.fspath(scratch)
         for path in made.outputs:
-            place = self.output / path
-            place.parent.mkdir(parents=True, exist_ok=True)
-            (scratch / path).replace(place)
-        self._cleaner.submit(shutil.rmtree, scratch, ignore_errors=True)
+            try:
+                os.replace(f"{beside}/{path}", f"{there}/{path}")
+            except FileNotFoundError:
+                (self.output / path).parent.mkdir(parents=True, exist_ok=True)
+                os.replace(f"{beside}/{path}", f"{there}/{path}")
+        self._cleaner.submit(_remove_folders, beside, made.outputs)
         record = Record(key, made.outputs, made.seconds, made.facts)
         self.manifest.add(name, record)
         self.done_here.add(name)
@@ -120,6 +124,18 @@ class Workspace:
         for folder in self._missing:
             if not _removed(folder):
                 break
+
+
+def _remove_folders(scratch: str, outputs: Iterable[str]) -> None:
+    """Remove a scratch folder, of which nothing should be left but the folders of these outputs."""
+    folders = {path.rpartition("/")[0] for path in outputs}
+    while more := {folder.rpartition("/")[0] for folder in folders} - folders:
+        folders |= more
+    try:
+        for folder in sorted(folders, reverse=True):
+            os.rmdir(f"{scratch}/{folder}")
+    except OSError:
+        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _removed(folder: Path) -> bool:

@@ -254,14 +254,14 @@ def test_a_full_disk_ends_the_run_with_what_is_done_in_place(output: Path) -> No
 def test_a_disk_that_fills_up_while_outputs_are_moved_ends_the_run(
     output: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    replace = Path.replace
+    replace = os.replace
 
-    def full(self: Path, target: Path) -> Path:
-        if target.name == "b.txt":
-            raise OSError(28, os.strerror(28), str(target))
-        return replace(self, target)
+    def full(source: str, target: str) -> None:
+        if os.path.basename(target) == "b.txt":
+            raise OSError(28, os.strerror(28), target)
+        replace(source, target)
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(os, "replace", full)
     outcome = run_in(output, task("a"), task("b"), task("c"))
     assert outcome.problem == f"{output / 'b.txt'}: {os.strerror(28)}"
     assert sorted(contents(output)) == ["a.txt"]
