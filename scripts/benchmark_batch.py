@@ -6,8 +6,11 @@
 
 Clips are pieces of the recordings in `assets/`, each moved elsewhere, so that none is like another. `compare.py` goes
 through all of them with one worker and with two in turns, each time into an empty folder; figures are of the fastest
-round. Memory is the most that a process has had (on Linux; elsewhere it is left out): of the program itself, over the
-number of clips, and of its largest worker, over the length of one clip. What counts are the ratios.
+round. Where Blender renders on the processor, one worker by itself uses several, so there is also one that is kept on
+a single processor (on Linux). Folders are made where `TMPDIR` says: on a disk it is the disk that limits two workers,
+since every clip makes many small files. Memory is the most that a process has had (on Linux; elsewhere it is left out):
+of the program itself, over the number of clips, and of its largest worker, over the length of one clip. What counts
+are the ratios.
 """
 
 from __future__ import annotations
@@ -91,8 +94,8 @@ def wandering(samples: int) -> str:
     return "t,x,y,z,qw,qx,qy,qz\n" + "\n".join(",".join(map(repr, row)) for row in table.tolist()) + "\n"
 
 
-def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str) -> Run:
-    """Run `compare.py` on some clips, into a folder that is gone afterwards."""
+def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
+    """Run `compare.py` on some clips, on a single processor if it is to be alone, into a folder that was not there."""
     output = folder / "output"
     shutil.rmtree(output, ignore_errors=True)
     command = [
@@ -108,6 +111,8 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str) -> Ru
     started = time.perf_counter()
     own = worker = 0
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT) as process:
+        if alone:
+            os.sched_setaffinity(process.pid, {min(os.sched_getaffinity(0))})
         os.set_blocking(process.stderr.fileno(), False)
         said = b""
         while process.poll() is None:
@@ -143,23 +148,26 @@ def children_of(pid: int) -> list[int]:
 
 def workers(title: str, clips: Sequence[Path], folder: Path, rounds: int, *options: str) -> Iterator[str]:
     """One worker beside two, as lines of Markdown."""
-    runs: dict[int, list[Run]] = {1: [], 2: []}
+    runs: dict[tuple[int, bool], list[Run]] = {(1, False): [], (2, False): []}
+    if hasattr(os, "sched_setaffinity"):
+        runs[1, True] = []
     for _ in range(rounds):
-        for jobs, some in runs.items():
-            say(f"{title}, {jobs} at work ...")
-            some.append(compare(clips, folder, jobs, *options))
-    best = {jobs: min(some, key=lambda run: run.seconds) for jobs, some in runs.items()}
+        for (jobs, alone), some in runs.items():
+            say(f"{title}, {jobs} at work{' on one processor' if alone else ''} ...")
+            some.append(compare(clips, folder, jobs, *options, alone=alone))
+    best = {way: min(some, key=lambda run: run.seconds) for way, some in runs.items()}
     yield f"### {title}"
     yield ""
     yield f"`compare.py CLIP... {' '.join(options)} --jobs N`"
     yield ""
     yield "| workers | seconds | clips a minute | as fast as one | at work, of the time of all | outside the renderer |"
     yield "|---:|---:|---:|---:|---:|---:|"
-    for jobs, run in best.items():
+    for (jobs, alone), run in best.items():
         outside = f"{1.0 - run.rendering / run.work:.1%}" if run.rendering else ""
         yield (
-            f"| {jobs} | {run.seconds:.1f} | {60.0 * len(clips) / run.seconds:.0f} "
-            f"| {best[1].seconds / run.seconds:.2f} times | {run.work / run.seconds / jobs:.0%} | {outside} |"
+            f"| {jobs}{' on one processor' if alone else ''} | {run.seconds:.1f} "
+            f"| {60.0 * len(clips) / run.seconds:.0f} | {best[1, False].seconds / run.seconds:.2f} times "
+            f"| {run.work / run.seconds / jobs:.0%} | {outside} |"
         )
     yield ""
 

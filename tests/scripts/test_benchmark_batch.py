@@ -43,12 +43,13 @@ def test_it_sees_what_a_process_has_taken_at_most():
 
 
 def test_two_workers_are_told_beside_one(tmp_path, monkeypatch):
-    took = {1: 20.0, 2: 10.5}
+    took = {(1, False): 20.0, (2, False): 10.5, (1, True): 21.0}
 
-    def compare(clips, folder, jobs, *options):
-        return benchmark_batch.Run(took[jobs], 10**8, 2 * 10**8, 0.9 * took[jobs] * jobs, 15.0)
+    def compare(clips, folder, jobs, *options, alone):
+        return benchmark_batch.Run(took[jobs, alone], 10**8, 2 * 10**8, 0.9 * took[jobs, alone] * jobs, 15.0)
 
     monkeypatch.setattr(benchmark_batch, "compare", compare)
     page = "\n".join(benchmark_batch.workers("two", [tmp_path] * 7, tmp_path, 2, "--no-video"))
     assert "| 1 | 20.0 | 21 | 1.00 times | 90% | 16.7% |" in page
+    assert ("| 1 on one processor | 21.0 | 20 | 0.95 times | 90% |" in page) == hasattr(os, "sched_setaffinity")
     assert "| 2 | 10.5 | 40 | 1.90 times | 90% | 20.6% |" in page
