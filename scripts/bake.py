@@ -40,7 +40,7 @@ from addon.animation.mode_keys import segment_modes
 from addon.animation.reading import read
 from addon.animation.slots import MODE_PATH, Curves, curves_in, slots_of
 from addon.motion import KEYFRAME_MODES
-from scripts.command_line import own_arguments
+from scripts.command_line import number, own_arguments
 from scripts.files import written_beside
 from scripts.progress import Progress
 
@@ -453,20 +453,14 @@ def _names(text: str) -> list[str]:
 
 
 def _frame(text: str) -> float:
-    try:
-        frame = float(text)
-    except ValueError:
-        frame = math.nan
+    frame = number(text)
     if not math.isfinite(frame):
         raise argparse.ArgumentTypeError(f"{text!r} is not a frame")
     return frame
 
 
 def _step(text: str) -> float:
-    try:
-        step = float(text)
-    except ValueError:
-        step = math.nan
+    step = number(text)
     if not SMALLEST_STEP <= step < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of frames, {SMALLEST_STEP} or more")
     return step

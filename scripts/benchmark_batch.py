@@ -34,6 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from scripts.publishing import publish
+from scripts.workplan.worker import peak_memory_of
 
 SECONDS = 2.0
 """How long a clip is."""
@@ -116,8 +117,8 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone
         os.set_blocking(process.stderr.fileno(), False)
         said = b""
         while process.poll() is None:
-            own = max(own, peak_memory(process.pid))
-            worker = max([worker, *map(peak_memory, children_of(process.pid))])
+            own = max(own, peak_memory_of(process.pid))
+            worker = max([worker, *map(peak_memory_of, children_of(process.pid))])
             said += process.stderr.read() or b""
             time.sleep(POLL)
         seconds = time.perf_counter() - started
@@ -127,15 +128,6 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone
     tasks = json.loads((output / "manifest.json").read_text(encoding="utf-8"))["tasks"].values()
     rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks)
     return Run(seconds, own, worker, sum(task["seconds"] for task in tasks), rendering)
-
-
-def peak_memory(pid: int) -> int:
-    """The most memory that a process has had, in bytes; 0 where it is gone or the system does not tell."""
-    try:
-        lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError:
-        return 0
-    return next((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:")), 0)
 
 
 def children_of(pid: int) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
@@ -14,3 +15,11 @@ def own_arguments(script: str) -> list[str]:
     if Path(sys.argv[0]).name == Path(script).name:
         return sys.argv[1:]
     return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+
+
+def number(text: str) -> float:
+    """The number that an option says; NaN, which is within no bounds, where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -29,7 +29,7 @@ except ImportError as error:
     sys.exit(2)
 
 from addon.motion import KEYFRAME_MODES, MODES
-from scripts.command_line import own_arguments
+from scripts.command_line import number, own_arguments
 from scripts.comparison import steps
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.modes import BEST_OF, single_modes
@@ -227,12 +227,13 @@ def main(arguments: list[str]) -> int:
     try:
         if not options.no_video:
             load_subject(options.object)
+        version, command = program_version(), shlex.join(["compare.py", *arguments])
         with (
             Progress() as progress,
             Workspace(options.output) as workspace,
-            _executor(options, progress) as executor,
+            _executor(options, progress, version) as executor,
         ):
-            return _Run(options, workspace, executor, progress, shlex.join(["compare.py", *arguments])).run()
+            return _Run(options, workspace, executor, progress, command, version).run()
     except (SubjectError, FolderInUse, ManifestError, ExecutorError) as error:
         print(f"compare.py: {error}", file=sys.stderr)
     except OSError as error:
@@ -240,7 +241,7 @@ def main(arguments: list[str]) -> int:
     return 2
 
 
-def _executor(options: argparse.Namespace, progress: Progress) -> Executor:
+def _executor(options: argparse.Namespace, progress: Progress, version: str) -> Executor:
     """Who does the work. Raises ExecutorError where Dask is wanted, and is not there."""
     if options.scheduler is None:
         return SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs)
@@ -252,7 +253,7 @@ def _executor(options: argparse.Namespace, progress: Progress) -> Executor:
         options.scheduler,
         options.output,
         identify=f"{steps.__name__}:{steps.identify.__name__}",
-        version=program_version(),
+        version=version,
         note=lambda text: progress.note(f"compare.py: {text}"),
     )
 
@@ -261,11 +262,16 @@ class _Run:
     """A comparison in its output folder."""
 
     def __init__(
-        self, options: argparse.Namespace, workspace: Workspace, executor: Executor, progress: Progress, command: str
+        self,
+        options: argparse.Namespace,
+        workspace: Workspace,
+        executor: Executor,
+        progress: Progress,
+        command: str,
+        version: str,
     ) -> None:
         self.options, self.workspace, self.executor, self.progress = options, workspace, executor, progress
-        self.command = command
-        self.version = program_version()
+        self.command, self.version = command, version
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what came of it."""
@@ -394,13 +400,10 @@ def _jobs(text: str) -> int:
 
 
 def _positive(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0.0 < number < float("inf"):
+    positive = number(text)
+    if not 0.0 < positive < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
-    return number
+    return positive
 
 
 def _resolution(text: str) -> tuple[int, int]:

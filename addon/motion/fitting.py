@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import twists
+from .measures import shell_point
 from .modes import MODES, interpolate
 from .poses import Poses
 from .quaternions import align_signs, multiply, normalise, rotate
@@ -126,8 +127,4 @@ def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
 
 def _shell_points(poses: Poses, radius: float) -> np.ndarray:
     """The points that the shell error goes by, shape (9, n)."""
-    points = []
-    for axis in np.eye(3):
-        arm = radius * axis * (1.0 if poses.scales is None else poses.scales[:, None])
-        points.append((poses.positions + rotate(poses.quaternions, np.broadcast_to(arm, poses.positions.shape))).T)
-    return np.concatenate(points)
+    return np.concatenate([shell_point(poses, axis, radius).T for axis in range(3)])

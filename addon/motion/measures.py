@@ -55,13 +55,12 @@ def measure(times: np.ndarray, poses: Poses, truth: Poses, radius: float = 0.1) 
 
 def shell_error(poses: Poses, truth: Poses, radius: float = 0.1) -> np.ndarray:
     """The largest displacement, shape (..., n), of the points at `radius` along the body's axes."""
-    displacement = np.stack(
-        [_shell_point(poses, axis, radius) - _shell_point(truth, axis, radius) for axis in range(3)]
-    )
+    displacement = np.stack([shell_point(poses, axis, radius) - shell_point(truth, axis, radius) for axis in range(3)])
     return np.sqrt(np.einsum("a...i,a...i->a...", displacement, displacement).max(axis=0))
 
 
-def _shell_point(poses: Poses, axis: int, radius: float) -> np.ndarray:
+def shell_point(poses: Poses, axis: int, radius: float) -> np.ndarray:
+    """Where the point at `radius` along one of the body's axes is, shape (..., 3)."""
     arm = radius * np.eye(3)[axis] * (1.0 if poses.scales is None else poses.scales[..., None])
     return poses.positions + rotate(poses.quaternions, np.broadcast_to(arm, poses.positions.shape))
 

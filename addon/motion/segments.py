@@ -216,8 +216,8 @@ def _fill(
 
     mode, within = curves(segments), not (outside and extrapolate)
     fill, numbers = _filler(mode, within), np.stack((segments.start, segments.rate))
-    pieces = 1 if mode.bends is None else _pieces(segments, mode.bends)
-    if mode.bends is not None and within and samples.size >= DENSE * pieces * segments.start.size:
+    pieces = _pieces(segments, mode.bends) if mode.bends is not None and within else 0
+    if 0 < DENSE * pieces * segments.start.size <= samples.size:
         coefficients = _series(mode, pieces)
         key_times = _divided(key_times, pieces)
         start = np.broadcast_to(key_times[:, :-1], (len(keys), key_times.shape[-1] - 1)).ravel()

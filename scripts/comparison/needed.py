@@ -141,7 +141,7 @@ def keys_needed(
                 )
                 ways = [(found, rms_error(stretch, found, group[0], radius)) for found in (evenly, by_motion)]
                 if fit:
-                    ways.append(_fewest_fitted(stretch, group[0], targets[place], radius, by_motion))
+                    ways.append(_fewest_fitted(stretch, group[0], targets[place], radius, *ways[1]))
                 for column, (found, error) in enumerate(ways):
                     keys[row, column, place] = np.inf if len(found) == len(stretch.times) else len(found)
                     reached[row, column, place] = error
@@ -182,12 +182,16 @@ def _fewest_evenly(clip: Clip, mode: str, target: float, radius: float, start: n
 
 
 def _fewest_fitted(
-    clip: Clip, mode: str, target: float, radius: float, adaptive: np.ndarray
+    clip: Clip, mode: str, target: float, radius: float, adaptive: np.ndarray, reached: float
 ) -> tuple[np.ndarray, float]:
-    """The fewest keys, and their error, that are within the target when fitted, searched from the adaptive ones on."""
-    best, reached = adaptive, rms_error(clip, adaptive, mode, radius)
-    keys, aim, scale = adaptive, target, clip.metres_per_unit
-    for _ in range(TRIES):
+    """The fewest keys, and their error, that are within the target when fitted.
+
+    They are searched from the adaptive ones on, which have reached this error without.
+    """
+    best, keys, aim, scale = adaptive, adaptive, target, clip.metres_per_unit
+    for number in range(TRIES):
+        if number:
+            keys = reduce_keys(clip.times, clip.poses, mode, aim / scale, radius / scale, rms=True)
         fitted = fit_keys(clip.times, clip.poses, keys, mode, radius / scale)
         error = rms_error(clip, keys, mode, radius, fitted)
         if error <= target and len(keys) <= len(best):
@@ -195,7 +199,6 @@ def _fewest_fitted(
         if error <= NOTHING:
             break
         aim *= target / error
-        keys = reduce_keys(clip.times, clip.poses, mode, aim / scale, radius / scale, rms=True)
     return best, reached
 
 

@@ -56,14 +56,20 @@ def main() -> None:
         say(perform(order, tell), peak=peak_memory())
 
 
+def peak_memory_of(process: int | str) -> int:
+    """The most memory, in bytes, that a process has had; 0 where it is gone, or the system does not tell."""
+    try:
+        status = Path(f"/proc/{process}/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmHWM:")), 0)
+
+
 def peak_memory() -> int:
     """The most memory, in bytes, that this process has had; 0 where the system does not tell."""
-    try:
-        # Not getrusage: there a process begins with the peak of the one that started it.
-        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
-        return next(int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmHWM:"))
-    except (OSError, StopIteration):
-        pass
+    # Not getrusage, where that can be: there a process begins with the peak of the one that started it.
+    if found := peak_memory_of("self"):
+        return found
     try:
         import resource
     except ImportError:

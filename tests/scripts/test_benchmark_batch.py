@@ -34,11 +34,11 @@ def test_its_long_clip_has_as_many_samples_as_it_says(tmp_path):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux tells")
 def test_it_sees_what_a_process_has_taken_at_most():
-    before = benchmark_batch.peak_memory(os.getpid())
+    before = benchmark_batch.peak_memory_of(os.getpid())
     assert before > 1e7
     block = np.ones(30_000_000)
-    assert benchmark_batch.peak_memory(os.getpid()) >= max(before, block.nbytes)
-    assert benchmark_batch.peak_memory(2**22 + 1) == 0
+    assert benchmark_batch.peak_memory_of(os.getpid()) >= max(before, block.nbytes)
+    assert benchmark_batch.peak_memory_of(2**22 + 1) == 0
     assert benchmark_batch.children_of(2**22 + 1) == []
 
 

@@ -58,7 +58,7 @@ def _aframe_of_2017() -> list:
     ]
 
 
-_BVH = """HIERARCHY
+ARM = """HIERARCHY
 ROOT Shoulder
 {
     OFFSET 0.0 0.0 0.0
@@ -75,6 +75,7 @@ ROOT Shoulder
 }
 MOTION
 """
+"""A shoulder and an elbow in BVH, up to where the frames begin."""
 
 _SCALES = np.linspace(1.0, 1.2, COUNT)
 _EUROC = (
@@ -108,8 +109,8 @@ SEEDS: dict[str, tuple[str, ...]] = {
         json.dumps(_aframe_of_2017(), indent=1),
     ),
     ".bvh": (
-        f"{_BVH}Frames: {COUNT}\nFrame Time: 0.02\n" + _rows((POSITIONS, DEGREES, DEGREES[::-1]), " "),
-        f"{_BVH}Frames: {COUNT}\nFrame Time: 0.02\n".replace("Elbow", "Shoulder").replace("\n", "\r\n")
+        f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n" + _rows((POSITIONS, DEGREES, DEGREES[::-1]), " "),
+        f"{ARM}Frames: {COUNT}\nFrame Time: 0.02\n".replace("Elbow", "Shoulder").replace("\n", "\r\n")
         + _rows((POSITIONS, DEGREES, 0.0 * DEGREES), "\t"),
     ),
 }

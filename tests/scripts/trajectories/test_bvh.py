@@ -8,24 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from addon.motion.quaternions import angle_between
 from scripts.trajectories import read_trajectories
+from tests.scripts.trajectories import seeds
 
-ARM = """HIERARCHY
-ROOT Shoulder
-{
-    OFFSET 0.0 0.0 0.0
-    CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-    JOINT Elbow
-    {
-        OFFSET 2.0 0.0 0.0
-        CHANNELS 3 Zrotation Xrotation Yrotation
-        End Site
-        {
-            OFFSET 1.0 0.0 0.0
-        }
-    }
-}
-MOTION
-Frames: 2
+ARM = f"""{seeds.ARM}Frames: 2
 Frame Time: 0.04
 0 0 0  0 0 0  0 0 0
 1 5 0  90 0 0  -90 0 0
