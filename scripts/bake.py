@@ -344,7 +344,8 @@ def write_file(job: Job, stop_if_asked: Callable[[], None]) -> None:
                 bpy.ops.wm.save_mainfile()
                 return
             with written_beside(job.output) as beside:
-                bpy.ops.wm.save_as_mainfile(filepath=str(beside), copy=True, check_existing=False, relative_remap=True)
+                whole = str(beside.absolute())  # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
+                bpy.ops.wm.save_as_mainfile(filepath=whole, copy=True, check_existing=False, relative_remap=True)
                 stop_if_asked()
     except RuntimeError as error:
         said = " ".join(str(error).split()).removeprefix("Error: ")
