@@ -6,7 +6,7 @@ nothing of it. The delta transforms that an object has of its own are remembered
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import bpy
 import numpy as np
@@ -27,7 +27,7 @@ OWN = {
 def fill_in(readings: Sequence[tuple[Slot, Curves, Source]]) -> None:
     """Compute and write the in-betweens of these slots."""
     for (slot, curves, source), delta in zip(readings, deltas([source for *_, source in readings]), strict=True):
-        _write(slot, curves, _values(source, delta), delta.first)
+        _write(slot, curves, _values(source, delta), source.frame_range)
         _record(slot, source.digest)
 
 
@@ -40,7 +40,7 @@ def is_complete(curves: Curves, source: Source) -> bool:
 
 def clear(slot: Slot, curves: Curves) -> None:
     """Take the in-betweens out of a slot, and give its objects their own delta transforms back."""
-    _write(slot, curves, {}, 0)
+    _write(slot, curves, {}, (0, 0))
     _record(slot, "")
 
 
@@ -75,37 +75,45 @@ def _values(source: Source, delta: Deltas) -> dict[str, np.ndarray]:
     return {path: getattr(delta, name) for path, name in _paths(source).items()}
 
 
-def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], first: int) -> None:
-    """Replace the in-betweens of a slot by these values of delta transforms, (channels, m) from the first frame on."""
-    channelbag = slot.channelbag
-    gone = set()
-    for path in OWN:
-        rows = values.get(path)
-        for index in range(WIDTHS[path.removeprefix("delta_")]):
-            fcurve = curves.get((path, index))
-            if fcurve is None or not is_filled_in(fcurve):
-                continue
-            if rows is None or not _covers(fcurve, first, rows.shape[1]):
-                channelbag.fcurves.remove(fcurve)
-                del curves[path, index]
-                gone.add(path)
+def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], frames: tuple[int, int]) -> None:
+    """Replace the in-betweens of a slot by these samples of delta transforms, from the first of the frames to the last.
+
+    A row (2 m,) for each channel has frame and value of every sample. Delta transforms that have no samples, or another
+    number of them, are taken out.
+    """
+    first, last = frames
     for path, rows in values.items():
-        for obj in slot.users:
-            _remember(obj, path)
-        points = np.empty((*rows.shape, 2), dtype=np.float32)
-        points[..., 0] = np.arange(first, first + rows.shape[1])
-        points[..., 1] = rows
-        for index, channel in enumerate(points.reshape(len(rows), -1)):
-            fcurve = curves.get((path, index)) or _new(channelbag, curves, path, index, first, rows.shape[1])
-            fcurve.sampled_points.foreach_set("co", channel)
-    if gone - set(values):
-        group = channelbag.groups.get(GROUP)
-        if group is not None and not group.channels:
-            channelbag.groups.remove(group)
+        for index, samples in enumerate(rows):
+            fcurve = curves.get((path, index))
+            if fcurve is not None and len(fcurve.sampled_points) != last - first + 1:
+                _remove(slot, curves, path, index)
+                fcurve = None
+            if fcurve is None:
+                fcurve = _new(slot.channelbag, curves, path, index, first, last)
+            fcurve.sampled_points.foreach_set("co", samples)
+    for obj in slot.users:
+        _remember(obj, values)
+    gone = [key for key, fcurve in curves.items() if key[0] in OWN and key[0] not in values and is_filled_in(fcurve)]
+    for key in gone:
+        _remove(slot, curves, *key)
+    if gone:
+        _tidy(slot)
         for obj in slot.users:
             give_back(obj)
     for obj in slot.users:
         obj.update_tag(refresh={"TIME"})
+
+
+def _remove(slot: Slot, curves: Curves, path: str, index: int) -> None:
+    slot.channelbag.fcurves.remove(curves.pop((path, index)))
+
+
+def _tidy(slot: Slot) -> None:
+    """Take out the group of the in-betweens where nothing is left in it."""
+    groups = slot.channelbag.groups
+    group = groups.get(GROUP)
+    if group is not None and not group.channels:
+        groups.remove(group)
 
 
 def _covers(fcurve: bpy.types.FCurve, first: int, count: int) -> bool:
@@ -113,12 +121,14 @@ def _covers(fcurve: bpy.types.FCurve, first: int, count: int) -> bool:
     return len(points) == count and points[0].co[0] == first
 
 
-def _new(channelbag, curves: Curves, path: str, index: int, first: int, count: int) -> bpy.types.FCurve:
+def _new(
+    channelbag: bpy.types.ActionChannelbag, curves: Curves, path: str, index: int, first: int, last: int
+) -> bpy.types.FCurve:
     """A sampled F-curve out of the animator's way: locked, and hidden in the Graph Editor."""
     fcurve = curves[path, index] = channelbag.fcurves.new(path, index=index)
     fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
     fcurve.keyframe_points.insert(first, 0.0)
-    fcurve.convert_to_samples(first, first + count)
+    fcurve.convert_to_samples(first, last + 1)
     fcurve.lock = fcurve.hide = True
     fcurve.select = False
     return fcurve
@@ -126,18 +136,20 @@ def _new(channelbag, curves: Curves, path: str, index: int, first: int, count: i
 
 def adopt(slot: Slot, curves: Curves) -> None:
     """Remember the own delta transforms of objects that move by a slot which is filled in already."""
-    for path in {path for (path, _), fcurve in curves.items() if path in OWN and is_filled_in(fcurve)}:
-        for obj in slot.users:
-            _remember(obj, path)
+    paths = {path for (path, _), fcurve in curves.items() if path in OWN and is_filled_in(fcurve)}
+    for obj in slot.users:
+        _remember(obj, paths)
 
 
-def _remember(obj: bpy.types.Object, path: str) -> None:
-    """Keep the object's own delta transform, which in-betweens take the place of."""
-    own, place = OWN[path]
+def _remember(obj: bpy.types.Object, paths: Iterable[str]) -> None:
+    """Keep the object's own delta transforms, which in-betweens take the place of."""
     motion = obj.rigid_motion
-    if not motion.filled[place]:
-        setattr(motion, own, getattr(obj, path))
-        motion.filled[place] = True
+    filled = tuple(motion.filled)
+    for path in paths:
+        own, place = OWN[path]
+        if not filled[place]:
+            setattr(motion, own, getattr(obj, path))
+            motion.filled[place] = True
 
 
 def give_back(obj: bpy.types.Object) -> None:

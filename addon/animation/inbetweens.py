@@ -11,13 +11,12 @@ and that is kept where keys are not eased: handles shape single channels, and it
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..motion import KEYFRAME_MODES, Poses
-from ..motion import in_betweens as segment_poses
+from ..motion import KEYFRAME_MODES, Poses, prepare
 from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
 from ..motion.piecewise import blocks, combine
 from ..motion.poses import beyond
@@ -25,7 +24,7 @@ from ..motion.quaternions import conjugate, multiply
 from .fcurves import Keys, evaluated
 from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
 
-AT_ONCE = 65536
+AT_ONCE = 131072
 """Samples that are prepared for at once."""
 
 BLOCK = 16384
@@ -52,19 +51,19 @@ class InBetweens:
 
 @dataclass(frozen=True, eq=False)
 class Deltas:
-    """The values of delta transforms on whole frames; None for a property that the modes leave alone."""
+    """Delta transforms on the m whole frames of a source, as sampled F-curves take them; None where they are left alone.
 
-    first: int
-    """The first frame."""
+    A row for each component, with the frame and the value of every sample by turns, in single precision.
+    """
 
     location: np.ndarray | None
-    """Shape (3, m)."""
+    """Shape (3, 2 m)."""
 
     rotation: np.ndarray | None
-    """Shape (4, m) or, for a source that turns by Euler angles, (3, m)."""
+    """Shape (4, 2 m) or, for a source that turns by Euler angles, (3, 2 m)."""
 
     scale: np.ndarray | None
-    """Shape (3, m)."""
+    """Shape (3, 2 m)."""
 
 
 def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> InBetweens:
@@ -98,14 +97,20 @@ def deltas(sources: Sequence[Source]) -> list[Deltas]:
         _, delta = _motion(portion, frames)
         samples = _each(portion, map(len, frames))
         order = portion[0].order
-        rotation = delta[ROWS[ROTATION]]
         if order is not None:
-            rotation = eulers_from_quaternions(rotation.T, order, [place.start for _, place in samples]).T
-        rows = {LOCATION: delta[ROWS[LOCATION]], ROTATION: rotation, SCALE: delta[ROWS[SCALE]]}
+            angles = eulers_from_quaternions(delta[ROWS[ROTATION]].T, order, [place.start for _, place in samples]).T
+            delta = np.concatenate((delta[ROWS[LOCATION]], angles, delta[ROWS[SCALE]]))
+        rotation = slice(3, 7 if order is None else 6)
+        points = np.empty((*delta.shape, 2), np.float32)
+        points[..., 0] = np.concatenate(frames)
+        points[..., 1] = delta
         for source, place in samples:
-            own = {name: rows[name][:, place] for name in source.keyed}
-            scale = own.get(SCALE) if source.uniform_scale else None
-            found[id(source)] = Deltas(source.frame_range[0], own.get(LOCATION), own.get(ROTATION), scale)
+            own = points[:, place].reshape(len(points), -1)
+            found[id(source)] = Deltas(
+                own[ROWS[LOCATION]] if LOCATION in source.keyed else None,
+                own[rotation] if ROTATION in source.keyed else None,
+                own[rotation.stop :] if source.uniform_scale else None,
+            )
     return [found[id(source)] for source in sources]
 
 
@@ -135,7 +140,9 @@ def _each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source
 def _motion(
     sources: Sequence[Source], frames: Sequence[np.ndarray], mode: int | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Blender's own in-betweens (10, m), rotations as unit quaternions, and the deltas (10, m) to the wanted ones.
+    """Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
+
+    Shapes (10, m), or (7, m) of those without a scale that is keyed, and of these without one that is filled in.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
     """
@@ -150,10 +157,10 @@ def _motion(
     weights, offsets = _weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
-    own = np.stack([source.own[: len(native)] for source in sources], axis=1)
+    delta = np.empty((10 if sources[0].uniform_scale else 7, native.shape[1]))
+    own = np.stack([source.own[: len(delta)] for source in sources], axis=1)
     ends = _Ends.of(start, end, segments, smooth=np.isin(modes, SMOOTH))
 
-    delta = np.empty_like(native)
     every_frame = np.concatenate(frames)
     for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
         progress = np.empty((1, place.stop - place.start))
@@ -167,8 +174,9 @@ def _motion(
     delta[:, on_keys] = own[:, owners]
     for number, (source, place) in enumerate(samples):
         before, after = source.used_up
-        outside = (frames[number] < before) | (frames[number] > after)
-        delta[:, place][:, outside] = own[:, number, None]
+        if before > -np.inf or after < np.inf:
+            outside = (frames[number] < before) | (frames[number] > after)
+            delta[:, place][:, outside] = own[:, number, None]
     return native, delta
 
 
@@ -182,15 +190,19 @@ def _fill(
     counts: np.ndarray,
     progress: np.ndarray,
 ) -> None:
-    """Fill in the deltas (10, m) of some segments, each with its own modes and deltas, (s,) and (10, s)."""
+    """Fill in the deltas (., m) of some segments, each with its own modes and deltas, (s,) and (., s)."""
     for mode in np.unique(modes[counts > 0]):
         chosen = modes == mode
         every = bool(chosen.all())
         some = slice(None) if every else np.repeat(chosen, counts)
-        delta[:, some] = own[:, chosen].repeat(counts[chosen], axis=1)
-        if mode:
-            wanted = ends.poses(segment, np.where(chosen, counts, 0), progress[some], MODE_IDS[mode])
-            _differ(wanted, native[:, some], delta, some)
+        here = counts if every else np.where(chosen, counts, 0)
+        if not mode:
+            delta[:, some] = own.repeat(here, axis=1)
+            continue
+        wanted = ends.poses(segment, here, progress[some], MODE_IDS[mode])
+        _differ(wanted, native[:, some], delta, some)
+        if wanted.scales is not None:
+            delta[ROWS[SCALE], some] *= own[ROWS[SCALE]].repeat(here, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,6 +223,9 @@ class _Ends:
 
     around: tuple[np.ndarray, Poses] | None
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
+
+    prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
+    """What each mode makes of all segments, once it has been asked for."""
 
     @classmethod
     def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> _Ends:
@@ -240,12 +255,15 @@ class _Ends:
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,)."""
-        if KEYFRAME_MODES[mode].is_smooth:
-            times, keys = self.around[0][some], self.around[1][some]
-            nothing = np.zeros_like(counts)
-            return segment_poses(times, keys, np.stack((nothing, counts, nothing), axis=1), progress, mode)
-        times = np.broadcast_to((0.0, 1.0), (len(counts), 2))
-        return segment_poses(times, self.keys[some], counts[:, None], progress, mode)
+        smooth = KEYFRAME_MODES[mode].is_smooth
+        if mode not in self.prepared:
+            even = np.broadcast_to((0.0, 1.0), self.times.shape)
+            self.prepared[mode] = prepare(*(self.around if smooth else (even, self.keys)), mode)
+        if smooth:
+            # Of the three segments between four keys the one in the middle.
+            some = slice(3 * some.start, 3 * some.stop)
+            counts = np.multiply.outer(counts, (0, 1, 0)).ravel()
+        return self.prepared[mode](counts, progress, some)
 
 
 def _with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: np.ndarray) -> tuple[np.ndarray, Poses]:
@@ -284,14 +302,14 @@ def _sampled(
         _rest(rows[:, place], source)
         for own, keys in source.channels:
             if at is source.key_frames and source.is_together:
-                rows[own, place] = keys.values
+                rows[_together(own), place] = keys.values
             else:
                 places.append((own, place))
                 curves.append(keys)
                 times.append(at)
     for number, channels, values in evaluated(curves, times, unit_elastic=unit_elastic):
         own, place = places[number]
-        rows[own[channels], place] = values
+        rows[_together(own[channels]), place] = values
     return rows
 
 
@@ -317,11 +335,16 @@ def _height(places: list[tuple[Source, slice]]) -> int:
     return 10 if any(SCALE in source.keyed for source, _ in places) else 7
 
 
+def _together(rows: list[int]) -> list[int] | slice:
+    """Rising rows as a slice, where they are one after the other: that is copied to at once."""
+    return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] < len(rows) else rows
+
+
 def _rest(rows: np.ndarray, source: Source) -> None:
     """Fill in what a source does not key."""
     for name, own in ROWS.items():
-        if name not in source.keyed:
-            rows[own] = REST[own, None][: len(rows[own])]
+        if name not in source.keyed and own.start < len(rows):
+            rows[own] = REST[own, None]
     for row, value in source.rest.items():
         rows[row] = value
     if source.order is not None:
@@ -397,9 +420,9 @@ def _key_poses(start: np.ndarray, end: np.ndarray, own: np.ndarray, source: Sour
 
 
 def _differ(poses: Poses, native: np.ndarray, delta: np.ndarray, some: slice | np.ndarray) -> None:
-    """Set some of the deltas (10, m) to what takes Blender's in-betweens (10, .) to these poses."""
+    """Set some of the deltas (., m) to what takes Blender's in-betweens (., .) to these poses."""
     delta[ROWS[LOCATION], some] = poses.positions.T - native[ROWS[LOCATION]]
     delta[ROWS[ROTATION], some] = multiply(poses.quaternions, conjugate(native[ROWS[ROTATION]].T)).T
     if poses.scales is not None:
         scale = native[ROWS[SCALE]]
-        delta[ROWS[SCALE], some] *= np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)
+        delta[ROWS[SCALE], some] = np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)

@@ -7,7 +7,7 @@ from .best_of import best_modes, interpolate_by_segments
 from .decimation import decimate
 from .fitting import fit_keys
 from .measures import Errors, measure, rms, shell_error
-from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate
+from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate, prepare
 from .poses import Poses
 from .reduction import reduce_keys
 from .repair import Repair, repair
@@ -26,6 +26,7 @@ __all__ = [
     "interpolate",
     "interpolate_by_segments",
     "measure",
+    "prepare",
     "reduce_keys",
     "repair",
     "rms",

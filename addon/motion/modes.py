@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
 from .poses import LIMIT, SHORTEST, Poses
-from .segments import Curves, Segments, interpolate_along, interpolate_within
+from .segments import Curves, Segments, interpolate_along, prepare_within
 
 
 @dataclass(frozen=True)
@@ -200,18 +201,43 @@ def in_betweens(
     ValueError
         As `interpolate` does.
     """
+    return prepare(key_times, keys, mode)(counts, progress)
+
+
+def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Callable[..., Poses]:
+    """`in_betweens` for several calls with the same keys: what depends on the keys alone is worked out once.
+
+    Returns
+    -------
+    callable
+        (counts, progress, some=slice(None)) to Poses of shape (m,), with counts and progress as `in_betweens` takes
+        them. `some` are the segments that they are for, counted through all objects, one after the other; its step is
+        1 and its ends are none from the end.
+
+    Raises
+    ------
+    ValueError
+        As `interpolate` does; so does what is returned.
+    """
     if mode not in MODES:
         raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
-    key_times, progress = np.asarray(key_times, dtype=np.float64), np.asarray(progress, dtype=np.float64)
-    counts = np.asarray(counts)
+    key_times = np.asarray(key_times, dtype=np.float64)
     keys = _checked(key_times, keys)
-    if counts.shape != (*keys.shape[:-1], keys.shape[-1] - 1) or progress.shape != (int(counts.sum()),):
-        raise ValueError(
-            f"counts of shape {counts.shape} and {progress.size} progresses do not fit keys of {keys.shape}"
-        )
-    if not np.isfinite(progress).all():
-        raise ValueError("progress needs to be made of finite numbers")
-    return interpolate_within(MODES[mode].curves, key_times, keys, counts.ravel(), progress)
+    shape = (*keys.shape[:-1], keys.shape[-1] - 1)
+    within = prepare_within(MODES[mode].curves, key_times, keys)
+
+    def poses(counts: ArrayLike, progress: ArrayLike, some: slice = slice(None)) -> Poses:
+        counts, progress = np.asarray(counts), np.asarray(progress, dtype=np.float64)
+        asked = shape if some == slice(None) else (len(range(*some.indices(math.prod(shape)))),)
+        if counts.shape != asked or progress.shape != (int(counts.sum()),):
+            raise ValueError(
+                f"counts of shape {counts.shape} and {progress.size} progresses do not fit keys of {keys.shape}"
+            )
+        if not np.isfinite(progress).all():
+            raise ValueError("progress needs to be made of finite numbers")
+        return within(counts.ravel(), progress, some)
+
+    return poses
 
 
 def _checked(key_times: np.ndarray, keys: Poses) -> Poses:

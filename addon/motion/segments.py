@@ -229,21 +229,32 @@ def _fill(
     _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), position, out.reshape(ROWS, -1))
 
 
-def interpolate_within(
-    curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses, counts: np.ndarray, progress: np.ndarray
-) -> Poses:
-    """Poses of shape (m,), where each segment says how many there are in it, and each how far it has come.
+Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
+"""What makes poses (m,) of some of the segments, (s,) of them: from how many there are in each, and their progress."""
 
-    `key_times` and keys are (..., n), at least two a row and with unit quaternions. `counts` of shape (..., n - 1) sum
-    up to m. `progress` (m,) is 0 at a segment's first key and 1 at its second, and may pass both.
+
+def prepare_within(curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses) -> Within:
+    """What makes poses between keys where each segment says how many there are in it, and each how far it has come.
+
+    `key_times` and keys are (..., n), at least two a row and with unit quaternions; their segments are counted
+    throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both.
     """
     segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
-    bounds = np.concatenate(((0,), np.cumsum(counts)))
-    out = np.empty((ROWS, progress.size))
-    within = progress.size == 0 or bool(progress.min() >= 0.0 and progress.max() <= 1.0)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
-    _evaluate(_filler(mode, within), no_numbers, bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
-    return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
+
+    def within(counts: np.ndarray, progress: np.ndarray, some: slice) -> Poses:
+        out = np.empty((ROWS, progress.size))
+        inside = progress.size == 0 or bool(progress.min() >= 0.0 and progress.max() <= 1.0)
+        fill, first = _filler(mode, inside), some.start or 0
+
+        def shifted(segment: slice, *others: np.ndarray) -> None:
+            fill(slice(first + segment.start, first + segment.stop), *others)
+
+        bounds = np.concatenate(((0,), np.cumsum(counts)))
+        _evaluate(shifted, no_numbers[:, some], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
+        return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
+
+    return within
 
 
 Fill = Callable[[slice, np.ndarray, np.ndarray, np.ndarray], None]
