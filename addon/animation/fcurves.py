@@ -11,8 +11,9 @@ Channels keyed together have these in common, so that their parameters are worke
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import bpy
@@ -40,6 +41,9 @@ NEAR = float(np.float32(1e-4))
 
 BLOCK = 16384
 """Values worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
+
+AT_HAND = 65536
+"""Values of curves with the same timing that are worked out at once."""
 
 STEP = 1e-5
 """Last step of Newton's method: the error left is about its square."""
@@ -109,6 +113,13 @@ class Keys:
         return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles)
 
     @property
+    def is_sound(self) -> bool:
+        """Whether all numbers are finite, and the keys in the order of their frames."""
+        numbers = (self.points, self.left, self.right, self.easing_settings)
+        in_order = (self.times[1:] >= self.times[:-1]).all()
+        return bool(in_order) and all(part is None or np.isfinite(part).all() for part in numbers)
+
+    @property
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""
         arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
@@ -130,46 +141,53 @@ def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[tuple[list[int], Keys
     list of (list of int, Keys)
         Those together that are keyed together: their places in the sequence, and their keys.
     """
-    together: dict[tuple, list[tuple]] = {}
+    alike: dict[tuple, list[tuple]] = {}
     for number, fcurve in enumerate(fcurves):
         keys = fcurve.keyframe_points
-        points = np.empty(2 * len(keys), np.float32)
-        keys.foreach_get("co", points)
         cycles = _read_cycles(fcurve.modifiers) if fcurve.modifiers else None
-        alike = points[::2].tobytes(), fcurve.extrapolation, cycles
-        together.setdefault(alike, []).append((number, keys, points))
-    return [
-        ([number for number, *_ in curves], _read([keys for _, keys, _ in curves], [co for *_, co in curves], *others))
-        for (_, *others), curves in together.items()
-    ]
+        alike.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((number, keys))
+    found = []
+    for (_, extrapolation, cycles), curves in alike.items():
+        numbers, channels = zip(*curves, strict=True)
+        points = _read_each(channels, "co", np.float32, 2)
+        for some in _on_the_same_frames(points):
+            keys = _read([channels[row] for row in some], points[some], extrapolation == "LINEAR", cycles)
+            found.append(([numbers[row] for row in some], keys))
+    return found
 
 
-def _read(channels: Sequence, points: Sequence[np.ndarray], extrapolation: str, cycles: Cycles | None) -> Keys:
-    """The keys of channels that are keyed together, from their `keyframe_points` and these points (2 n,) of each."""
-    shape = len(channels), len(points[0]) // 2
+def _on_the_same_frames(points: np.ndarray) -> list[list[int]]:
+    """The numbers of channels (c, n, 2), those together that have their keys on the same frames."""
+    frames = points[..., 0]
+    if (frames == frames[0]).all():
+        return [list(range(len(points)))]
+    together: dict[bytes, list[int]] = {}
+    for row, own in enumerate(frames):
+        together.setdefault(own.tobytes(), []).append(row)
+    return list(together.values())
 
-    def read(name: str, out: np.ndarray) -> np.ndarray:
-        for row, keys in zip(out, channels, strict=True):
-            keys.foreach_get(name, row)
-        return out
 
-    interpolation = read("interpolation", np.empty(shape, np.int32))
+def _read(channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None) -> Keys:
+    """The keys of channels that are keyed together, from their `keyframe_points` and these points (c, n, 2)."""
+    interpolation = _read_each(channels, "interpolation", np.int32)
     kinds = _known(interpolation, INTERPOLATIONS, CONSTANT)
     eased = not kinds <= {CONSTANT, LINEAR, BEZIER}
-    linear = extrapolation == "LINEAR"
     left = right = easing = settings = None
     if BEZIER in kinds or (linear and eased):
-        left, right = (
-            read(name, np.empty((shape[0], 2 * shape[1]), np.float32)).reshape(*shape, 2)
-            for name in ("handle_left", "handle_right")
-        )
+        left, right = (_read_each(channels, name, np.float32, 2) for name in ("handle_left", "handle_right"))
     if eased:
-        easing = read("easing", np.empty(shape, np.int32))
+        easing = _read_each(channels, "easing", np.int32)
         _known(easing, EASINGS, AUTO)
-        settings = np.empty((3, *shape), np.float32)
-        for rows, name in zip(settings, ("back", "amplitude", "period"), strict=True):
-            read(name, rows)
-    return Keys(np.concatenate(points).reshape(*shape, 2), interpolation, left, right, easing, settings, linear, cycles)
+        settings = np.stack([_read_each(channels, name, np.float32) for name in ("back", "amplitude", "period")])
+    return Keys(points, interpolation, left, right, easing, settings, linear, cycles)
+
+
+def _read_each(channels: Sequence, name: str, dtype: type, *width: int) -> np.ndarray:
+    """What the n keys of each of c channels have by this name, shape (c, n) or (c, n, width)."""
+    rows = np.empty((len(channels), len(channels[0]) * math.prod(width)), dtype)
+    for row, keys in zip(rows, channels, strict=True):
+        keys.foreach_get(name, row)
+    return rows.reshape(len(rows), -1, *width) if width else rows
 
 
 def _known(codes: np.ndarray, names: dict[int, str], otherwise: int) -> set[int]:
@@ -188,7 +206,13 @@ def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
     return None
 
 
-def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elastic: bool = False) -> list[np.ndarray]:
+def evaluate(
+    curves: Sequence[Keys],
+    times: Sequence[np.ndarray],
+    *,
+    unit_elastic: bool = False,
+    out: Sequence[np.ndarray] | None = None,
+) -> Sequence[np.ndarray]:
     """The values of curves at their times.
 
     Parameters
@@ -201,41 +225,23 @@ def evaluate(curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elasti
     unit_elastic : bool
         Take the amplitude of ELASTIC relative to the change of value in its segment, instead of in units of value:
         then curves keyed together have the same timing there too.
+    out : sequence of array, shape (c, m), optional
+        What to put the values into.
 
     Returns
     -------
-    list of array, shape (c, m)
+    sequence of array, shape (c, m)
         NaN where keys or handles are not finite. What Blender does to the channels
         of whole numbers and enumerations, which it rounds, is left out.
     """
-    results = [np.empty((len(keys.points), len(at))) for keys, at in zip(curves, times, strict=True)]
-    for number, channels, values in evaluated(curves, times, unit_elastic=unit_elastic):
-        results[number][channels] = values
-    return results
-
-
-def evaluated(
-    curves: Sequence[Keys], times: Sequence[np.ndarray], *, unit_elastic: bool = False
-) -> list[tuple[int, slice, np.ndarray]]:
-    """The same in pieces: of which of the curves, which of their channels, and the values (channels, m)."""
-    pieces: list[tuple[int, slice, np.ndarray]] = []
-    if not curves:
-        return pieces
-    with np.errstate(all="ignore"):
-        spans = _Spans.of(curves, unit_elastic)
-        for groups in _blocks(_groups(curves, list(times), spans)):
-            begin = 0
-            rows = _values(groups, spans)
-            for group in groups:
-                end = begin + len(group.moments)
-                values = group.finished(rows[:, begin:end])
-                row = 0
-                for number, channels in group.members:
-                    count = channels.stop - channels.start
-                    pieces.append((number, channels, values[row : row + count]))
-                    row += count
-                begin = end
-    return pieces
+    if out is None:
+        out = [np.empty((len(keys.points), len(at))) for keys, at in zip(curves, times, strict=True)]
+    if curves:
+        with np.errstate(all="ignore"):
+            spans = _Spans.of(curves, unit_elastic)
+            for groups in _blocks(_groups(curves, list(times), spans)):
+                _fill(groups, spans, out)
+    return out
 
 
 def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -367,14 +373,29 @@ class _Group:
     offsets: np.ndarray | None
     """What cycles add to each curve, in the order of the result, shape (c, m). None: nothing."""
 
-    def finished(self, values: np.ndarray) -> np.ndarray:
-        """Values (c, m) at the moments, as they were asked for."""
+    def handfuls(self, size: int) -> Iterator[tuple[slice, _Group]]:
+        """The same with about `size` of the curves at a time, and which these are."""
+        begin = first = end = 0
+        for place, (_, channels) in enumerate(self.members, start=1):
+            end += channels.stop - channels.start
+            if end - begin >= size or place == len(self.members):
+                some = slice(begin, end)
+                offsets = None if self.offsets is None else self.offsets[some]
+                yield some, replace(self, members=self.members[first:place], curves=self.curves[some], offsets=offsets)
+                begin, first = end, place
+
+    def put(self, values: np.ndarray, out: Sequence[np.ndarray]) -> None:
+        """Put values (c, m) at the moments where they belong, see `evaluate`."""
         if self.order is not None:
-            sorted_values, values = values, np.empty_like(values)
-            values[:, self.order] = sorted_values
+            rising, values = values, np.empty_like(values)
+            values[:, self.order] = rising
         if self.offsets is not None:
             values += self.offsets
-        return values
+        begin = 0
+        for number, channels in self.members:
+            end = begin + channels.stop - channels.start
+            out[number][channels] = values[begin:end]
+            begin = end
 
 
 def _groups(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: _Spans) -> Iterator[_Group]:
@@ -430,8 +451,8 @@ def _blocks(groups: Iterable[_Group]) -> Iterator[list[_Group]]:
     yield block
 
 
-def _values(groups: list[_Group], spans: _Spans) -> np.ndarray:
-    """The values of groups of c curves each at their moments, m in all: shape (c, m)."""
+def _fill(groups: list[_Group], spans: _Spans, out: Sequence[np.ndarray]) -> None:
+    """Put the values of groups with equally many curves each where they belong, see `evaluate`."""
     leading = np.concatenate([group.spans for group in groups])
     counts = np.concatenate([group.counts for group in groups])
     parameters = spans.parameters(leading, counts, np.concatenate([group.moments for group in groups]))
@@ -443,9 +464,20 @@ def _values(groups: list[_Group], spans: _Spans) -> np.ndarray:
     powers[0] = 1.0
     for power in range(degree):
         np.multiply(powers[power], parameters, out=powers[power + 1])
-    values = np.empty((len(own), len(parameters)))
-    combine(spans.polynomials[: degree + 1, own].transpose(1, 0, 2), powers, counts, values)
-    return values
+
+    def values(of_curves: slice) -> np.ndarray:
+        rows = np.empty((len(own[of_curves]), len(parameters)))
+        combine(spans.polynomials[: degree + 1, own[of_curves]].transpose(1, 0, 2), powers, counts, rows)
+        return rows
+
+    if len(groups) == 1:
+        for some, group in groups[0].handfuls(AT_HAND // max(1, len(parameters))):
+            group.put(values(some), out)
+        return
+    begin, rows = 0, values(slice(None))
+    for group in groups:
+        group.put(rows[:, begin : begin + len(group.moments)], out)
+        begin += len(group.moments)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
 from ..motion.piecewise import blocks, combine
 from ..motion.poses import beyond
 from ..motion.quaternions import conjugate, multiply
-from .fcurves import Keys, evaluated
+from .fcurves import Keys, evaluate
 from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
 
 AT_ONCE = 131072
@@ -77,7 +77,9 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
         One of `MODE_IDS` for all segments, instead of the modes that they have.
     """
     frames = np.asarray(frames, dtype=np.float64)
-    native, delta = _motion([source], [frames], None if mode is None else MODE_IDS.index(mode))
+    native, delta = np.empty((2, _height([source]), len(frames)))
+    delta = delta[: _filled_height([source])]
+    _move([source], [frames], native, delta, None if mode is None else MODE_IDS.index(mode))
 
     def moved_by(deltas: np.ndarray) -> Poses:
         return Poses(
@@ -86,7 +88,7 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
             (native[ROWS[SCALE]] * deltas[ROWS[SCALE]]).mean(axis=0) if source.uniform_scale else None,
         )
 
-    return InBetweens(frames, moved_by(source.own[: len(native), None]), moved_by(delta))
+    return InBetweens(frames, moved_by(source.own[:, None]), moved_by(delta))
 
 
 def deltas(sources: Sequence[Source]) -> list[Deltas]:
@@ -94,22 +96,24 @@ def deltas(sources: Sequence[Source]) -> list[Deltas]:
     found = {}
     for portion in _portions(sources):
         frames = [np.arange(source.frame_range[0], source.frame_range[1] + 1.0) for source in portion]
-        _, delta = _motion(portion, frames)
         samples = _each(portion, map(len, frames))
+        # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
+        rows, points = np.empty((2, _height(portion), samples[-1][1].stop))
+        delta = rows[: _filled_height(portion)]
+        _move(portion, frames, rows, delta)
         order = portion[0].order
         if order is not None:
-            angles = eulers_from_quaternions(delta[ROWS[ROTATION]].T, order, [place.start for _, place in samples]).T
-            delta = np.concatenate((delta[ROWS[LOCATION]], angles, delta[ROWS[SCALE]]))
-        rotation = slice(3, 7 if order is None else 6)
-        points = np.empty((*delta.shape, 2), np.float32)
+            starts = [place.start for _, place in samples]
+            delta[3:6] = eulers_from_quaternions(delta[ROWS[ROTATION]].T, order, starts).T
+        points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
         for source, place in samples:
             own = points[:, place].reshape(len(points), -1)
             found[id(source)] = Deltas(
                 own[ROWS[LOCATION]] if LOCATION in source.keyed else None,
-                own[rotation] if ROTATION in source.keyed else None,
-                own[rotation.stop :] if source.uniform_scale else None,
+                own[ROWS[ROTATION]][: 4 if order is None else 3] if ROTATION in source.keyed else None,
+                own[ROWS[SCALE]] if source.uniform_scale else None,
             )
     return [found[id(source)] for source in sources]
 
@@ -137,19 +141,22 @@ def _each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source
     return [(source, slice(*place)) for source, place in zip(sources, itertools.pairwise(bounds), strict=True)]
 
 
-def _motion(
-    sources: Sequence[Source], frames: Sequence[np.ndarray], mode: int | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
-
-    Shapes (10, m), or (7, m) of those without a scale that is keyed, and of these without one that is filled in.
+def _move(
+    sources: Sequence[Source],
+    frames: Sequence[np.ndarray],
+    native: np.ndarray,
+    delta: np.ndarray,
+    mode: int | None = None,
+) -> None:
+    """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
+    `native` is of `_height`, `delta` of `_filled_height`. They may be in the same place: then the deltas are there.
     """
     order = sources[0].order
     samples = _each(sources, map(len, frames))
     segments = _each(sources, (len(source.key_frames) - 1 for source in sources))
-    native = timing = _sampled(samples, frames)
+    timing = _sampled(samples, frames, out=native)
     start, end = bounds = _ends(segments)
     if any(source.is_elastic for source in sources):
         timing = _sampled(samples, frames, unit_elastic=True)
@@ -157,7 +164,6 @@ def _motion(
     weights, offsets = _weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
-    delta = np.empty((10 if sources[0].uniform_scale else 7, native.shape[1]))
     own = np.stack([source.own[: len(delta)] for source in sources], axis=1)
     ends = _Ends.of(start, end, segments, smooth=np.isin(modes, SMOOTH))
 
@@ -177,7 +183,6 @@ def _motion(
         if before > -np.inf or after < np.inf:
             outside = (frames[number] < before) | (frames[number] > after)
             delta[:, place][:, outside] = own[:, number, None]
-    return native, delta
 
 
 def _fill(
@@ -293,23 +298,31 @@ def _packed(poses: Poses) -> np.ndarray:
 
 
 def _sampled(
-    samples: list[tuple[Source, slice]], frames: Sequence[np.ndarray], *, unit_elastic: bool = False
+    samples: list[tuple[Source, slice]],
+    frames: Sequence[np.ndarray],
+    *,
+    unit_elastic: bool = False,
+    out: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The channels' own values at the frames of each source, shape (10, m), or (7, m) where no scale is keyed."""
-    places, curves, times = [], [], []
-    rows = np.empty((_height(samples), samples[-1][1].stop))
+    """The channels' own values at the frames of each source, m in all, with a row for each of the `_height`."""
+    rows = np.empty((_height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
+    curves, times, out, apart = [], [], [], []
     for (source, place), at in zip(samples, frames, strict=True):
         _rest(rows[:, place], source)
         for own, keys in source.channels:
             if at is source.key_frames and source.is_together:
-                rows[_together(own), place] = keys.values
+                rows[own, place] = keys.values
+                continue
+            curves.append(keys)
+            times.append(at)
+            if own[-1] - own[0] < len(own):
+                out.append(rows[own[0] : own[-1] + 1, place])
             else:
-                places.append((own, place))
-                curves.append(keys)
-                times.append(at)
-    for number, channels, values in evaluated(curves, times, unit_elastic=unit_elastic):
-        own, place = places[number]
-        rows[_together(own[channels]), place] = values
+                out.append(np.empty((len(own), len(at))))
+                apart.append((own, place, out[-1]))
+    evaluate(curves, times, unit_elastic=unit_elastic, out=out)
+    for own, place, values in apart:
+        rows[own, place] = values
     return rows
 
 
@@ -331,13 +344,14 @@ def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -
     return start, end
 
 
-def _height(places: list[tuple[Source, slice]]) -> int:
-    return 10 if any(SCALE in source.keyed for source, _ in places) else 7
+def _height(sources: Sequence[Source]) -> int:
+    """How many of the components are needed for what the sources key."""
+    return ROWS[SCALE].stop if any(SCALE in source.keyed for source in sources) else ROWS[ROTATION].stop
 
 
-def _together(rows: list[int]) -> list[int] | slice:
-    """Rising rows as a slice, where they are one after the other: that is copied to at once."""
-    return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] < len(rows) else rows
+def _filled_height(sources: Sequence[Source]) -> int:
+    """How many of them for what is filled in."""
+    return ROWS[SCALE].stop if sources[0].uniform_scale else ROWS[ROTATION].stop
 
 
 def _rest(rows: np.ndarray, source: Source) -> None:

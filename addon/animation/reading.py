@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import bpy
@@ -92,9 +93,10 @@ def _has_say(what: Transformable, fcurve: bpy.types.FCurve) -> bool:
     """Whether a channel has keys that count. `Refused` where it has something else that does."""
     if fcurve.mute:
         return False
-    if fcurve.modifiers or not fcurve.keyframe_points:
+    has_keys = bool(fcurve.keyframe_points)
+    if fcurve.modifiers or not has_keys:
         refuse_channel(what.name, fcurve)
-    return bool(fcurve.keyframe_points)
+    return has_keys
 
 
 def mode_of(obj: bpy.types.Object) -> int:
@@ -107,14 +109,17 @@ def own_deltas(obj: bpy.types.Object) -> np.ndarray:
     """The delta transforms that an object has of its own, (10,): remembered while in-betweens are in their place."""
     motion = obj.rigid_motion
     location, quaternion, euler, scale = motion.filled
-    own = np.empty(10)
-    own[:3] = motion.own_location if location else obj.delta_location
-    own[7:] = motion.own_scale if scale else obj.delta_scale
     if obj.rotation_mode in ORDERS:
-        angles = np.array(motion.own_euler if euler else obj.delta_rotation_euler)
-        own[3:7] = quaternions_from_eulers(angles[None], obj.rotation_mode)[0]
+        angles = motion.own_euler if euler else obj.delta_rotation_euler
+        rotation = quaternions_from_eulers(np.array(angles)[None], obj.rotation_mode)[0]
     else:
-        own[3:7] = motion.own_quaternion if quaternion else obj.delta_rotation_quaternion
-        length = np.sqrt(own[3:7] @ own[3:7])
-        own[3:7] = own[3:7] / length if length != 0.0 else (1.0, 0.0, 0.0, 0.0)
-    return own
+        rotation = motion.own_quaternion if quaternion else obj.delta_rotation_quaternion
+        length = math.hypot(*rotation)
+        rotation = [component / length for component in rotation] if length else (1.0, 0.0, 0.0, 0.0)
+    return np.array(
+        (
+            *(motion.own_location if location else obj.delta_location),
+            *rotation,
+            *(motion.own_scale if scale else obj.delta_scale),
+        )
+    )

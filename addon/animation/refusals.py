@@ -79,20 +79,17 @@ def refuse_numbers(name: str, source: Source) -> None:
     _refuse_modes(name, source.mode)
     if not source.channels:
         return
-    for keys in source.curves:
-        in_order = bool(np.all(keys.times[1:] >= keys.times[:-1]))
-        if not (in_order and all(np.isfinite(part).all() for part in _numbers(keys).values())):
-            _explain_numbers(name, source)
-    if not (np.isfinite(source.own).all() and all(map(math.isfinite, source.rest.values()))):
+    numbers = (*source.own.tolist(), *source.rest.values())
+    if not (all(map(math.isfinite, numbers)) and all(keys.is_sound for keys in source.curves)):
         _explain_numbers(name, source)
-    keyed = max(keys.times[-1] for keys in source.curves) - min(keys.times[0] for keys in source.curves)
     first, last = source.frame_range
-    if keyed > MOST_FRAMES:
-        raise Refused(
-            f"{name} has keys over {keyed:.0f} frames, at most {MOST_FRAMES} can be filled in: "
-            "delete the keys that are far off"
-        )
     if last - first > MOST_FRAMES:
+        keyed = max(keys.times[-1] for keys in source.curves) - min(keys.times[0] for keys in source.curves)
+        if keyed > MOST_FRAMES:
+            raise Refused(
+                f"{name} has keys over {keyed:.0f} frames, at most {MOST_FRAMES} can be filled in: "
+                "delete the keys that are far off"
+            )
         raise Refused(
             f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most {MOST_FRAMES} "
             "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"

@@ -148,4 +148,5 @@ def curves_in(channelbag: bpy.types.ActionChannelbag | None) -> Curves:
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is one that in-betweens are in: sampled, and in the group of them."""
-    return fcurve.group is not None and fcurve.group.name == GROUP and not fcurve.keyframe_points
+    group = fcurve.group
+    return group is not None and group.name == GROUP and not fcurve.keyframe_points

@@ -124,7 +124,8 @@ class Source:
     @property
     def is_live(self) -> bool:
         """Whether there is a segment that is to be filled in otherwise than Blender does."""
-        return len(self.curves) > 0 and len(self.key_frames) > 1 and bool(np.any(self.modes))
+        moved = bool(np.any(self.modes)) if isinstance(self.mode, Keys) else self.mode != 0
+        return moved and len(self.curves) > 0 and len(self.key_frames) > 1
 
     @cached_property
     def frame_range(self) -> tuple[int, int]:
