@@ -128,75 +128,92 @@ class Keys:
         return b"".join((header.encode(), *(array.tobytes() for array in read)))
 
 
-def read_keys(fcurves: Sequence[bpy.types.FCurve]) -> list[tuple[list[int], Keys]]:
+def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
     """The keys of F-curves, and the first Cycles modifier of each that is not muted; none of their other modifiers.
 
     Parameters
     ----------
-    fcurves : sequence of bpy.types.FCurve
-        With keys: of a sampled curve there are none.
+    fcurves : sequence of sequences of bpy.types.FCurve
+        Those of each owner, with keys: of a sampled curve there are none. Many owners are read quicker at once.
 
     Returns
     -------
-    list of (list of int, Keys)
-        Those together that are keyed together: their places in the sequence, and their keys.
+    list of lists of (list of int, Keys)
+        For each owner those together that are keyed together: their places in its sequence, and their keys.
     """
     alike: dict[tuple, list[tuple]] = {}
-    for number, fcurve in enumerate(fcurves):
-        keys = fcurve.keyframe_points
-        cycles = _read_cycles(fcurve.modifiers) if fcurve.modifiers else None
-        alike.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((number, keys))
-    found = []
-    for (_, extrapolation, cycles), curves in alike.items():
-        numbers, channels = zip(*curves, strict=True)
-        points = _read_each(channels, "co", np.float32, 2)
-        for some in _on_the_same_frames(points):
-            keys = _read([channels[row] for row in some], points[some], extrapolation == "LINEAR", cycles)
-            found.append(([numbers[row] for row in some], keys))
+    for owner, curves in enumerate(fcurves):
+        for place, fcurve in enumerate(curves):
+            keys = fcurve.keyframe_points
+            cycles = _read_cycles(fcurve.modifiers) if fcurve.modifiers else None
+            alike.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((owner, place, keys))
+    found: list[list[tuple[list[int], Keys]]] = [[] for _ in fcurves]
+    for (_, extrapolation, cycles), some in alike.items():
+        owners, places, channels = zip(*some, strict=True)
+        for rows, keys in _read(owners, channels, extrapolation == "LINEAR", cycles):
+            found[owners[rows[0]]].append(([places[row] for row in rows], keys))
+    for together in found:
+        together.sort(key=lambda one: one[0])
     return found
 
 
-def _on_the_same_frames(points: np.ndarray) -> list[list[int]]:
-    """The numbers of channels (c, n, 2), those together that have their keys on the same frames."""
-    frames = points[..., 0]
-    if (frames == frames[0]).all():
-        return [list(range(len(points)))]
-    together: dict[bytes, list[int]] = {}
-    for row, own in enumerate(frames):
-        together.setdefault(own.tobytes(), []).append(row)
+def _read(
+    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None
+) -> Iterator[tuple[list[int], Keys]]:
+    """The keys of channels, from their `keyframe_points` with equally many each: the numbers of those together."""
+    points = _read_each("co", channels, np.float32, 2)
+    together = _keyed_together(owners, points[..., 0])
+    order = [row for rows in together for row in rows]
+    if order != list(range(len(order))):
+        channels, points = [channels[row] for row in order], points[order]
+    sizes = np.array([len(rows) for rows in together])
+    bounds = np.concatenate(((0,), np.cumsum(sizes)))
+
+    def any_of(keys: np.ndarray) -> np.ndarray:
+        return np.logical_or.reduceat(keys.any(axis=1), bounds[:-1])
+
+    interpolation = _read_each("interpolation", channels, np.int32)
+    _mend(interpolation, INTERPOLATIONS, CONSTANT)
+    eased = any_of(~np.isin(interpolation, (CONSTANT, LINEAR, BEZIER)))
+    curved = any_of(interpolation == BEZIER) | (eased & linear)
+    some = np.flatnonzero(curved.repeat(sizes))
+    left, right = (_read_each(name, channels, np.float32, 2, some=some) for name in ("handle_left", "handle_right"))
+    some = np.flatnonzero(eased.repeat(sizes))
+    easing = _read_each("easing", channels, np.int32, some=some)
+    _mend(easing, EASINGS, AUTO)
+    settings = [_read_each(name, channels, np.float32, some=some) for name in ("back", "amplitude", "period")]
+    for number, (rows, own) in enumerate(
+        zip(together, itertools.starmap(slice, itertools.pairwise(bounds)), strict=True)
+    ):
+        handles = (left[own], right[own]) if curved[number] else (None, None)
+        easings = (easing[own], np.stack([rows[own] for rows in settings])) if eased[number] else (None, None)
+        yield rows, Keys(points[own], interpolation[own], *handles, *easings, linear, cycles)
+
+
+def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
+    """The numbers of channels with keys on these frames (c, n), those together of one owner and on the same frames."""
+    raw, width = frames.tobytes(), frames.shape[1] * frames.itemsize
+    together: dict[tuple[int, bytes], list[int]] = {}
+    for row, owner in enumerate(owners):
+        together.setdefault((owner, raw[row * width : (row + 1) * width]), []).append(row)
     return list(together.values())
 
 
-def _read(channels: Sequence, points: np.ndarray, linear: bool, cycles: Cycles | None) -> Keys:
-    """The keys of channels that are keyed together, from their `keyframe_points` and these points (c, n, 2)."""
-    interpolation = _read_each(channels, "interpolation", np.int32)
-    kinds = _known(interpolation, INTERPOLATIONS, CONSTANT)
-    eased = not kinds <= {CONSTANT, LINEAR, BEZIER}
-    left = right = easing = settings = None
-    if BEZIER in kinds or (linear and eased):
-        left, right = (_read_each(channels, name, np.float32, 2) for name in ("handle_left", "handle_right"))
-    if eased:
-        easing = _read_each(channels, "easing", np.int32)
-        _known(easing, EASINGS, AUTO)
-        settings = np.stack([_read_each(channels, name, np.float32) for name in ("back", "amplitude", "period")])
-    return Keys(points, interpolation, left, right, easing, settings, linear, cycles)
+def _read_each(
+    name: str, channels: Sequence, dtype: type, *width: int, some: Sequence[int] | None = None
+) -> np.ndarray:
+    """What the n keys of each of c channels have by this name, (c, n) or (c, n, width); zeros for all but `some`."""
+    values = np.zeros((len(channels), len(channels[0]) * math.prod(width)), dtype)
+    for row in range(len(channels)) if some is None else some:
+        channels[row].foreach_get(name, values[row])
+    return values.reshape(len(values), -1, *width) if width else values
 
 
-def _read_each(channels: Sequence, name: str, dtype: type, *width: int) -> np.ndarray:
-    """What the n keys of each of c channels have by this name, shape (c, n) or (c, n, width)."""
-    rows = np.empty((len(channels), len(channels[0]) * math.prod(width)), dtype)
-    for row, keys in zip(rows, channels, strict=True):
-        keys.foreach_get(name, row)
-    return rows.reshape(len(rows), -1, *width) if width else rows
-
-
-def _known(codes: np.ndarray, names: dict[int, str], otherwise: int) -> set[int]:
-    """The codes there are, after Blender's own way with those that mean nothing, in a damaged file."""
-    found = set(codes.ravel().tolist())
-    if not found <= names.keys():
-        codes[~np.isin(codes, list(names))] = otherwise
-        found = found & names.keys() | {otherwise}
-    return found
+def _mend(codes: np.ndarray, names: dict[int, str], otherwise: int) -> None:
+    """Do Blender's own way with codes that mean nothing, in a damaged file."""
+    unknown = ~np.isin(codes, list(names))
+    if unknown.any():
+        codes[unknown] = otherwise
 
 
 def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
@@ -505,10 +522,10 @@ class _Spans:
     interpolation: np.ndarray
     """Codes, CONSTANT where the rate is 0, shape (N,)."""
 
-    easing: np.ndarray
-    """Codes, shape (N,)."""
+    easing: np.ndarray | None
+    """Codes, shape (N,). None where nothing eases."""
 
-    settings: np.ndarray
+    settings: np.ndarray | None
     """BACK's overshoot, ELASTIC's change, amplitude and period (in durations), shape (4, N)."""
 
     bezier: np.ndarray
@@ -569,7 +586,11 @@ class _Spans:
                 slopes = _slopes(points[outside], points[neighbours], handles[outside], codes[outside])
                 polynomials[1, outside] = slopes
 
-        easing, (back, amplitude, period) = (rows[..., key] for rows in _easings(curves))
+        easing = settings = None
+        if any(keys.easing is not None for keys in curves):
+            easing, (back, amplitude, period) = (rows[..., key] for rows in _easings(curves))
+            changes = np.ones_like(change) if unit_elastic else change
+            settings = np.stack((back, changes, amplitude, period / duration))
         if not unit_elastic:
             # The parameter is then how far the value has moved, and no longer what share of its change is done.
             polynomials[1, moving & (codes == ELASTIC)] = 1.0
@@ -589,7 +610,7 @@ class _Spans:
             side=side,
             interpolation=np.where(moving, codes, CONSTANT),
             easing=easing,
-            settings=np.stack((back, np.ones_like(change) if unit_elastic else change, amplitude, period / duration)),
+            settings=settings,
             bezier=bezier,
             polynomials=polynomials,
             timing=timing.tobytes(),
@@ -696,7 +717,8 @@ def _cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndar
         Coefficients of t, t^2 and t^3 for frame and value from the first key on.
     """
     duration = end[:, :1] - start[:, :1]
-    flat = np.max(np.abs((start - end, right - left, left - end))[..., 1], axis=0) < np.finfo(np.float32).eps
+    rises = (one[:, 1] - other[:, 1] for one, other in ((start, end), (right, left), (left, end)))
+    flat = np.logical_and.reduce([np.abs(rise) < np.finfo(np.float32).eps for rise in rises])
     right, left = _shortened(start, right, duration), _shortened(end, left, duration)
     cubics = np.stack(
         (3.0 * (right - start), 3.0 * (start - 2.0 * right + left), end - start + 3.0 * (right - left))
@@ -709,7 +731,8 @@ def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.
     """The handle, no longer in time than the segment."""
     arm = key - handle
     length = np.abs(arm[:, :1])
-    return np.where(length > duration, key - duration / length * arm, handle)
+    long = length > duration
+    return np.where(long, key - duration / length * arm, handle) if long.any() else handle
 
 
 def _slopes(ends: np.ndarray, neighbours: np.ndarray, handles: np.ndarray, codes: np.ndarray) -> np.ndarray:

@@ -51,9 +51,10 @@ class InBetweens:
 
 @dataclass(frozen=True, eq=False)
 class Deltas:
-    """Delta transforms on the m whole frames of a source, as sampled F-curves take them; None where they are left alone.
+    """Delta transforms on the m whole frames of a source, as sampled F-curves take them.
 
-    A row for each component, with the frame and the value of every sample by turns, in single precision.
+    A row for each component, with the frame and the value of every sample by turns, in single precision; None where
+    they are left alone.
     """
 
     location: np.ndarray | None
@@ -95,7 +96,8 @@ def deltas(sources: Sequence[Source]) -> list[Deltas]:
     """The delta transforms that turn Blender's in-betweens into the wanted ones, on the whole frames of each source."""
     found = {}
     for portion in _portions(sources):
-        frames = [np.arange(source.frame_range[0], source.frame_range[1] + 1.0) for source in portion]
+        of_range = {span: np.arange(span[0], span[1] + 1.0) for span in {source.frame_range for source in portion}}
+        frames = [of_range[source.frame_range] for source in portion]
         samples = _each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, _height(portion), samples[-1][1].stop))

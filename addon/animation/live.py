@@ -21,7 +21,7 @@ from .filling import clear, fill_in, give_back, is_complete, recorded
 from .inbetweens import deltas
 from .reading import keyed_in, read
 from .refusals import refuse_numbers
-from .slots import Curves, Refused, Slot, curves_in, is_filled_in, slots_in, slots_of
+from .slots import Refused, Slot, curves_in, is_filled_in, slots_in, slots_of
 from .sources import Source
 
 log = logging.getLogger(__package__)
@@ -92,14 +92,12 @@ def problem_of(obj: bpy.types.Object) -> str:
 
 
 def _refresh(slots: Iterable[Slot]) -> int:
+    # What is linked has the in-betweens that its own file was saved with.
+    readings = [(slot, curves_in(slot.channelbag)) for slot in slots if slot.action.is_editable]
     stale = []
-    for slot in slots:
-        if not slot.action.is_editable:
-            # What is linked has the in-betweens that its own file was saved with.
-            continue
-        curves, before = curves_in(slot.channelbag), recorded(slot)
-        source = _wanted(slot, curves, before)
-        if source is None:
+    for (slot, curves), source in zip(readings, keyed_in(readings), strict=True):
+        before = recorded(slot)
+        if not _is_wanted(slot, source, before):
             if before or any(is_filled_in(fcurve) for fcurve in curves.values()):
                 clear(slot, curves)
             for obj in slot.users:
@@ -107,7 +105,9 @@ def _refresh(slots: Iterable[Slot]) -> int:
         elif source.digest != before or not is_complete(curves, source):
             if insertion.keep_pose(slot, curves, before, source, _State.frame, again=_State.again):
                 curves = curves_in(slot.channelbag)
-                source = _wanted(slot, curves, before)
+                (source,) = keyed_in([(slot, curves)])
+                if not _is_wanted(slot, source, before):
+                    continue
             stale.append((slot, curves, source))
     try:
         fill_in(stale)
@@ -121,21 +121,22 @@ def _refresh(slots: Iterable[Slot]) -> int:
     return len(stale)
 
 
-def _wanted(slot: Slot, curves: Curves, before: str) -> Source | None:
-    """What is keyed in a slot, None where Blender's own in-betweens are all that is wanted or can be had.
+def _is_wanted(slot: Slot, source: Source | Refused, before: str) -> bool:
+    """Whether there is more to a source than Blender's own in-betweens, and it can be had.
 
-    `before` is the digest of what it is filled in from: that needs no second examination.
+    `before` is the digest of what the slot is filled in from: that needs no second examination.
     """
-    try:
-        source = keyed_in(slot, curves)
-        if source.digest != before:
+    if isinstance(source, Refused):
+        return False
+    if source.digest != before:
+        try:
             refuse_numbers(slot.users[0].name, source)
-            if not source.is_live:
-                return None
-    except ValueError:
-        return None
+        except Refused:
+            return False
+        if not source.is_live:
+            return False
     insertion.remember(source)
-    return source
+    return True
 
 
 @contextmanager

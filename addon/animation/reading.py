@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -31,29 +32,75 @@ def read(slot: Slot, curves: Curves, mode: int | None = None) -> Source:
     Refused
         Where that cannot be filled in.
     """
-    source = keyed_in(slot, curves)
+    (source,) = keyed_in([(slot, curves)])
+    if isinstance(source, Refused):
+        raise source
     if mode is not None:
         source = replace(source, mode=mode)
     refuse_numbers(slot.users[0].name, source)
     return source
 
 
-def keyed_in(slot: Slot, curves: Curves) -> Source:
-    """The same with numbers and modes as they are, which may be any in a damaged file; see `refuse_numbers`."""
-    source, *others = (_read_for(Transformable.of(obj), slot, curves) for obj in slot.users)
+def keyed_in(readings: Sequence[tuple[Slot, Curves]]) -> list[Source | Refused]:
+    """What is keyed in each of several slots, or why it cannot be filled in.
+
+    Numbers and modes are as they are, which may be any in a damaged file: see `refuse_numbers`.
+    """
+    found: list[list[_Keyed] | Refused] = []
+    for slot, curves in readings:
+        try:
+            found.append([_keyed_for(Transformable.of(obj), slot, curves) for obj in slot.users])
+        except Refused as problem:
+            found.append(problem)
+    everyone = [keyed for users in found if not isinstance(users, Refused) for keyed in users]
+    channels = iter(read_keys([keyed.fcurves for keyed in everyone]))
+    modes = iter(read_keys([keyed.modes for keyed in everyone]))
+    return [
+        users
+        if isinstance(users, Refused)
+        else _in_common(slot, [_source(keyed, slot, next(channels), next(modes)) for keyed in users])
+        for (slot, _), users in zip(readings, found, strict=True)
+    ]
+
+
+def _in_common(slot: Slot, sources: list[Source]) -> Source | Refused:
+    """What is keyed in a slot for all of its users together, from what is for each of them."""
+    source, *others = sources
     for obj, other in zip(slot.users[1:], others, strict=True):
         if other.digest != source.digest:
-            raise Refused(
+            return Refused(
                 f"{obj.name} moves by the same Action slot as {slot.users[0].name}, but has another mode, rotation "
                 "mode or delta transform: give it an Action of its own (Object > Relations > Make Single User)"
             )
     return source
 
 
-def _read_for(what: Transformable, slot: Slot, curves: Curves) -> Source:
-    """What is keyed in a slot, as one of its users has it."""
+@dataclass(frozen=True)
+class _Keyed:
+    """Which channels of a slot one of its users is moved by."""
+
+    what: Transformable
+
+    names: frozenset[str]
+    """Which of location, rotation and scale are keyed."""
+
+    rows: list[int]
+    """The components with keys."""
+
+    fcurves: list[bpy.types.FCurve]
+    """The channel of each."""
+
+    rest: dict[int, float]
+    """The values of the other components of what is keyed."""
+
+    modes: list[bpy.types.FCurve]
+    """The mode channel, if there is one with keys."""
+
+
+def _keyed_for(what: Transformable, slot: Slot, curves: Curves) -> _Keyed:
+    """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
     refuse_what_is_taken(what, slot, curves)
-    keyed, rows, fcurves, rest = [], [], [], {}
+    names, rows, fcurves, rest = [], [], [], {}
     for name, prop in what.properties.items():
         first, unkeyed = ROWS[name].start, []
         for index in range(WIDTHS[prop]):
@@ -64,29 +111,30 @@ def _read_for(what: Transformable, slot: Slot, curves: Curves) -> Source:
             else:
                 unkeyed.append(index)
         if len(unkeyed) < WIDTHS[prop]:
-            keyed.append(name)
+            names.append(name)
             if unkeyed:
                 values = getattr(what.carrier, prop)
                 rest |= {first + index: values[index] for index in unkeyed}
-    read_together = read_keys(fcurves)
-    own_span = any(keys.linear or keys.cycles is not None for _, keys in read_together)
+    mode = curves.get((what.prefix + MODE_PATH, 0))
+    modes = [mode] if mode is not None and _has_say(what, mode) else []
+    return _Keyed(what, frozenset(names), rows, fcurves, rest, modes)
+
+
+def _source(
+    keyed: _Keyed, slot: Slot, channels: list[tuple[list[int], Keys]], modes: list[tuple[list[int], Keys]]
+) -> Source:
+    """What is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
+    carrier = keyed.what.carrier
+    own_span = any(keys.linear or keys.cycles is not None for _, keys in channels)
     return Source(
-        order=None if what.rotation == "rotation_quaternion" else what.carrier.rotation_mode,
-        keyed=frozenset(keyed),
-        channels=tuple(([rows[place] for place in places], keys) for places, keys in read_together),
-        rest=rest,
-        own=own_deltas(what.carrier),
-        mode=_mode(what, curves),
+        order=None if keyed.what.rotation == "rotation_quaternion" else carrier.rotation_mode,
+        keyed=keyed.names,
+        channels=tuple(([keyed.rows[place] for place in places], keys) for places, keys in channels),
+        rest=keyed.rest,
+        own=own_deltas(carrier),
+        mode=modes[0][1] if modes else mode_of(carrier),
         span=slot.span if own_span else None,
     )
-
-
-def _mode(what: Transformable, curves: Curves) -> int | Keys:
-    fcurve = curves.get((what.prefix + MODE_PATH, 0))
-    if fcurve is None or not _has_say(what, fcurve):
-        return mode_of(what.carrier)
-    ((_, keys),) = read_keys([fcurve])
-    return keys
 
 
 def _has_say(what: Transformable, fcurve: bpy.types.FCurve) -> bool:

@@ -70,7 +70,7 @@ def blenders(keys: Keys, *, update: bool = True) -> Iterator[bpy.types.FCurve]:
 
 
 def read_one(fcurve: bpy.types.FCurve) -> Keys:
-    ((places, keys),) = read_keys([fcurve])
+    (((places, keys),),) = read_keys([[fcurve]])
     assert places == [0]
     return keys
 
@@ -296,7 +296,7 @@ def test_channels_are_read_together_that_are_keyed_together():
     same, later = keys_of((1, 5, 9), (2, 3, 4), "BEZIER"), keys_of((1, 6, 9), (2, 3, 4), "BEZIER")
     endless = keys_of((1, 5, 9), (2, 3, 4), "BEZIER", linear=True)
     with blenders(same) as a, blenders(later) as b, blenders(same) as c, blenders(endless) as d:
-        read = read_keys([a, b, c, d])
+        (read,) = read_keys([[a, b, c, d]])
         assert [places for places, _ in read] == [[0, 2], [1], [3]]
         assert [keys.points.shape for _, keys in read] == [(2, 3, 2), (1, 3, 2), (1, 3, 2)]
 
