@@ -25,9 +25,9 @@ from .segments import SMALLEST_ANGLE, Curves, Segments
 def lerp_slerp(segments: Segments) -> Curves:
     """Straight line and great arc."""
 
-    def basis(s, parameters, within):
+    def basis(s, parameters, narrow):
         rows = np.empty((4, s.size))
-        _slerp(s, parameters[0], within, rows[:2])
+        _slerp(s, parameters[0], narrow, rows[:2])
         rows[2], rows[3] = 1.0, s
         return rows, _geometric_scales(s, parameters)
 
@@ -37,9 +37,9 @@ def lerp_slerp(segments: Segments) -> Curves:
 def screw(segments: Segments) -> Curves:
     """The screw motion from key to key: ScLERP, and the SLERP of motors."""
 
-    def basis(s, parameters, within):
+    def basis(s, parameters, narrow):
         rows = np.empty((6, s.size))
-        _slerp(s, parameters[0], within, rows[:2])
+        _slerp(s, parameters[0], narrow, rows[:2])
         rows[2], rows[3] = 1.0, s
         np.multiply(rows[1], rows[:2], out=rows[4:])
         return rows, _geometric_scales(s, parameters)
@@ -53,7 +53,7 @@ def screw(segments: Segments) -> Curves:
 def motor_lerp(segments: Segments) -> Curves:
     """The normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
 
-    def basis(s, parameters, within):
+    def basis(s, parameters, narrow):
         rows = np.empty((5, s.size))
         _lerp(s, parameters[0], rows[:2])
         rows[2] = 1.0
@@ -128,10 +128,10 @@ def similarity_slerp(segments: Segments) -> Curves:
     if segments.scales is None:
         return screw(segments)
 
-    def basis(s, parameters, within):
+    def basis(s, parameters, narrow):
         quarter_angle, growth, _ = parameters
         rows = np.empty((6, s.size))
-        _slerp(s, quarter_angle, within, rows[:2])
+        _slerp(s, quarter_angle, narrow, rows[:2])
         rows[2] = 1.0
         # (exp(z u) - exp(z / 2)) / (exp(z) - 1), with z = l and z = l + i angle; u = (1 + s) / 2. See `algebras.cga`.
         rows[3] = _half_sinh_share(s, growth, 0.0 * growth).real
@@ -148,7 +148,7 @@ def similarity_lerp(segments: Segments) -> Curves:
     if segments.scales is None:
         return motor_lerp(segments)
 
-    def basis(s, parameters, within):
+    def basis(s, parameters, narrow):
         cosine, *roots = parameters
         # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse
         # for the weight of its rotor. See `algebras.cga.extract`.
@@ -191,12 +191,12 @@ def _curves(segments: Segments, positions: tuple, parameters: tuple, basis) -> C
     )
 
 
-def _slerp(s: np.ndarray, quarter_angle: np.ndarray, within: bool, turn: np.ndarray) -> None:
-    """cos(psi) and sin(psi) of psi = s h. Within the segment psi is at most 45 degrees, and a root gives the cosine."""
+def _slerp(s: np.ndarray, quarter_angle: np.ndarray, narrow: bool, turn: np.ndarray) -> None:
+    """cos(psi) and sin(psi) of psi = s h, which is `narrow` where it is at most 60 degrees."""
     cosine, sine = turn
     np.multiply(s, quarter_angle, out=cosine)
     np.sin(cosine, out=sine)
-    if within:
+    if narrow:
         np.multiply(sine, sine, out=cosine)
         np.subtract(1.0, cosine, out=cosine)
         np.sqrt(cosine, out=cosine)

@@ -48,19 +48,41 @@ def multiply(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, ou
         Samples of each piece, n in all.
     out : array, shape (k, n)
     """
-    changes = np.flatnonzero(counts[1:] != counts[:-1]) + 1
-    begin = 0
-    for first, last in itertools.pairwise((0, *changes.tolist(), len(counts))):
-        if counts[first] == 0:
-            continue
-        shape = (-1, last - first, int(counts[first]))
-        end = begin + shape[1] * shape[2]
-        np.matmul(
-            matrices[first:last],
-            functions[:, begin:end].reshape(shape).transpose(1, 0, 2),
-            out=out[:, begin:end].reshape(shape).transpose(1, 0, 2),
-        )
-        begin = end
+    piece = sample = 0
+    for rounds, runs in _rounds(counts):
+        pieces, samples = sum(length for length, _ in runs), sum(length * count for length, count in runs)
+        last_piece, last_sample = piece + rounds * pieces, sample + rounds * samples
+        of_pieces = matrices[piece:last_piece].reshape(rounds, pieces, *matrices.shape[1:])
+        of_samples = [rows[:, sample:last_sample].reshape(len(rows), rounds, samples) for rows in (functions, out)]
+        at_piece = at_sample = 0
+        for length, count in runs:
+            if count:
+                own = slice(at_sample, at_sample + length * count)
+                shape = (-1, rounds, length, count)
+                given, product = (rows[..., own].reshape(shape).transpose(1, 2, 0, 3) for rows in of_samples)
+                np.matmul(of_pieces[:, at_piece : at_piece + length], given, out=product)
+            at_piece += length
+            at_sample += length * count
+        piece, sample = last_piece, last_sample
+
+
+def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
+    """Counts (S,) as runs of equal ones, (length, count), and how many times such runs come round one after another.
+
+    Objects that are keyed alike repeat their counts: few large products take the place of many small ones.
+    """
+    bounds = [0, *(np.flatnonzero(counts[1:] != counts[:-1]) + 1).tolist(), len(counts)]
+    runs = [(last - first, int(counts[first])) for first, last in itertools.pairwise(bounds) if last > first]
+    # The outermost ones may have been cut.
+    inner = runs[1:-1]
+    period = inner.index(inner[0], 1) if inner[:1] and inner[0] in inner[1:] else len(runs)
+    rounds = len(inner) // period
+    if rounds < 2 or inner[period : rounds * period] != inner[: (rounds - 1) * period]:
+        yield 1, runs
+        return
+    yield 1, runs[:1]
+    yield rounds, inner[:period]
+    yield 1, runs[1 + rounds * period :]
 
 
 def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:

@@ -37,6 +37,9 @@ TURN = 1.5
 ROWS = 8
 """Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
 
+NARROW = 4.0 / 3.0
+"""The largest |s| at which psi, 45 degrees at the keys, is no more than 60: a root gives the cosine from the sine."""
+
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
 
@@ -148,7 +151,7 @@ class Curves:
     """The numbers of each segment that b and c need, shape (parameters, S)."""
 
     basis: Basis
-    """From s (n,), parameters of (n,) each and whether all |s| <= 1 to b above c, (., n), and scales (n,) or None."""
+    """From s (n,), parameters of (n,) each and whether |s| <= NARROW to b above c, (., n), and scales (n,) or None."""
 
     bends: np.ndarray | None = None
     """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
@@ -214,9 +217,9 @@ def _fill(
             np.clip(s, -1.0, 1.0, out=s)
         return s
 
-    mode, within = curves(segments), not (outside and extrapolate)
-    fill, numbers = _filler(mode, within), np.stack((segments.start, segments.rate))
-    pieces = _pieces(segments, mode.bends) if mode.bends is not None and within else 0
+    mode, reach = curves(segments), np.inf if outside and extrapolate else 1.0
+    fill, numbers = _filler(mode, reach), np.stack((segments.start, segments.rate))
+    pieces = _pieces(segments, mode.bends) if mode.bends is not None and reach <= 1.0 else 0
     if 0 < DENSE * pieces * segments.start.size <= samples.size:
         coefficients = _series(mode, pieces)
         key_times = _divided(key_times, pieces)
@@ -244,8 +247,8 @@ def prepare_within(curves: Callable[[Segments], Curves], key_times: np.ndarray, 
 
     def within(counts: np.ndarray, progress: np.ndarray, some: slice) -> Poses:
         out = np.empty((ROWS, progress.size))
-        inside = progress.size == 0 or bool(progress.min() >= 0.0 and progress.max() <= 1.0)
-        fill, first = _filler(mode, inside), some.start or 0
+        reach = float(max(2.0 * progress.max() - 1.0, 1.0 - 2.0 * progress.min())) if progress.size else 0.0
+        fill, first = _filler(mode, reach), some.start or 0
 
         def shifted(segment: slice, *others: np.ndarray) -> None:
             fill(slice(first + segment.start, first + segment.stop), *others)
@@ -278,17 +281,17 @@ def _evaluate(
         fill(segment, position(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
 
 
-def _filler(mode: Curves, within: bool) -> Fill:
-    """What a mode's curves are, worked out for every sample."""
+def _filler(mode: Curves, reach: float) -> Fill:
+    """What a mode's curves are, worked out for every sample, where no |s| is larger than `reach`."""
 
     def fill(segment: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
         parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
-        basis, scales = mode.basis(s, [*parameters], within)
+        basis, scales = mode.basis(s, [*parameters], reach <= NARROW)
         _combine(mode, segment, basis, counts, out)
         if scales is not None:
             out[7] = scales
         if mode.bends is not None:
-            _bend(mode.bends[..., segment], s, within, counts, out)
+            _bend(mode.bends[..., segment], s, reach <= 1.0, counts, out)
 
     return fill
 
@@ -307,7 +310,7 @@ def _series(mode: Curves, pieces: int) -> np.ndarray:
     values = np.zeros((ROWS, count * moments.size))
     bounds = moments.size * np.arange(count + 1)
     _evaluate(
-        _filler(mode, True),
+        _filler(mode, 1.0),
         np.empty((0, count)),
         bounds,
         lambda sample: np.resize(moments, sample.stop - sample.start),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.motion import MODES, Poses, in_betweens
+from addon.motion import MODES, Poses, in_betweens, prepare
 from addon.motion.piecewise import blocks, combine, is_dense, multiply
 from tests.motion.cases import random_quaternions
 
@@ -24,6 +24,21 @@ def test_products_are_what_each_sample_gives(counts, rows, functions):
     combine(coefficients, values, counts, found[0])
     multiply(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), values, counts, found[1])
     np.testing.assert_allclose(found, np.stack((expected, expected)), rtol=0, atol=1e-12)
+
+
+few = st.lists(st.sampled_from((0, 1, 3, 5)), max_size=4)
+
+
+@settings(deadline=None)
+@given(few, few.filter(any), st.integers(2, 6), few)
+def test_counts_that_come_round_again_and_again_make_the_same_products(head, pattern, rounds, tail):
+    counts = np.array(head + rounds * pattern + tail)
+    random = np.random.default_rng(counts)
+    matrices, functions = random.normal(size=(len(counts), 3, 2)), random.normal(size=(2, counts.sum()))
+    found = np.full((3, counts.sum()), np.nan)
+    multiply(matrices, functions, counts, found)
+    expected = np.einsum("nkb,bn->kn", matrices.repeat(counts, axis=0), functions)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_long_runs_are_dense_and_single_samples_are_not():
@@ -52,3 +67,28 @@ def test_a_segment_without_samples_may_lie_between_long_ones(mode):
         alone = in_betweens(np.arange(4.0), keys, counts, u, mode)
         np.testing.assert_allclose(both[some].positions, alone.positions, rtol=0, atol=1e-12)
         np.testing.assert_allclose(both[some].quaternions, alone.quaternions, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_prepared_segments_give_the_same_a_few_at_a_time_and_past_their_keys(mode):
+    random = np.random.default_rng(3)
+    keys = Poses(random.normal(size=(2, 5, 3)), random_quaternions(random, 10).reshape(2, 5, 4), np.full((2, 5), 1.5))
+    times, counts = np.arange(5.0), np.array(((3, 0, 2, 4), (5, 1, 0, 2)))
+    progress = random.uniform(-0.3, 1.3, size=counts.sum())
+    expected = in_betweens(times, keys, counts, progress, mode)
+    segments = prepare(times, keys, mode)
+    bounds = np.concatenate(((0,), np.cumsum(counts)))
+    for first, last in ((0, 3), (3, 6), (6, 8)):
+        samples = slice(bounds[first], bounds[last])
+        few = segments(counts.ravel()[first:last], progress[samples], slice(first, last))
+        np.testing.assert_allclose(few.positions, expected.positions[samples], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(few.quaternions, expected.quaternions[samples], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(few.scales, expected.scales[samples], rtol=0, atol=1e-12)
+
+
+def test_prepared_segments_refuse_what_does_not_fit_them():
+    segments = prepare([0.0, 1.0, 2.0], Poses(np.zeros((3, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (3, 1))))
+    with pytest.raises(ValueError, match="do not fit"):
+        segments([1, 1], [0.5, 0.5], slice(1, 2))
+    with pytest.raises(ValueError, match="finite"):
+        segments([1], [np.nan], slice(1, 2))
