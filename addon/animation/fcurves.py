@@ -93,6 +93,9 @@ class Keys:
 
     cycles: Cycles | None = None
 
+    is_sound: bool = True
+    """Whether all numbers that were read are finite, and the keys in the order of their frames."""
+
     @cached_property
     def times(self) -> np.ndarray:
         """Frames of the keys, shape (n,), double precision."""
@@ -110,14 +113,7 @@ class Keys:
             for array in (self.points, self.interpolation, self.left, self.right, self.easing)
         )
         settings = None if self.easing_settings is None else self.easing_settings[:, channels]
-        return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles)
-
-    @property
-    def is_sound(self) -> bool:
-        """Whether all numbers are finite, and the keys in the order of their frames."""
-        numbers = (self.points, self.left, self.right, self.easing_settings)
-        in_order = (self.times[1:] >= self.times[:-1]).all()
-        return bool(in_order) and all(part is None or np.isfinite(part).all() for part in numbers)
+        return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles, self.is_sound)
 
     @property
     def raw(self) -> bytes:
@@ -182,12 +178,14 @@ def _read(
     easing = _read_each("easing", channels, np.int32, some=some)
     _mend(easing, EASINGS, AUTO)
     settings = [_read_each(name, channels, np.float32, some=some) for name in ("back", "amplitude", "period")]
+    numbers = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
+    sound = ~any_of(~np.isfinite(numbers)) & ~any_of(~(points[:, 1:, 0] >= points[:, :-1, 0]))
     for number, (rows, own) in enumerate(
         zip(together, itertools.starmap(slice, itertools.pairwise(bounds)), strict=True)
     ):
         handles = (left[own], right[own]) if curved[number] else (None, None)
         easings = (easing[own], np.stack([rows[own] for rows in settings])) if eased[number] else (None, None)
-        yield rows, Keys(points[own], interpolation[own], *handles, *easings, linear, cycles)
+        yield rows, Keys(points[own], interpolation[own], *handles, *easings, linear, cycles, bool(sound[number]))
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:

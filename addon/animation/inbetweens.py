@@ -181,8 +181,8 @@ def _move(
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = own[:, owners]
     for number, (source, place) in enumerate(samples):
-        before, after = source.used_up
-        if before > -np.inf or after < np.inf:
+        if source.cyclic is not None:
+            before, after = source.used_up
             outside = (frames[number] < before) | (frames[number] > after)
             delta[:, place][:, outside] = own[:, number, None]
 
