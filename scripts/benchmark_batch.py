@@ -5,12 +5,12 @@
     python scripts/benchmark_batch.py --output docs/benchmark_batch.md
 
 Clips are pieces of the recordings in `assets/`, each moved elsewhere, so that none is like another. `compare.py` goes
-through all of them with one worker and with two in turns, each time into an empty folder; figures are of the fastest
+through all of them with one worker and with two in turns, each time into a new folder; figures are of the fastest
 round. Where Blender renders on the processor, one worker by itself uses several, so there is also one that is kept on
-a single processor (on Linux). Folders are made where `TMPDIR` says: on a disk it is the disk that limits two workers,
-since every clip makes many small files. Memory is the most that a process has had (on Linux; elsewhere it is left out):
-of the program itself, over the number of clips, and of its largest worker, over the length of one clip. What counts
-are the ratios.
+a single processor (on Linux). Folders are made where `TMPDIR` says, and none is deleted before the end: for minutes
+after many files were deleted, ext4 takes several times as long to make new ones. Memory is the most that a process has
+had (on Linux; elsewhere it is left out): of the program itself, over the number of clips, and of its largest worker,
+over the length of one clip. What counts are the ratios.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import argparse
 import json
 import os
 import platform
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -96,9 +95,8 @@ def wandering(samples: int) -> str:
 
 
 def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone: bool = False) -> Run:
-    """Run `compare.py` on some clips, on a single processor if it is to be alone, into a folder that was not there."""
-    output = folder / "output"
-    shutil.rmtree(output, ignore_errors=True)
+    """Run `compare.py` on some clips, on a single processor if it is to be alone, into a new folder in that one."""
+    output = Path(tempfile.mkdtemp(dir=folder))
     command = [
         sys.executable,
         ROOT / "scripts" / "compare.py",

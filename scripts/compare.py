@@ -20,14 +20,6 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from scripts.system_libraries import missing_for_rendering, way_out
-
-try:
-    import bpy
-except ImportError as error:
-    print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
-    sys.exit(2)
-
 from addon.motion import KEYFRAME_MODES, MODES
 from scripts.command_line import number, own_arguments
 from scripts.comparison import steps
@@ -35,11 +27,11 @@ from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.modes import BEST_OF, single_modes
 from scripts.comparison.planning import Wanted, comparison_tasks, look_into, reading_tasks
 from scripts.comparison.report import Settings
-from scripts.comparison.stage import ANTIALIASING, ENGINES, StageSettings
+from scripts.comparison.stage_settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
 from scripts.comparison.steps import KEYS_NEEDED, REPORT
-from scripts.comparison.subject import SubjectError, load_subject
-from scripts.comparison.version import program_version
+from scripts.comparison.version import blender_version, program_version
 from scripts.progress import Progress
+from scripts.system_libraries import missing_for_rendering, way_out
 from scripts.trajectories.axes import AXES
 from scripts.workplan import (
     Executor,
@@ -226,7 +218,7 @@ def main(arguments: list[str]) -> int:
         return 2
     try:
         if not options.no_video:
-            load_subject(options.object)
+            require_subject(options.object)
         version, command = program_version(), shlex.join(["compare.py", *arguments])
         with (
             Progress() as progress,
@@ -234,11 +226,29 @@ def main(arguments: list[str]) -> int:
             _executor(options, progress, version) as executor,
         ):
             return _Run(options, workspace, executor, progress, command, version).run()
+    except ImportError as error:
+        print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
     except (SubjectError, FolderInUse, ManifestError, ExecutorError) as error:
         print(f"compare.py: {error}", file=sys.stderr)
     except OSError as error:
         print(f"compare.py: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
     return 2
+
+
+def require_subject(wanted: str) -> None:
+    """Make sure that the object to show can be had.
+
+    Raises
+    ------
+    SubjectError
+        Where it cannot.
+    ImportError
+        Where there is no Blender to ask.
+    """
+    # Only here is Blender loaded, which takes longer than all else before the work begins.
+    from scripts.comparison.subject import load_subject
+
+    load_subject(wanted)
 
 
 def _executor(options: argparse.Namespace, progress: Progress, version: str) -> Executor:
@@ -342,7 +352,7 @@ def wanted(options: argparse.Namespace, command: str) -> Wanted:
     settings = Settings(
         radius=options.radius,
         program=f"{manifest['name']} {manifest['version']}",
-        blender=bpy.app.version_string,
+        blender=blender_version(),
         command=command,
         details={}
         if options.no_video

@@ -26,10 +26,11 @@ from scripts import compare
 from scripts.command_line import own_arguments
 from scripts.comparison import steps
 from scripts.comparison.planning import comparison_tasks, look_into, reading_tasks
-from scripts.comparison.subject import MODELS, SubjectError, file_of_subject, load_subject
+from scripts.comparison.stage_settings import MODELS, SubjectError, place_of_subject
 from scripts.comparison.version import program_version
 from scripts.files import write_text
 from scripts.progress import Progress
+from scripts.system_libraries import way_out
 from scripts.trajectories import TrajectoryError
 from scripts.trajectories.reading import split_source
 from scripts.workplan import Plan, ProcessExecutor, SerialExecutor, Workspace, run
@@ -101,7 +102,7 @@ def main(arguments: list[str]) -> int:
     command = shlex.join(["job_bundle.py", *arguments])
     try:
         if options.stage and not options.no_video:
-            load_subject(options.object)
+            compare.require_subject(options.object)
         inputs = gather(options)
         own.bundle, options.output = own.bundle.absolute(), options.output.absolute()
         os.chdir(inputs)
@@ -109,6 +110,9 @@ def main(arguments: list[str]) -> int:
         if plan is None:
             return 2
         write_bundle(own.bundle, plan, options.output)
+    except ImportError as error:
+        print(f"job_bundle.py: {error}\n{way_out(str(error), 'job_bundle.py')}", file=sys.stderr)
+        return 2
     except (SubjectError, ValueError) as error:
         print(f"job_bundle.py: {error}", file=sys.stderr)
         return 2
@@ -133,7 +137,7 @@ def gather(options: argparse.Namespace) -> Path:
     """
     sources = [_file_and_body(source) for source in options.inputs]
     own_object = options.object not in MODELS and not options.no_video
-    subject = file_of_subject(options.object) if own_object else None
+    subject = place_of_subject(options.object)[0] if own_object else None
     files = [path for path, _ in sources] + ([subject] if subject else [])
     folder = Path(os.path.commonpath([os.path.dirname(os.path.abspath(path)) for path in files]))
 

@@ -23,10 +23,9 @@ from . import steps
 from .choices import Choice, choice_parts
 from .metrics import table_names
 from .report import ON_ONE_PAGE, Settings
-from .stage import StageSettings
+from .stage_settings import StageSettings, place_of_subject
 from .storage import ClipReference, file_names, read_facts, read_times
 from .study import folder_names
-from .subject import file_of_subject
 from .timeline import Timeline
 
 MODULE = steps.__name__
@@ -230,7 +229,7 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
                 "radius": wanted.radius,
                 "stage": asdict(stage),
             },
-            inputs=(str(file_of_subject(stage.subject)),),
+            inputs=(str(place_of_subject(stage.subject)[0]),),
             outputs=(steps.blend_of(clip, choice),),
             after=(steps.measuring(clip, choice),),
             title=title,

@@ -8,7 +8,6 @@ without scripts. The scene's custom properties tell where the recording's origin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -19,57 +18,9 @@ from addon.motion.quaternions import rotate
 from . import captions, layout, palette
 from .lanes import Cast, Lanes
 from .reconstructions import Reconstruction
+from .stage_settings import SMALL_PICTURE, StageSettings
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
-
-ENGINES = ("workbench", "eevee", "cycles")
-ANTIALIASING = ("OFF", "FXAA", "5", "8", "11", "16", "32")
-
-SMALL_PICTURE = 500
-"""Lines below which edges need smoothing."""
-
-
-@dataclass(frozen=True)
-class StageSettings:
-    """How a comparison is shown."""
-
-    engine: str = "workbench"
-    """One of `ENGINES`."""
-
-    resolution: tuple[int, int] = (960, 540)
-    """Width and height in pixels, even: the codec wants that."""
-
-    fps: int = 30
-
-    slow_motion: float = 1.0
-    """How many times slower than life."""
-
-    subject: str = "drill"
-    """The object that moves: "drill", "controller" or "file.blend:Name"."""
-
-    antialiasing: str | None = None
-    """Of Workbench: one of `ANTIALIASING`; numbers are samples.
-
-    Where nothing is asked for, FXAA below `SMALL_PICTURE` lines, and OFF from there on: in software rendering FXAA
-    takes as long as three times the pixels, which look better.
-    """
-
-    samples: int = 16
-    """Of EEVEE and Cycles."""
-
-    def __post_init__(self) -> None:
-        if self.engine not in ENGINES:
-            raise ValueError(f"engine {self.engine!r}: there are {', '.join(ENGINES)}")
-        if min(self.resolution) < 2 or any(size % 2 for size in self.resolution):
-            raise ValueError(f"resolution {self.resolution[0]}x{self.resolution[1]}: give two even numbers of pixels")
-        if not 1 <= self.fps <= 240:
-            raise ValueError(f"{self.fps} frames a second: give 1 to 240")
-        if not (math.isfinite(self.slow_motion) and self.slow_motion > 0.0):
-            raise ValueError(f"slow motion by {self.slow_motion}: give a number above 0; 4 is four times slower")
-        if not 1 <= self.samples <= 4096:
-            raise ValueError(f"{self.samples} samples: give 1 to 4096")
-        if self.antialiasing not in (None, *ANTIALIASING):
-            raise ValueError(f"antialiasing {self.antialiasing!r}: there are {', '.join(ANTIALIASING)}")
 
 
 def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.types.Scene:

@@ -169,8 +169,8 @@ def tabulate_keys(job: Job, *, studies: Sequence[Any]) -> None:
 def build(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radius: float, stage: Mapping[str, Any]) -> None:
     """Build the stage of a film, and save it."""
     from .film import save_blend
-    from .stage import StageSettings, build_stage
-    from .subject import SubjectError
+    from .stage import build_stage
+    from .stage_settings import StageSettings, SubjectError
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = read_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, radius)

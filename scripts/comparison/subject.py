@@ -12,15 +12,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-MODELS_FILE = Path(__file__).parents[2] / "assets" / "models.blend"
-MODELS = {"drill": "Drill", "controller": "Controller"}
+from .stage_settings import SubjectError, place_of_subject
 
 TINTED = "Mode"
 """The material that gives way to the colour of the lane."""
-
-
-class SubjectError(ValueError):
-    """The object to show cannot be had. The message says why, in one line."""
 
 
 def load_subject(wanted: str) -> bpy.types.Mesh:
@@ -29,19 +24,14 @@ def load_subject(wanted: str) -> bpy.types.Mesh:
     Parameters
     ----------
     wanted : str
-        A key of `MODELS`, or "file.blend:Name".
+        See `place_of_subject`.
 
     Raises
     ------
     SubjectError
         Where the file, the object or its faces are missing.
     """
-    return _read_mesh(*_file_and_name(wanted))
-
-
-def file_of_subject(wanted: str) -> Path:
-    """The file that an object is in, whether or not it is there. Raises SubjectError where no object is named."""
-    return _file_and_name(wanted)[0]
+    return _read_mesh(*place_of_subject(wanted))
 
 
 def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -70,15 +60,6 @@ def _plain(name: str) -> str:
     """The name without the number that Blender adds to make it unique."""
     stem, dot, number = name.rpartition(".")
     return stem if dot and number.isdecimal() else name
-
-
-def _file_and_name(wanted: str) -> tuple[Path, str]:
-    if wanted in MODELS:
-        return MODELS_FILE, MODELS[wanted]
-    file, colon, name = wanted.rpartition(":")
-    if not colon or not file.lower().endswith(".blend"):
-        raise SubjectError(f"object {wanted!r}: give {', '.join(MODELS)} or file.blend:Name")
-    return Path(file), name
 
 
 def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:

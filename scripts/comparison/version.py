@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from importlib.metadata import version
+
 import numpy as np
 
 from scripts.workplan import code_version
@@ -14,7 +17,11 @@ SOURCES = (
 
 
 def program_version() -> str:
-    """The same wherever the same results come out."""
-    import bpy  # Numbers alone need no Blender.
+    """The same wherever the same results come out. Raises ImportError where there is no Blender."""
+    return f"Blender {blender_version()}, NumPy {np.__version__}, program {code_version(*SOURCES)[:12]}"
 
-    return f"Blender {bpy.app.version_string}, NumPy {np.__version__}, program {code_version(*SOURCES)[:12]}"
+
+def blender_version() -> str:
+    """Of the Blender that this runs in, or of its module, which numbers alone need not load: that takes longest."""
+    loaded = getattr(sys.modules.get("bpy"), "app", None)
+    return ".".join(map(str, loaded.version)) if loaded else version("bpy")

@@ -16,7 +16,8 @@ from mathutils import Matrix, Quaternion
 from addon.motion import Poses
 from scripts.comparison import captions, layout
 from scripts.comparison.materials import ink
-from scripts.comparison.stage import StageSettings, make_camera, make_frame, make_lights, set_up_render
+from scripts.comparison.stage import make_camera, make_frame, make_lights, set_up_render
+from scripts.comparison.stage_settings import StageSettings
 from scripts.comparison.subject import tinted_slots
 
 WIDTH = 1004

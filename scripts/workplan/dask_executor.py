@@ -333,6 +333,8 @@ class DaskExecutor:
         message = from_json(answer["message"])
         if isinstance(message, Made):
             try:
+                with suppress(FileNotFoundError):
+                    Path(one.order.scratch).rmdir()
                 Path(answer["scratch"]).rename(one.order.scratch)
             except OSError as error:
                 return Lost(name, f"{error.filename}: {error.strerror}")

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from .hashing import FileState
-from .tasks import Job, TaskError, find_step
+from .tasks import Job, TaskError, find_step, places_of
 
 FULL_OR_FORBIDDEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS})
 """Errors that the next task will have as well."""
@@ -138,10 +138,10 @@ def perform(order: Order, tell: Callable[[Told | Noted], object]) -> Made | Fail
     started = time.perf_counter()
     done: Made | Failed | None = None
     try:
-        scratch.mkdir(parents=True)
+        scratch.mkdir(parents=True, exist_ok=True)
         facts = find_step(order.function)(job, **order.arguments)
         _check_inputs(order)
-        outputs = {path: _state_of(scratch, path) for path in order.outputs}
+        outputs = {path: _state_of(scratch / place, path) for path, place in places_of(order.outputs).items()}
         done = Made(order.name, outputs, time.perf_counter() - started, dict(facts or {}))
     except TaskError as error:
         done = Failed(order.name, str(error))
@@ -175,15 +175,19 @@ def _check_inputs(order: Order) -> None:
             raise TaskError(f"{path}: this file changed while it was read; run the same command again")
 
 
-def _state_of(scratch: Path, path: str) -> FileState:
-    if not (scratch / path).is_file():
+def _state_of(place: Path, path: str) -> FileState:
+    if not place.is_file():
         raise TaskError(f"{path}: this was to be made, and was not")
-    return FileState.of(scratch / path)
+    return FileState.of(place)
 
 
-def _shown(path: str | bytes | int, order: Order) -> str:
+def _shown(found: str | bytes | int, order: Order) -> str:
     """A path as the user knows it: the scratch folder is nobody's business."""
-    return str(path).replace(order.scratch, order.output)
+    for path, place in places_of(order.outputs).items():
+        # What takes an output's place when it is whole has a name that ends in the output's.
+        if str(found).startswith(order.scratch) and str(found).endswith(place.rpartition("/")[2]):
+            return f"{order.output}/{path}"
+    return str(found).replace(order.scratch, order.output)
 
 
 def _is_full(output: Path) -> bool:

@@ -113,6 +113,18 @@ def find_step(name: str) -> Callable[..., Mapping[str, Any] | None]:
     return function
 
 
+def places_of(outputs: Iterable[str]) -> dict[str, str]:
+    """Where each output of a task is in its scratch folder: by its name alone, for folders are slow to make.
+
+    Only where two of them have the same name, the outputs of one folder are in one with a number.
+    """
+    parts = {path: path.rpartition("/") for path in outputs}
+    if len({name.casefold() for *_, name in parts.values()}) == len(parts):
+        return {path: name for path, (*_, name) in parts.items()}
+    numbers = {folder: number for number, folder in enumerate(sorted({folder for folder, *_ in parts.values()}))}
+    return {path: f"{numbers[folder]}/{name}" for path, (folder, _, name) in parts.items()}
+
+
 class Job:
     """A task's view of its files while it is done.
 
@@ -144,7 +156,7 @@ class Job:
         self.output = output
         self.finished = frozenset(finished)
         self._scratch = scratch
-        self._outputs = frozenset(outputs)
+        self._places = places_of(outputs)
         self._progress = progress
         self._note = note
 
@@ -153,10 +165,10 @@ class Job:
         return self.output / path
 
     def writes(self, path: str) -> Path:
-        """Where to write an output of this task. The folders are there."""
-        if path not in self._outputs:
-            raise ValueError(f"{path!r} is not among the outputs of this task: {', '.join(sorted(self._outputs))}")
-        place = self._scratch / path
+        """Where to write an output of this task, under its own name; beside it are those of the same folder."""
+        if path not in self._places:
+            raise ValueError(f"{path!r} is not among the outputs of this task: {', '.join(sorted(self._places))}")
+        place = self._scratch / self._places[path]
         place.parent.mkdir(parents=True, exist_ok=True)
         return place
 

@@ -10,13 +10,13 @@ import os
 import shutil
 import uuid
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Self
 
 from .lock import FolderLock
 from .manifest import Manifest, Record
 from .performing import Made
+from .tasks import places_of
 
 
 class Workspace:
@@ -50,8 +50,8 @@ class Workspace:
         """The tasks that were done since it was opened."""
         self.manifest: Manifest
         self._shared, self._only = shared, only
-        # Removing folders takes longer than all else on some file systems; nobody need wait for it.
-        self._cleaner = ThreadPoolExecutor(1)
+        # Making and removing folders takes longer than all else on some file systems: these are empty, and used again.
+        self._used: list[Path] = []
         self._lock = FolderLock(self.own / "lock", output, shared=shared)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
 
@@ -69,7 +69,8 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         try:
-            self._cleaner.shutdown()
+            for scratch in self._used:
+                shutil.rmtree(scratch, ignore_errors=True)
             if not self._shared:
                 self._clear_scratch()
                 self.manifest.write()
@@ -78,8 +79,8 @@ class Workspace:
             self._remove_if_empty()
 
     def scratch(self) -> Path:
-        """A new folder's path for the outputs of a task at work, on the file system where they will be."""
-        return self.own / "scratch" / uuid.uuid4().hex[:12]
+        """A folder for the outputs of a task at work, where they will be: empty, or yet to be made."""
+        return self._used.pop() if self._used else self.own / "scratch" / uuid.uuid4().hex[:12]
 
     def put_in_place(self, name: str, key: str, made: Made, scratch: Path) -> Record:
         """Move the outputs of a task to where they belong, and take down that it is done.
@@ -90,13 +91,16 @@ class Workspace:
             Where that cannot be. What was moved is not counted as done.
         """
         there, beside = os.fspath(self.output), os.fspath(scratch)
-        for path in made.outputs:
+        for path, place in places_of(made.outputs).items():
             try:
-                os.replace(f"{beside}/{path}", f"{there}/{path}")
+                os.replace(f"{beside}/{place}", f"{there}/{path}")
             except FileNotFoundError:
                 (self.output / path).parent.mkdir(parents=True, exist_ok=True)
-                os.replace(f"{beside}/{path}", f"{there}/{path}")
-        self._cleaner.submit(_remove_folders, beside, made.outputs)
+                os.replace(f"{beside}/{place}", f"{there}/{path}")
+        if os.listdir(scratch):
+            shutil.rmtree(scratch, ignore_errors=True)
+        else:
+            self._used.append(scratch)
         record = Record(key, made.outputs, made.seconds, made.facts)
         self.manifest.add(name, record)
         self.done_here.add(name)
@@ -124,18 +128,6 @@ class Workspace:
         for folder in self._missing:
             if not _removed(folder):
                 break
-
-
-def _remove_folders(scratch: str, outputs: Iterable[str]) -> None:
-    """Remove a scratch folder, of which nothing should be left but the folders of these outputs."""
-    folders = {path.rpartition("/")[0] for path in outputs}
-    while more := {folder.rpartition("/")[0] for folder in folders} - folders:
-        folders |= more
-    try:
-        for folder in sorted(folders, reverse=True):
-            os.rmdir(f"{scratch}/{folder}")
-    except OSError:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _removed(folder: Path) -> bool:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from scripts.comparison.film import join_pieces, render_film, render_piece, save_blend
-from scripts.comparison.stage import StageSettings, build_stage
+from scripts.comparison.stage import build_stage
+from scripts.comparison.stage_settings import StageSettings
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 SETTINGS = StageSettings(resolution=(160, 90), fps=10)

@@ -15,7 +15,7 @@ from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform, choic
 from scripts.comparison.clips import Clip
 from scripts.comparison.planning import PIECE, Study, Wanted, comparison_tasks, look_into, reading_tasks
 from scripts.comparison.report import ON_ONE_PAGE, Settings
-from scripts.comparison.stage import StageSettings
+from scripts.comparison.stage_settings import StageSettings
 from scripts.comparison.storage import ClipReference, file_names, write_recording
 from scripts.comparison.study import folder_names, reconstruct
 from scripts.workplan import Plan, Task

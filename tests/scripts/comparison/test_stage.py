@@ -15,7 +15,8 @@ from scripts.comparison import layout
 from scripts.comparison.choices import Tolerance
 from scripts.comparison.clips import Clip
 from scripts.comparison.nodes import input_path
-from scripts.comparison.stage import StageSettings, build_stage
+from scripts.comparison.stage import build_stage
+from scripts.comparison.stage_settings import StageSettings
 from scripts.comparison.study import reconstruct as choose
 from scripts.comparison.subject import vertices_of
 from scripts.comparison.timeline import Timeline

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from scripts.comparison.subject import MODELS, SubjectError, load_subject, shrink, tinted_slots, vertices_of
+from scripts.comparison.stage_settings import MODELS, SubjectError
+from scripts.comparison.subject import load_subject, shrink, tinted_slots, vertices_of
 
 
 def painted(picture: Path) -> bpy.types.Material:

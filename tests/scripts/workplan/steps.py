@@ -20,6 +20,15 @@ def write(job: Job, *, path: str, text: str = "", log: str = "") -> dict[str, in
 
 
 @step
+def write_all(job: Job, *, texts: dict[str, str], more: str = "") -> None:
+    """Write several outputs, and something that is none."""
+    for path, text in texts.items():
+        job.writes(path).write_text(text)
+    if more:
+        job.writes(path).with_name(more).write_text("left over")
+
+
+@step
 def join(job: Job, *, path: str, parts: list[str], log: str = "") -> None:
     """Write what is in the parts that are there."""
     _note(log, path)
@@ -50,6 +59,15 @@ def fail(job: Job, *, path: str, foreseen: bool = True) -> None:
     if foreseen:
         raise TaskError(f"{path}: cannot be made; make another")
     raise KeyError(path)
+
+
+@step
+def stumble(job: Job, *, path: str, beside: str = "") -> None:
+    """Fail at writing an output, or what is to take its place."""
+    place = job.writes(path)
+    place = place.with_name(f"{beside}{place.name}")
+    place.mkdir()
+    place.write_text("never")
 
 
 @step

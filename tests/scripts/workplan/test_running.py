@@ -17,6 +17,7 @@ from scripts.workplan import FolderInUse, ManifestError, Outcome, Plan, SerialEx
 from scripts.workplan.hashing import code_version
 from tests.scripts.workplan.plans import (
     EXECUTORS,
+    STEPS,
     contents,
     done,
     joining,
@@ -42,6 +43,28 @@ def test_tasks_are_done_and_their_outputs_are_in_place(output: Path, executor: s
     assert str(outcome) == "3 done"
 
 
+def test_outputs_of_one_name_in_several_folders_do_not_get_in_one_anothers_way(output: Path) -> None:
+    texts = {"a/x.txt": "1", "b/x.txt": "2", "b/y.txt": "3", "X.txt": "4"}
+    several = Task("several", f"{STEPS}:write_all", {"texts": texts}, outputs=tuple(texts))
+    assert states(run_in(output, several)) == done("several")
+    assert contents(output) == texts
+
+
+def test_what_a_task_left_in_its_scratch_folder_is_not_taken_for_an_output_of_the_next(output: Path) -> None:
+    untidy = Task("a", f"{STEPS}:write_all", {"texts": {"a.txt": "1"}, "more": "b.txt"}, outputs=("a.txt",))
+    forgetful = task("b", "forget")
+    outcome = run_in(output, untidy, forgetful)
+    assert (outcome.states["a"], outcome.states["b"]) == (State.DONE, State.FAILED)
+    assert contents(output) == {"a.txt": "1"}
+
+
+def test_tasks_that_leave_nothing_behind_use_a_scratch_folder_one_after_the_other(output: Path) -> None:
+    with Workspace(output) as workspace, SerialExecutor() as executor:
+        run(Plan([task(name) for name in "abcdef"], "1"), workspace, executor)
+        assert len(list((output / ".workplan" / "scratch").iterdir())) == 1
+    assert not (output / ".workplan" / "scratch").exists()
+
+
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_a_failure_is_said_and_the_others_go_on(output: Path, executor: str, capsys: pytest.CaptureFixture) -> None:
     tasks = [task("a"), task("bad", "fail"), joining("b", "a"), joining("c", "bad", "a"), joining("d", "c")]
@@ -57,6 +80,13 @@ def test_an_error_that_nobody_foresaw_names_its_task_and_the_manifest_says_where
     assert outcome.failures["bad"] == "The bad one: KeyError: 'bad.txt'"
     failures = json.loads((output / "manifest.json").read_text())["failures"]
     assert "in fail" in failures["bad"]["details"]
+
+
+@pytest.mark.parametrize("beside", ["", ".123."])
+def test_an_error_of_the_system_names_the_output_where_it_would_have_been(output: Path, beside: str) -> None:
+    arguments = {"path": "a/b/c.txt", "beside": beside}
+    outcome = run_in(output, Task("c", f"{STEPS}:stumble", arguments, outputs=("a/b/c.txt", "d/e.txt")))
+    assert outcome.failures["c"].startswith(f"c: {output}/a/b/c.txt: ")
 
 
 def test_a_task_that_does_not_make_what_it_said_has_failed(output: Path) -> None:
