@@ -95,7 +95,7 @@ def _run(plan: Plan, workspace: Workspace, name: str, *, openjd: bool) -> int:
             # What is there under its name was made of something else.
             workspace.discard(task.outputs)
         return 0 if openjd and not (done.details or done.hopeless) else 1
-    workspace.put_in_place(name, key, done, Path(order.scratch))
+    workspace.put_in_place(order, key, done)
     print(f"{task.title}: done in {done.seconds:.1f} s", flush=True)
     return 0
 

@@ -12,7 +12,7 @@ from typing import Any
 from .tasks import ROOT, Task
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class FileState:
     """What a file was when it was looked at."""
 
@@ -25,6 +25,10 @@ class FileState:
         """Read a file. Raises OSError where there is none."""
         before = path.stat()
         return cls(before.st_size, before.st_mtime_ns, file_digest(path))
+
+    def as_json(self) -> dict[str, int | str]:
+        """Every field, for `FileState(**fields)`."""
+        return {"size": self.size, "mtime_ns": self.mtime_ns, "sha256": self.sha256}
 
     def still(self, path: Path) -> bool:
         """Whether the file is there as it was. It is read again only where its time of change is another."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.files import write_text
+from scripts.files import replacing
 
 from .hashing import FileState
 
@@ -39,6 +39,10 @@ class Record:
 
     facts: Mapping[str, Any] = field(default_factory=dict)
     """What its function returned."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Every field as plain data."""
+        return vars(self) | {"outputs": {path: state.as_json() for path, state in self.outputs.items()}}
 
     def holds(self, key: str, output: Path) -> bool:
         """Whether these outputs are what the key asks for, and are all there, whole."""
@@ -77,7 +81,7 @@ class Manifest:
 
     def add(self, name: str, record: Record) -> None:
         """Take down that a task is done, for good."""
-        write_text(self._place(name), json.dumps(_content({name: record}, {}), indent=1) + "\n")
+        _write(self._place(name), [(name, record)], {})
         self.tasks[name] = record
 
     def write(self) -> None:
@@ -85,8 +89,7 @@ class Manifest:
         records = list(self._records.glob("*.json")) if self._records.is_dir() else []
         if not self.tasks and not self._path.exists():
             return
-        content = _content(dict(sorted(self.tasks.items())), self.failures)
-        write_text(self._path, json.dumps(content, indent=1) + "\n")
+        _write(self._path, sorted(self.tasks.items()), self.failures)
         for record in records:
             record.unlink(missing_ok=True)
 
@@ -109,9 +112,10 @@ class Manifest:
         self.tasks |= tasks
 
 
-def _content(tasks: Mapping[str, Record], failures: Mapping[str, Mapping[str, str]]) -> dict[str, Any]:
-    records = {
-        name: vars(record) | {"outputs": {path: vars(state) for path, state in record.outputs.items()}}
-        for name, record in tasks.items()
-    }
-    return {"schema": SCHEMA, "tasks": records, "failures": failures}
+def _write(path: Path, tasks: Iterable[tuple[str, Record]], failures: Mapping[str, Mapping[str, str]]) -> None:
+    """Write records, a line for each: of ten thousand there is never more than one in memory as text."""
+    with replacing(path) as stream:
+        stream.write(f'{{"schema": {SCHEMA}, "failures": {json.dumps(failures)}, "tasks": {{')
+        for number, (name, record) in enumerate(tasks):
+            stream.write(f"{',' if number else ''}\n{json.dumps(name)}: {json.dumps(record.as_json())}")
+        stream.write("\n}}\n")

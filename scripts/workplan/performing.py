@@ -105,7 +105,7 @@ def as_json(message: Message) -> dict[str, Any]:
     """A message as plain data."""
     content = {"kind": type(message).__name__, **vars(message)}
     if isinstance(message, Made):
-        content["outputs"] = {path: vars(state) for path, state in message.outputs.items()}
+        content["outputs"] = {path: state.as_json() for path, state in message.outputs.items()}
     return content
 
 

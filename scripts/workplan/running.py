@@ -14,7 +14,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from scripts.progress import Progress, Stage
@@ -325,7 +324,7 @@ class _Run:
     def _put_in_place(self, made: Made, order: Order) -> None:
         key = self.keys.with_those(made.name, order.finished)
         try:
-            self.workspace.put_in_place(made.name, key, made, Path(order.scratch))
+            self.workspace.put_in_place(order, key, made)
         except OSError as error:
             shutil.rmtree(order.scratch, ignore_errors=True)
             where = f"{error.filename2 or error.filename or self.workspace.output}: "

@@ -15,7 +15,7 @@ from typing import Self
 
 from .lock import FolderLock
 from .manifest import Manifest, Record
-from .performing import Made
+from .performing import Made, Order
 from .tasks import places_of
 
 
@@ -82,28 +82,28 @@ class Workspace:
         """A folder for the outputs of a task at work, where they will be: empty, or yet to be made."""
         return self._used.pop() if self._used else self.own / "scratch" / uuid.uuid4().hex[:12]
 
-    def put_in_place(self, name: str, key: str, made: Made, scratch: Path) -> Record:
-        """Move the outputs of a task to where they belong, and take down that it is done.
+    def put_in_place(self, order: Order, key: str, made: Made) -> Record:
+        """Move the outputs that an order asked for to where they belong, and take down that its task is done.
 
         Raises
         ------
         OSError
             Where that cannot be. What was moved is not counted as done.
         """
-        there, beside = os.fspath(self.output), os.fspath(scratch)
-        for path, place in places_of(made.outputs).items():
+        there, beside = os.fspath(self.output), order.scratch
+        for path, place in places_of(order.outputs).items():
             try:
                 os.replace(f"{beside}/{place}", f"{there}/{path}")
             except FileNotFoundError:
                 (self.output / path).parent.mkdir(parents=True, exist_ok=True)
                 os.replace(f"{beside}/{place}", f"{there}/{path}")
-        if os.listdir(scratch):
-            shutil.rmtree(scratch, ignore_errors=True)
+        if os.listdir(beside):
+            shutil.rmtree(beside, ignore_errors=True)
         else:
-            self._used.append(scratch)
-        record = Record(key, made.outputs, made.seconds, made.facts)
-        self.manifest.add(name, record)
-        self.done_here.add(name)
+            self._used.append(Path(beside))
+        record = Record(key, {path: made.outputs[path] for path in order.outputs}, made.seconds, made.facts)
+        self.manifest.add(order.name, record)
+        self.done_here.add(order.name)
         return record
 
     def discard(self, outputs: Iterable[str]) -> None:
