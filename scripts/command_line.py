@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
+import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+
+MOST_INPUTS = 12
+"""Inputs of a command that are worth being read again."""
 
 
 def own_arguments(script: str) -> list[str]:
@@ -15,6 +20,13 @@ def own_arguments(script: str) -> list[str]:
     if Path(sys.argv[0]).name == Path(script).name:
         return sys.argv[1:]
     return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+
+
+def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> str:
+    """A command as one would type it: of very many inputs the first few, and how many more there were."""
+    left_out = set(inputs[MOST_INPUTS:]) - set(inputs[:MOST_INPUTS])
+    typed = shlex.join([program, *(argument for argument in arguments if argument not in left_out)])
+    return f"{typed} # and {len(left_out)} more" if left_out else typed
 
 
 def number(text: str) -> float:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import shlex
 import sys
 import time
 import tomllib
@@ -21,7 +20,7 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 from addon.motion import KEYFRAME_MODES, MODES
-from scripts.command_line import number, own_arguments
+from scripts.command_line import as_typed, number, own_arguments
 from scripts.comparison import steps
 from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.modes import BEST_OF, single_modes
@@ -219,7 +218,7 @@ def main(arguments: list[str]) -> int:
     try:
         if not options.no_video:
             require_subject(options.object)
-        version, command = program_version(), shlex.join(["compare.py", *arguments])
+        version, command = program_version(), as_typed("compare.py", arguments, options.inputs)
         with (
             Progress() as progress,
             Workspace(options.output) as workspace,

@@ -23,7 +23,7 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 from scripts import compare
-from scripts.command_line import own_arguments
+from scripts.command_line import as_typed, own_arguments
 from scripts.comparison import steps
 from scripts.comparison.planning import comparison_tasks, look_into, reading_tasks
 from scripts.comparison.stage_settings import MODELS, SubjectError, place_of_subject
@@ -99,7 +99,7 @@ def parse(arguments: list[str]) -> tuple[argparse.Namespace, argparse.Namespace]
 def main(arguments: list[str]) -> int:
     """Write a bundle, and return the exit code."""
     own, options = parse(arguments)
-    command = shlex.join(["job_bundle.py", *arguments])
+    command = as_typed("job_bundle.py", arguments, options.inputs)
     try:
         if options.stage and not options.no_video:
             compare.require_subject(options.object)
