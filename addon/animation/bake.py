@@ -180,7 +180,7 @@ def channel_values(what: Transformable, source: Source, motion: InBetweens) -> d
         else:
             angles = eulers_from_quaternions(quaternions, source.order)
             channels[what.rotation] = _beginning_near(first[3:6], angles, source.order)
-    if poses.scales is not None:
+    if poses.scales is not None and own[7:].mean() != 0.0:
         # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
         segments = np.searchsorted(source.key_frames, motion.frames, side="right") - 1
         is_even = source.modes[np.clip(segments, 0, len(source.modes) - 1)] > 0

@@ -181,3 +181,16 @@ def test_each_axis_of_a_scale_that_is_left_to_blender_is_baked_by_itself(live_fi
     assert_shown([obj], frames)
     bake(obj)
     assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+
+
+def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):
+    obj = key(new_object(), scale="even")
+    obj.delta_scale = (2.0, -1.0, -1.0)
+    set_mode(obj, "dq_sclerp")
+    frames = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
+    places = shown_worlds([obj], frames)[0][..., 3]
+    bake(obj)
+    np.testing.assert_allclose(shown_worlds([obj], frames)[0][..., 3], places, rtol=0, atol=1e-5 * np.abs(places).max())
+    for index in range(3):
+        points = curves_of(obj)["scale", index].keyframe_points
+        assert np.isfinite([point.co.y for point in points]).all()
