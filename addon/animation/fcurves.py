@@ -178,13 +178,13 @@ def _read(
     easing = _read_each("easing", channels, np.int32, some=some)
     _mend(easing, EASINGS, AUTO)
     settings = [_read_each(name, channels, np.float32, some=some) for name in ("back", "amplitude", "period")]
-    numbers = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
-    sound = ~any_of(~np.isfinite(numbers)) & ~any_of(~(points[:, 1:, 0] >= points[:, :-1, 0]))
+    every = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
+    sound = ~any_of(~np.isfinite(every)) & ~any_of(~(points[:, 1:, 0] >= points[:, :-1, 0]))
     for number, (rows, own) in enumerate(
         zip(together, itertools.starmap(slice, itertools.pairwise(bounds)), strict=True)
     ):
         handles = (left[own], right[own]) if curved[number] else (None, None)
-        easings = (easing[own], np.stack([rows[own] for rows in settings])) if eased[number] else (None, None)
+        easings = (easing[own], np.stack([numbers[own] for numbers in settings])) if eased[number] else (None, None)
         yield rows, Keys(points[own], interpolation[own], *handles, *easings, linear, cycles, bool(sound[number]))
 
 

@@ -82,6 +82,8 @@ def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], frames: tu
     number of them, are taken out.
     """
     first, last = frames
+    for obj in slot.users:
+        _remember(obj, values)
     for path, rows in values.items():
         for index, samples in enumerate(rows):
             fcurve = curves.get((path, index))
@@ -91,8 +93,6 @@ def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], frames: tu
             if fcurve is None:
                 fcurve = _new(slot.channelbag, curves, path, index, first, last)
             fcurve.sampled_points.foreach_set("co", samples)
-    for obj in slot.users:
-        _remember(obj, values)
     gone = [key for key, fcurve in curves.items() if key[0] in OWN and key[0] not in values and is_filled_in(fcurve)]
     for key in gone:
         _remove(slot, curves, *key)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import version
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -23,5 +24,9 @@ def program_version() -> str:
 
 def blender_version() -> str:
     """Of the Blender that this runs in, or of its module, which numbers alone need not load: that takes longest."""
-    loaded = getattr(sys.modules.get("bpy"), "app", None)
-    return ".".join(map(str, loaded.version)) if loaded else version("bpy")
+    if not getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", ""):
+        with suppress(PackageNotFoundError):
+            return version("bpy")
+    import bpy
+
+    return ".".join(map(str, bpy.app.version))
