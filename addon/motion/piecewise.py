@@ -75,8 +75,8 @@ def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
     runs = [(last - first, int(counts[first])) for first, last in itertools.pairwise(bounds) if last > first]
     # The outermost ones may have been cut.
     inner = runs[1:-1]
-    period = inner.index(inner[0], 1) if inner[:1] and inner[0] in inner[1:] else len(runs)
-    rounds = len(inner) // period
+    period = inner.index(inner[0], 1) if inner[:1] and inner[0] in inner[1:] else 0
+    rounds = len(inner) // period if period else 0
     if rounds < 2 or inner[period : rounds * period] != inner[: (rounds - 1) * period]:
         yield 1, runs
         return
