@@ -14,7 +14,6 @@ Needs the packages of the "test" extra; pypose (its SE(3) B-spline) is measured 
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -42,7 +41,7 @@ except ImportError:
 
 from addon.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from addon.motion.quaternions import align_signs, multiply
-from scripts.publishing import publish
+from scripts.publishing import opening, publish
 
 ENOUGH = 4.0
 """Seconds after which one way of computing a case has been measured well enough."""
@@ -303,14 +302,6 @@ def reductions(counts: tuple[int, ...], tolerance: float = 0.005) -> Iterator[st
     yield ""
 
 
-def versions() -> str:
-    """What was measured, on what."""
-    return (
-        f"Python {platform.python_version()}, NumPy {np.__version__}, SciPy {scipy.__version__}, "
-        f"pytransform3d {pytransform3d.__version__}, {platform.system()} {platform.machine()}"
-    )
-
-
 def main(arguments: list[str] | None = None) -> int:
     """Run all cases; print, and write where asked."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -318,8 +309,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
     parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
-    lines = ["# Benchmark", "", f"`python scripts/benchmark.py --rounds {options.rounds}`: {versions()}.", ""]
-    lines += [*__doc__.split("\n\n")[-1].strip().splitlines(), ""]
+    lines = opening(
+        "Benchmark",
+        f"python scripts/benchmark.py --rounds {options.rounds}",
+        __doc__,
+        SciPy=scipy.__version__,
+        pytransform3d=pytransform3d.__version__,
+    )
     for case in cases(options.count):
         print(f"{case.title} ...", file=sys.stderr, flush=True)
         lines += report(case, race(ways(case), options.rounds))

@@ -18,7 +18,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -32,7 +31,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from scripts.publishing import publish
+from scripts.publishing import opening, publish
 from scripts.workplan.worker import peak_memory_of
 
 SECONDS = 2.0
@@ -208,9 +207,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
     given = f"--clips {options.clips} --films {options.films} --minutes {options.minutes} --rounds {options.rounds}"
-    lines = ["# Benchmark of many clips", ""]
-    lines += [f"`python scripts/benchmark_batch.py {given}`: {versions()}.", ""]
-    lines += [*__doc__.split("\n\n")[-1].strip().splitlines(), ""]
+    command = f"python scripts/benchmark_batch.py {given}"
+    lines = opening("Benchmark of many clips", command, __doc__, processors=os.cpu_count())
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         clips = [folder / f"clip_{number:04}.csv" for number in range(max(options.clips, options.films))]
@@ -224,14 +222,6 @@ def main(arguments: list[str] | None = None) -> int:
         lines += memory(folder, clips[: options.clips], [int(part) for part in options.minutes.split(",")])
     publish(lines, options.output)
     return 0
-
-
-def versions() -> str:
-    """What was measured, on what."""
-    return (
-        f"Python {platform.python_version()}, NumPy {np.__version__}, {os.cpu_count()} processors, "
-        f"{platform.system()} {platform.machine()}"
-    )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import atexit
-import platform
 import statistics
 import sys
 import time
@@ -27,7 +26,7 @@ from bpy_extras import anim_utils
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from addon import animation
-from scripts.publishing import publish
+from scripts.publishing import opening, publish
 
 MODE = "dq_sclerp"
 
@@ -233,15 +232,8 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     animation.register()
     atexit.register(animation.unregister)
-    lines = [
-        "# Benchmark of live in-betweens",
-        "",
-        f"`python scripts/benchmark_live.py --rounds {options.rounds}`: Blender {bpy.app.version_string}, "
-        f"Python {platform.python_version()}, NumPy {np.__version__}, {platform.system()} {platform.machine()}.",
-        "",
-        *__doc__.split("\n\n")[-1].strip().splitlines(),
-        "",
-    ]
+    command = f"python scripts/benchmark_live.py --rounds {options.rounds}"
+    lines = opening("Benchmark of live in-betweens", command, __doc__, Blender=bpy.app.version_string)
     for rotation_mode in ("QUATERNION", "XYZ"):
         print(f"{options.objects} objects, {rotation_mode} ...", file=sys.stderr, flush=True)
         objects = scene_of(options.objects, options.keys, options.frames, rotation_mode)

@@ -17,7 +17,6 @@ poses is in the file besides, on every frame, but made anew from the keys: it is
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -31,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from addon import animation
 from addon.motion import Poses, interpolate, repair, shell_error
 from addon.motion.measures import rms
-from scripts.publishing import publish
+from scripts.publishing import opening, publish
 from scripts.trajectories import TrajectoryError, read_trajectories
 from scripts.trajectories.reading import FORMATS
 
@@ -223,16 +222,11 @@ def main(arguments: list[str] | None = None) -> int:
         recordings = [read(path, options.fps) for path in files(options.recordings)]
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))
-    lines = [
-        "# Few keys instead of many",
-        "",
-        f"`python scripts/reduction.py --tolerance {options.tolerance:g} --radius {options.radius:g} "
-        f"--fps {options.fps:g}`{' with --recordings' if options.recordings else ''}: "
-        f"Blender {bpy.app.version_string}, Python {platform.python_version()}, NumPy {np.__version__}.",
-        "",
-        *__doc__.split("\n\n")[-1].strip().splitlines(),
-        "",
-    ]
+    command = (
+        f"python scripts/reduction.py --tolerance {options.tolerance:g} --radius {options.radius:g} "
+        f"--fps {options.fps:g}{' --recordings ...' if options.recordings else ''}"
+    )
+    lines = opening("Few keys instead of many", command, __doc__, Blender=bpy.app.version_string)
     animation.register()
     try:
         for rotation_mode in ROTATION_MODES:

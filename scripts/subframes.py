@@ -15,7 +15,6 @@ worst. Figures are the largest of all, RMS where it says so.
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -33,7 +32,7 @@ from addon.motion import KEYFRAME_MODES, Poses, shell_error
 from addon.motion.eulers import eulers_from_quaternions
 from addon.motion.measures import rms
 from addon.motion.quaternions import align_signs, angle_between, multiply
-from scripts.publishing import publish
+from scripts.publishing import opening, publish
 
 SEGMENTS = 24
 
@@ -161,15 +160,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)
-    lines = [
-        "# Between whole frames",
-        "",
-        f"`python scripts/subframes.py --radius {options.radius:g}`: Blender {bpy.app.version_string}, "
-        f"Python {platform.python_version()}, NumPy {np.__version__}.",
-        "",
-        *__doc__.split("\n\n")[-1].strip().splitlines(),
-        "",
-    ]
+    command = f"python scripts/subframes.py --radius {options.radius:g}"
+    lines = opening("Between whole frames", command, __doc__, Blender=bpy.app.version_string)
     animation.register()
     try:
         for motion in MOTIONS:
