@@ -553,13 +553,13 @@ class _Spans:
         key = np.arange(first[-1]) - np.repeat(np.arange(1, len(first)), np.diff(first))
         key[before] += 1
 
-        points = np.concatenate([keys.points.reshape(-1, 2) for keys in curves])[key]
+        points = np.concatenate([keys.points.reshape(-1, 2) for keys in curves]).take(key, axis=0)
         left, right = (
             np.concatenate([(keys.points if of_keys is None else of_keys).reshape(-1, 2) for keys, of_keys in handles])
             for handles in ([(keys, keys.left) for keys in curves], [(keys, keys.right) for keys in curves])
         )
-        left, right = left[key], right[key]
-        codes = np.concatenate([keys.interpolation.ravel() for keys in curves])[key]
+        left, right = left.take(key, axis=0), right.take(key, axis=0)
+        codes = np.concatenate([keys.interpolation.ravel() for keys in curves]).take(key)
         following, following_left = np.roll(points, -1, axis=0), np.roll(left, -1, axis=0)
         duration = following[:, 0] - points[:, 0]
         crowded = ~(duration > 2.1 * NEAR)
@@ -573,7 +573,7 @@ class _Spans:
         polynomials[0], polynomials[1], bezier[0] = points[:, 1], change, 1.0
         curved = np.flatnonzero(moving & (codes == BEZIER))
         if len(curved):
-            cubics = _cubics(points[curved], right[curved], following_left[curved], following[curved])
+            cubics = _cubics(*(ends.take(curved, axis=0) for ends in (points, right, following_left, following)))
             bezier[:, curved] = cubics[..., 0] / duration[curved]
             polynomials[1:, curved] = cubics[..., 1]
         linear = np.flatnonzero(np.repeat([keys.linear for keys in curves], channels))

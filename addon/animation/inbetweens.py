@@ -207,9 +207,12 @@ def _fill(
             delta[:, some] = own.repeat(here, axis=1)
             continue
         wanted = ends.poses(segment, here, progress[some], MODE_IDS[mode])
-        _differ(wanted, native[:, some], delta, some)
+        part = delta if every else np.empty((len(delta), int(here.sum())))
+        _differ(wanted, native[:, some], part)
         if wanted.scales is not None:
-            delta[ROWS[SCALE], some] *= own[ROWS[SCALE]].repeat(here, axis=1)
+            part[ROWS[SCALE]] *= own[ROWS[SCALE]].repeat(here, axis=1)
+        if not every:
+            delta[:, some] = part
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,10 +438,10 @@ def _key_poses(start: np.ndarray, end: np.ndarray, own: np.ndarray, source: Sour
     )
 
 
-def _differ(poses: Poses, native: np.ndarray, delta: np.ndarray, some: slice | np.ndarray) -> None:
-    """Set some of the deltas (., m) to what takes Blender's in-betweens (., .) to these poses."""
-    delta[ROWS[LOCATION], some] = poses.positions.T - native[ROWS[LOCATION]]
-    delta[ROWS[ROTATION], some] = multiply(poses.quaternions, conjugate(native[ROWS[ROTATION]].T)).T
+def _differ(poses: Poses, native: np.ndarray, delta: np.ndarray) -> None:
+    """Set deltas (., m) to what takes Blender's in-betweens (., m), which may be in their place, to these poses."""
+    np.subtract(poses.positions.T, native[ROWS[LOCATION]], out=delta[ROWS[LOCATION]])
+    multiply(poses.quaternions, conjugate(native[ROWS[ROTATION]].T), out=delta[ROWS[ROTATION]].T)
     if poses.scales is not None:
         scale = native[ROWS[SCALE]]
-        delta[ROWS[SCALE], some] = np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)
+        delta[ROWS[SCALE]] = np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)

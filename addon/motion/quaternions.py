@@ -7,11 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Hamilton's product a b, shapes (..., 4): the rotation b first, then a. A view, components apart in memory."""
+def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+    """Hamilton's product a b, shapes (..., 4): the rotation b first, then a. A view, components apart in memory.
+
+    `out`, an array for the product, has none of its memory in common with a and b.
+    """
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape)))
+    components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape))) if out is None else np.moveaxis(out, -1, 0)
     w, x, y, z = (components[row, ...] for row in range(4))
     np.subtract(aw * bw, ax * bx, out=w)
     w -= ay * by
