@@ -183,10 +183,12 @@ def _state_of(place: Path, path: str) -> FileState:
 
 def _shown(found: str | bytes | int, order: Order) -> str:
     """A path as the user knows it: the scratch folder is nobody's business."""
-    for path, place in places_of(order.outputs).items():
-        # What takes an output's place when it is whole has a name that ends in the output's.
-        if str(found).startswith(order.scratch) and str(found).endswith(place.rpartition("/")[2]):
-            return f"{order.output}/{path}"
+    found = Path(str(found))
+    places = {Path(order.scratch, place): path for path, place in places_of(order.outputs).items()}
+    # What takes an output's place when it is whole has a name that ends in the output's, and perhaps in another's.
+    whose = [place for place in places if place.parent == found.parent and found.name.endswith(place.name)]
+    if whose:
+        return f"{order.output}/{places[max(whose, key=lambda place: len(place.name))]}"
     return str(found).replace(order.scratch, order.output)
 
 

@@ -69,9 +69,10 @@ class Workspace:
 
     def __exit__(self, *_: object) -> None:
         try:
-            for scratch in self._used:
-                shutil.rmtree(scratch, ignore_errors=True)
-            if not self._shared:
+            if self._shared:
+                for scratch in self._used:
+                    _removed(scratch)
+            else:
                 self._clear_scratch()
                 self.manifest.write()
         finally:

@@ -89,6 +89,16 @@ def test_an_error_of_the_system_names_the_output_where_it_would_have_been(output
     assert outcome.failures["c"].startswith(f"c: {output}/a/b/c.txt: ")
 
 
+@pytest.mark.parametrize("beside", ["", ".123."])
+def test_of_two_outputs_the_name_of_one_of_which_ends_in_the_others_it_names_the_right_one(
+    output: Path, beside: str
+) -> None:
+    outputs = ("keys.csv", "best_of.keys.csv")
+    arguments = {"path": "best_of.keys.csv", "beside": beside}
+    outcome = run_in(output, Task("c", f"{STEPS}:stumble", arguments, outputs=outputs))
+    assert outcome.failures["c"].startswith(f"c: {output}/best_of.keys.csv: ")
+
+
 def test_a_task_that_does_not_make_what_it_said_has_failed(output: Path) -> None:
     assert "was to be made" in run_in(output, task("a", "forget")).failures["a"]
 
