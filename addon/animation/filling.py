@@ -87,13 +87,14 @@ def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], frames: tu
     for path, rows in values.items():
         for index, samples in enumerate(rows):
             fcurve = curves.get((path, index))
-            if fcurve is not None and len(fcurve.sampled_points) != last - first + 1:
-                _remove(slot, curves, path, index)
-                fcurve = None
-            if fcurve is None:
-                fcurve = _new(slot.channelbag, curves, path, index, first, last)
-            fcurve.sampled_points.foreach_set("co", samples)
-    gone = [key for key, fcurve in curves.items() if key[0] in OWN and key[0] not in values and is_filled_in(fcurve)]
+            points = () if fcurve is None else fcurve.sampled_points
+            if len(points) != last - first + 1:
+                if fcurve is not None:
+                    _remove(slot, curves, path, index)
+                points = _new(slot.channelbag, curves, path, index, first, last).sampled_points
+            points.foreach_set("co", samples)
+    others = OWN.keys() - values.keys()
+    gone = [key for key, fcurve in curves.items() if key[0] in others and is_filled_in(fcurve)]
     for key in gone:
         _remove(slot, curves, *key)
     if gone:

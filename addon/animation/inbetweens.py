@@ -27,7 +27,7 @@ from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
 
-BLOCK = 16384
+BLOCK = 24576
 """Samples worked on at once: few enough for the processor's caches."""
 
 
@@ -390,7 +390,7 @@ def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np
     ends = np.cumsum([len(own) for own in frames])
     begins = ends - [len(own) for own in frames]
     at = begins[owners] + np.concatenate(
-        [np.searchsorted(own, source.key_frames) for source, own in zip(sources, frames, strict=True)]
+        [own.searchsorted(source.key_frames) for source, own in zip(sources, frames, strict=True)]
     )
     hits = np.flatnonzero(np.concatenate(frames)[np.minimum(at, ends[owners] - 1)] == keys)
     # A segment begins with the sample on its first key; what is outside of the keys belongs to the outermost ones.

@@ -141,7 +141,7 @@ def _has_say(what: Transformable, fcurve: bpy.types.FCurve) -> bool:
     """Whether a channel has keys that count. `Refused` where it has something else that does."""
     if fcurve.mute:
         return False
-    has_keys = bool(fcurve.keyframe_points)
+    has_keys = len(fcurve.keyframe_points) > 0
     if fcurve.modifiers or not has_keys:
         refuse_channel(what.name, fcurve)
     return has_keys

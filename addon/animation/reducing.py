@@ -19,7 +19,7 @@ from ..motion.best_of import least_errors
 from . import live
 from .bake import channel_values
 from .channels import code_of
-from .fcurves import CONSTANT, LINEAR, Keys
+from .fcurves import CODE, CONSTANT, LINEAR, Keys
 from .inbetweens import in_betweens
 from .mode_keys import segment_modes, set_mode_in
 from .originals import (
@@ -297,7 +297,7 @@ def _with_best_modes(
     errors = np.stack([shell_error(_poses(replace(source, mode=int(code)), frames), truth, radius) for code in codes])
     best = least_errors(errors, np.searchsorted(frames, keys - SAME_FRAME), rounding, allowed)
     points = np.stack((keys, codes[[*best, best[-1]]]), axis=-1)[None].astype(np.float32)
-    return replace(source, mode=Keys(points, np.full(points.shape[:2], CONSTANT, np.int32)))
+    return replace(source, mode=Keys(points, np.full(points.shape[:2], CONSTANT, CODE)))
 
 
 def _worst(chosen: np.ndarray, error: np.ndarray, allowed: float) -> np.ndarray:
@@ -367,7 +367,7 @@ def _with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray]
     for (linear, cycles), rows in alike.items():
         points = np.empty((len(rows), len(frames), 2), np.float32)
         points[..., 0], points[..., 1] = frames, [values[row] for row in rows]
-        codes = np.full(points.shape[:2], LINEAR, np.int32)
+        codes = np.full(points.shape[:2], LINEAR, CODE)
         channels.append((rows, Keys(points, codes, linear=linear, cycles=cycles)))
     for own, keys in source.channels:
         places = [place for place, row in enumerate(own) if row not in values]

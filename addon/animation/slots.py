@@ -6,7 +6,7 @@ no delta transforms: `Transformable` is where it will come in, for what is baked
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -93,21 +93,22 @@ class Slot:
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
     """The slots that move these objects, in Actions of their own and in NLA strips; each once."""
-    wanted = {key for obj in objects for key in _uses(obj)}
-    return _slots(lambda key: key in wanted) if wanted else []
+    known = {obj: _uses(obj) for obj in objects}
+    wanted = {key for uses in known.values() for key in uses}
+    return _slots(lambda key: key in wanted, known) if wanted else []
 
 
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
     """The slots of these Actions that move an object."""
     wanted = {action.as_pointer() for action in actions}
-    return _slots(lambda key: key[0] in wanted)
+    return _slots(lambda key: key[0] in wanted, {})
 
 
-def _slots(is_wanted: Callable[[tuple[int, int]], bool]) -> list[Slot]:
+def _slots(is_wanted: Callable[[tuple[int, int]], bool], known: Mapping[bpy.types.Object, Uses]) -> list[Slot]:
     users: dict[tuple[int, int], list[bpy.types.Object]] = {}
     places = {}
     for obj in bpy.data.objects:
-        for key, (action, handle, strips) in _uses(obj).items():
+        for key, (action, handle, strips) in (known[obj] if obj in known else _uses(obj)).items():
             if is_wanted(key):
                 users.setdefault(key, []).append(obj)
                 places.setdefault(key, (action, handle, set()))[2].update(strips)
@@ -116,8 +117,11 @@ def _slots(is_wanted: Callable[[tuple[int, int]], bool]) -> list[Slot]:
     ]
 
 
-def _uses(obj: bpy.types.Object) -> dict[tuple[int, int], tuple[bpy.types.Action, int, set[tuple[int, int] | None]]]:
-    """The slots that move an object: Action, handle, and the frames that strips show, None outside of the NLA."""
+Uses = dict[tuple[int, int], tuple[bpy.types.Action, int, set[tuple[int, int] | None]]]
+"""The slots that move an object: Action, handle, and the frames that strips show, None outside of the NLA."""
+
+
+def _uses(obj: bpy.types.Object) -> Uses:
     data = obj.animation_data
     if data is None:
         return {}
