@@ -12,8 +12,8 @@ import numpy as np
 from ..motion.eulers import ORDERS, quaternions_from_eulers
 from .fcurves import Keys, read_keys
 from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
-from .slots import MODE_PATH, WIDTHS, Curves, Refused, Slot, Transformable
-from .sources import MODE_IDS, ROWS, UNKNOWN, Source
+from .slots import MODE_PATH, Curves, Refused, Slot, Transformable
+from .sources import MODE_IDS, PART_OF, UNKNOWN, Source
 
 
 def read(slot: Slot, curves: Curves, mode: int | None = None) -> Source:
@@ -53,7 +53,7 @@ def keyed_in(readings: Sequence[tuple[Slot, Curves]]) -> list[Source | Refused]:
         except Refused as problem:
             found.append(problem)
     everyone = [keyed for users in found if not isinstance(users, Refused) for keyed in users]
-    channels = iter(read_keys([keyed.fcurves for keyed in everyone]))
+    channels = iter(read_keys([list(keyed.channels.values()) for keyed in everyone]))
     modes = iter(read_keys([keyed.modes for keyed in everyone]))
     return [
         users
@@ -84,11 +84,8 @@ class _Keyed:
     names: frozenset[str]
     """Which of location, rotation and scale are keyed."""
 
-    rows: list[int]
-    """The components with keys."""
-
-    fcurves: list[bpy.types.FCurve]
-    """The channel of each."""
+    channels: dict[int, bpy.types.FCurve]
+    """The channels with keys, by the rows of their components."""
 
     rest: dict[int, float]
     """The values of the other components of what is keyed."""
@@ -100,36 +97,32 @@ class _Keyed:
 def _keyed_for(what: Transformable, slot: Slot, curves: Curves) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
     refuse_what_is_taken(what, slot, curves)
-    names, rows, fcurves, rest = [], [], [], {}
-    for name, prop in what.properties.items():
-        first, unkeyed = ROWS[name].start, []
-        for index in range(WIDTHS[prop]):
-            fcurve = curves.get((what.prefix + prop, index))
-            if fcurve is not None and _has_say(what, fcurve):
-                rows.append(first + index)
-                fcurves.append(fcurve)
-            else:
-                unkeyed.append(index)
-        if len(unkeyed) < WIDTHS[prop]:
-            names.append(name)
-            if unkeyed:
-                values = getattr(what.carrier, prop)
-                rest |= {first + index: values[index] for index in unkeyed}
+    keyed = {}
+    for row, key in what.channels.items():
+        fcurve = curves.get(key)
+        if fcurve is not None and _has_say(what, fcurve):
+            keyed[row] = fcurve
+    names = frozenset(map(PART_OF.__getitem__, keyed))
+    rest = {
+        row: getattr(what.carrier, path.removeprefix(what.prefix))[index]
+        for row, (path, index) in what.channels.items()
+        if row not in keyed and PART_OF[row] in names
+    }
     mode = curves.get((what.prefix + MODE_PATH, 0))
     modes = [mode] if mode is not None and _has_say(what, mode) else []
-    return _Keyed(what, frozenset(names), rows, fcurves, rest, modes)
+    return _Keyed(what, names, keyed, rest, modes)
 
 
 def _source(
     keyed: _Keyed, slot: Slot, channels: list[tuple[list[int], Keys]], modes: list[tuple[list[int], Keys]]
 ) -> Source:
     """What is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
-    carrier = keyed.what.carrier
+    carrier, rows = keyed.what.carrier, list(keyed.channels)
     own_span = any(keys.linear or keys.cycles is not None for _, keys in channels)
     return Source(
         order=None if keyed.what.rotation == "rotation_quaternion" else carrier.rotation_mode,
         keyed=keyed.names,
-        channels=tuple(([keyed.rows[place] for place in places], keys) for places, keys in channels),
+        channels=tuple(([rows[place] for place in places], keys) for places, keys in channels),
         rest=keyed.rest,
         own=own_deltas(carrier),
         mode=modes[0][1] if modes else mode_of(carrier),

@@ -33,7 +33,7 @@ from .originals import (
     refuse_without_original,
 )
 from .reading import read
-from .slots import MODE_PATH, WIDTHS, Refused, Slot, Transformable, curves_in, slots_of
+from .slots import MODE_PATH, Refused, Slot, Transformable, curves_in, slots_of
 from .sources import MODE_IDS, ROWS, SAME_FRAME, SCALE, Source, distinct
 
 SMALLEST = 1e-6
@@ -248,7 +248,7 @@ def _fewer_keys(
         if error_of_mixed.max() <= allowed:
             fewer, error = mixed, error_of_mixed
     key_frames = distinct(fewer.keyed_frames)
-    paths = _paths(Transformable.of(obj))
+    paths = Transformable.of(obj).channels
     return _Fewer(
         slot,
         len(before),
@@ -340,21 +340,12 @@ def _values(obj: bpy.types.Object, source: Source, frames: np.ndarray) -> dict[i
         if np.all(_is_constant(scale)):
             by_path[what.prefix + what.properties[SCALE]] = scale
     keyed = {row for own, _ in source.channels for row in own}
-    columns = {row: by_path[path][:, index] for row, (path, index) in _paths(what).items() if path in by_path}
+    columns = {row: by_path[path][:, index] for row, (path, index) in what.channels.items() if path in by_path}
     return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
 
 
 def _is_constant(columns: np.ndarray) -> np.ndarray:
     return np.ptp(columns, axis=0) <= SMALLEST * np.maximum(np.abs(columns).max(axis=0), 1.0)
-
-
-def _paths(what: Transformable) -> dict[int, tuple[str, int]]:
-    """Data path and index of each component."""
-    return {
-        ROWS[name].start + index: (what.prefix + prop, index)
-        for name, prop in what.properties.items()
-        for index in range(WIDTHS[prop])
-    }
 
 
 def _with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray], mode: str) -> Source:

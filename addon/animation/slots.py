@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..motion.eulers import ORDERS
-from .sources import LOCATION, ROTATION, SCALE
+from .sources import LOCATION, ROTATION, ROWS, SCALE
 
 MODE_PATH = "rigid_motion.mode"
 
@@ -64,6 +65,20 @@ class Transformable:
     def properties(self) -> dict[str, str]:
         """Location, rotation and scale, and which property each of them is."""
         return {LOCATION: "location", ROTATION: self.rotation, SCALE: "scale"}
+
+    @property
+    def channels(self) -> dict[int, tuple[str, int]]:
+        """Data path and index of each of its components, by their rows."""
+        return _channels(self.prefix, self.rotation)
+
+
+@cache
+def _channels(prefix: str, rotation: str) -> dict[int, tuple[str, int]]:
+    return {
+        ROWS[name].start + index: (prefix + prop, index)
+        for name, prop in ((LOCATION, "location"), (ROTATION, rotation), (SCALE, "scale"))
+        for index in range(WIDTHS[prop])
+    }
 
 
 @dataclass(frozen=True)
