@@ -105,8 +105,9 @@ def deltas(sources: Sequence[Source]) -> list[Deltas]:
         _move(portion, frames, rows, delta)
         order = portion[0].order
         if order is not None:
-            starts = [place.start for _, place in samples]
-            delta[3:6] = eulers_from_quaternions(delta[ROWS[ROTATION]].T, order, starts).T
+            for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
+                starts = [own.start - place.start for _, own in samples[some]]
+                delta[3:6, place] = eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta

@@ -13,7 +13,7 @@ from ..motion.eulers import ORDERS, quaternions_from_eulers
 from .fcurves import Keys, read_keys
 from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
 from .slots import MODE_PATH, Curves, Refused, Slot, Transformable
-from .sources import MODE_IDS, PART_OF, UNKNOWN, Source
+from .sources import MODE_IDS, PART_OF, REST, ROTATION, ROWS, UNKNOWN, Source
 
 
 def read(slot: Slot, curves: Curves, mode: int | None = None) -> Source:
@@ -150,13 +150,15 @@ def own_deltas(obj: bpy.types.Object) -> np.ndarray:
     """The delta transforms that an object has of its own, (10,): remembered while in-betweens are in their place."""
     motion = obj.rigid_motion
     location, quaternion, euler, scale = motion.filled
+    rotation = REST[ROWS[ROTATION]]
     if obj.rotation_mode in ORDERS:
-        angles = motion.own_euler if euler else obj.delta_rotation_euler
-        rotation = quaternions_from_eulers(np.array(angles)[None], obj.rotation_mode)[0]
+        angles = (motion.own_euler if euler else obj.delta_rotation_euler)[:]
+        if any(angles):
+            rotation = quaternions_from_eulers(np.array((angles,)), obj.rotation_mode)[0]
     else:
-        rotation = motion.own_quaternion if quaternion else obj.delta_rotation_quaternion
-        length = math.hypot(*rotation)
-        rotation = [component / length for component in rotation] if length else (1.0, 0.0, 0.0, 0.0)
+        components = (motion.own_quaternion if quaternion else obj.delta_rotation_quaternion)[:]
+        if length := math.hypot(*components):
+            rotation = [component / length for component in components]
     return np.array(
         (
             *(motion.own_location if location else obj.delta_location),

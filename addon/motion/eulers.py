@@ -63,8 +63,10 @@ def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     """The rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
-    half = 0.5 * angles.T
-    (ci, cj, ck), (si, sj, sk) = np.cos(half[[i, j, k]]), np.sin(half[[i, j, k]])
+    # Of half the angle sine and cosine both come from the tangent of its own half: one function of the library for two.
+    tangent = np.tan(0.25 * angles.T[[i, j, k]])
+    scale = 2.0 / (1.0 + tangent * tangent)
+    (ci, cj, ck), (si, sj, sk) = scale - 1.0, scale * tangent
     quaternions = np.empty((4, len(angles)))
     quaternions[0] = ci * cj * ck + sign * si * sj * sk
     quaternions[1 + i] = si * cj * ck - sign * ci * sj * sk
@@ -80,7 +82,8 @@ def _direction(x: np.ndarray, y: np.ndarray, starts: Sequence[int]) -> tuple[np.
     free = length < LOCKED
     if not free.any():
         line, turns = _unwrapped(angle, np.pi, starts)
-        return line, np.where(turns % 2.0 == 1.0, -length, length)
+        is_odd = turns != 2.0 * np.floor(0.5 * turns)
+        return line, np.negative(length, out=length, where=is_odd)
     line = np.zeros_like(angle)
     for first, last in itertools.pairwise((*starts, len(angle))):
         rows = np.arange(first, last)

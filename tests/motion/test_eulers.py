@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from mathutils import Euler
 from scipy.spatial.transform import Rotation
 
 from addon.motion import Poses, interpolate
-from addon.motion.eulers import ORDERS, eulers_from_quaternions
+from addon.motion.eulers import ORDERS, eulers_from_quaternions, quaternions_from_eulers
 from tests.motion.cases import random_quaternions
 
 in_every_order = pytest.mark.parametrize("order", ORDERS)
@@ -28,6 +30,16 @@ def assert_same_rotations(angles: np.ndarray, order: str, quaternions: np.ndarra
 def test_angles_give_the_rotations_back(order):
     quaternions = random_quaternions(np.random.default_rng(0), 2000)
     assert_same_rotations(eulers_from_quaternions(quaternions, order), order, quaternions)
+
+
+@in_every_order
+def test_angles_of_any_size_give_scipys_rotations(order):
+    right_angles = np.array(list(itertools.product(0.5 * np.pi * np.arange(-8.0, 9.0), repeat=3)))
+    angles = np.concatenate((right_angles, np.random.default_rng(3).normal(scale=20.0, size=(2000, 3))))
+    expected = rotations(angles, order).as_quat(scalar_first=True)
+    quaternions = quaternions_from_eulers(angles, order)
+    assert np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max() < 1e-15
+    assert np.abs(quaternions - expected * np.sign(np.sum(quaternions * expected, axis=1))[:, None]).max() < 1e-13
 
 
 @in_every_order
