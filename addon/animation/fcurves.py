@@ -436,8 +436,8 @@ def _groups(curves: Sequence[Keys], times: Sequence[np.ndarray], spans: _Spans) 
         if leader.cycles is not None or not rising[request]:
             order = np.argsort(moments, kind="stable")
             moments = moments[order]
-        numbers = [spans.number[number] + np.arange(channels.start, channels.stop) for number, channels in members]
-        own = np.concatenate(numbers)
+        rows = ((spans.number[number], channels) for number, channels in members)
+        own = np.array([row for first, some in rows for row in range(first + some.start, first + some.stop)])
         yield _Group(members, own, moments, *spans.place(int(own[0]), moments), order, offsets)
 
 

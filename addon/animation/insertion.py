@@ -71,8 +71,10 @@ def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: fl
         Whether there was such a key.
     """
     old = _sources.get(before)
+    if old is None or source.key_count <= old.key_count:
+        return False
     obj = next((user for user in slot.users if user.animation_data.action == slot.action), None)
-    if old is None or obj is None or old.order != source.order:
+    if obj is None or old.order != source.order:
         return False
     if obj.animation_data.use_tweak_mode:
         frame = obj.animation_data.nla_tweak_strip_time_to_scene(frame, invert=True)

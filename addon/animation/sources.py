@@ -86,6 +86,11 @@ class Source:
         return [keys for _, keys in self.channels]
 
     @property
+    def key_count(self) -> int:
+        """How many keys its channels have."""
+        return sum(keys.interpolation.size for keys in self.curves)
+
+    @property
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
         return len(self.channels) == 1 and self.cyclic is None
