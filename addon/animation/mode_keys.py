@@ -122,11 +122,17 @@ def set_mode_in(slot: Slot, mode: str, frames: Sequence[float]) -> None:
     chosen, keyed = np.asarray(frames, dtype=np.float64), _frames_in(curves)
     before = _modes_in(slot.users[0], curves, keyed)
     fcurve = curves.get((MODE_PATH, 0)) or _new(slot)
-    for frame, old in zip(keyed.tolist(), before, strict=True):
-        is_chosen = bool(np.abs(chosen - frame).min(initial=np.inf) < SAME_FRAME)
+    for frame, old, is_chosen in zip(keyed.tolist(), before, _is_among(chosen, keyed).tolist(), strict=True):
         wanted = MODE_IDS.index(mode) if is_chosen else old
         if is_chosen or not len(fcurve.keyframe_points) or _value(fcurve, frame) != wanted:
             _set_key(fcurve, frame, wanted, selected=is_chosen)
+    fcurve.update()
+
+
+def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Which of the frames (n,) are one of the chosen, shape (n,)."""
+    chosen = np.sort(chosen)
+    return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
 
 def check(obj: bpy.types.Object, slots: Sequence[Slot]) -> None:
@@ -154,6 +160,6 @@ def _new(slot: Slot) -> bpy.types.FCurve:
 
 def _set_key(fcurve: bpy.types.FCurve, frame: float, value: int, *, selected: bool) -> None:
     """A key that holds, selected as the key of the pose is, so that both move together."""
-    key = fcurve.keyframe_points.insert(frame, value)
+    key = fcurve.keyframe_points.insert(frame, value, options={"FAST"})
     key.interpolation = "CONSTANT"
     key.select_control_point = key.select_left_handle = key.select_right_handle = selected
