@@ -6,6 +6,7 @@ nothing of it. The delta transforms that an object has of its own are remembered
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import bpy
@@ -14,6 +15,9 @@ import numpy as np
 from .inbetweens import Deltas, deltas
 from .slots import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, slots_of
 from .sources import LOCATION, ROTATION, SCALE, Source
+
+FARTHEST = 1_000_000
+"""Frames from 0 up to which Blender can show any."""
 
 OWN = {
     "delta_location": ("own_location", 0),
@@ -151,6 +155,51 @@ def _remember(obj: bpy.types.Object, paths: Iterable[str]) -> None:
         if not filled[place]:
             setattr(motion, own, getattr(obj, path))
             motion.filled[place] = True
+
+
+def hold_own(slot: Slot, curves: Curves) -> None:
+    """Let a slot that is not filled in hold its objects' own delta transforms where another slot of theirs is.
+
+    While a strip plays whose Action lacks a channel that another strip's has, Blender puts that channel to its default.
+    """
+    held = _held(slot, curves)
+    there = {
+        key: next((point.co[1] for point in fcurve.sampled_points), None)
+        for key, fcurve in curves.items()
+        if key[0] in OWN and is_filled_in(fcurve)
+    }
+    if held != there:
+        # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
+        starts = [start for fcurve in curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
+        first = math.floor(min(starts, default=0.0))
+        values: dict[str, list[np.ndarray]] = {}
+        for (path, _), value in held.items():
+            values.setdefault(path, []).append(np.array((first, value, first + 1, value), dtype=np.float32))
+        _write(slot, curves, values, (first, first + 1))
+
+
+def _held(slot: Slot, curves: Curves) -> dict[tuple[str, int], float]:
+    """The channels that a slot which is not filled in has to have, and what they hold."""
+    first, *others = (_held_for(obj) for obj in slot.users)
+    if not curves or any(held != first for held in others):
+        return {}
+    animated = {path for (path, index), fcurve in curves.items() if path in OWN and not is_filled_in(fcurve)}
+    return {key: value for key, value in first.items() if key[0] not in animated}
+
+
+def _held_for(obj: bpy.types.Object) -> dict[tuple[str, int], float]:
+    if not len(obj.animation_data.nla_tracks):
+        return {}
+    filled = {
+        path for slot in slots_of([obj]) if recorded(slot) for path, _ in curves_in(slot.channelbag) if path in OWN
+    }
+    owns = {path: getattr(obj.rigid_motion, OWN[path][0])[:] for path in sorted(filled)}
+    return {
+        (path, index): value
+        for path, own in owns.items()
+        if all(map(math.isfinite, own)) and own != tuple(obj.bl_rna.properties[path].default_array)
+        for index, value in enumerate(own)
+    }
 
 
 def give_back(obj: bpy.types.Object) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import ClassVar
 
@@ -17,11 +17,11 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import insertion
-from .filling import clear, fill_in, give_back, is_complete, recorded
+from .filling import clear, fill_in, give_back, hold_own, is_complete, recorded
 from .inbetweens import deltas
 from .reading import keyed_in, read
 from .refusals import refuse_numbers
-from .slots import Refused, Slot, curves_in, is_filled_in, slots_in, slots_of
+from .slots import Curves, Refused, Slot, curves_in, slots_in, slots_of
 from .sources import Source
 
 log = logging.getLogger(__package__)
@@ -91,15 +91,16 @@ def problem_of(obj: bpy.types.Object) -> str:
     return ""
 
 
-def _refresh(slots: Iterable[Slot]) -> int:
+def _refresh(slots: Sequence[Slot]) -> int:
     # What is linked has the in-betweens that its own file was saved with.
     readings = [(slot, curves_in(slot.channelbag)) for slot in slots if slot.action.is_editable]
-    stale = []
+    stale, idle = [], []
     for (slot, curves), source in zip(readings, keyed_in(readings), strict=True):
         before = recorded(slot)
         if not _is_wanted(slot, source, before):
-            if before or any(is_filled_in(fcurve) for fcurve in curves.values()):
+            if before:
                 clear(slot, curves)
+            idle.append((slot, curves))
             for obj in slot.users:
                 give_back(obj)
         elif source.digest != before or not is_complete(curves, source):
@@ -118,7 +119,21 @@ def _refresh(slots: Iterable[Slot]) -> int:
                 fill_in([one])
             except ValueError:
                 clear(*one[:2])
+                idle.append(one[:2])
+    for slot, curves in (*idle, *_beside(slots)):
+        hold_own(slot, curves)
     return len(stale)
+
+
+def _beside(slots: Sequence[Slot]) -> list[tuple[Slot, Curves]]:
+    """What else than these slots moves their objects in the NLA, and is not filled in."""
+    tracked = {obj for slot in slots for obj in slot.users if len(obj.animation_data.nla_tracks)}
+    known = {(slot.action, slot.handle) for slot in slots}
+    return [
+        (slot, curves_in(slot.channelbag))
+        for slot in (slots_of(tracked) if tracked else ())
+        if (slot.action, slot.handle) not in known and slot.action.is_editable and not recorded(slot)
+    ]
 
 
 def _is_wanted(slot: Slot, source: Source | Refused, before: str) -> bool:

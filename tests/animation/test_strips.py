@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import key_frames, modes_of, problem_of, refresh, set_mode
+from addon.animation import bake, filling, key_frames, modes_of, problem_of, refresh, set_mode, unbake
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 
@@ -95,11 +95,6 @@ def test_a_mode_is_chosen_for_an_action_that_is_in_a_strip_already(live_file):
     assert_at(obj, np.arange(101.0, 142.0), wanted)
 
 
-OWN_LOST = pytest.mark.xfail(
-    strict=True, reason="while a strip plays whose Action has no delta transforms, Blender resets those of the other's"
-)
-
-
 @pytest.mark.parametrize("one_track", [True, False], ids=["one track", "two tracks"])
 @pytest.mark.parametrize(
     ("modes", "own"),
@@ -108,7 +103,8 @@ OWN_LOST = pytest.mark.xfail(
         (("dq_sclerp", "pga_lerp"), True),
         (("dq_sclerp", "BLENDER"), False),
         (("BLENDER", "cga_slerp"), False),
-        pytest.param(("BLENDER", "cga_slerp"), True, marks=OWN_LOST),
+        (("BLENDER", "cga_slerp"), True),
+        (("dq_sclerp", "BLENDER"), True),
     ],
 )
 def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, modes, own, one_track):
@@ -131,6 +127,133 @@ def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, 
     for start, worlds in zip((1, 101), wanted, strict=True):
         assert_at(obj, ACTION_FRAMES + start - 1, worlds)
     assert_at(obj, np.array((60.0, 90.0)), wanted[0][[-1, -1]])
+
+
+def two_strips(
+    order: str = "QUATERNION", *, own: bool = True
+) -> tuple[bpy.types.Object, Own, list[bpy.types.Action], list[np.ndarray]]:
+    """An object, its own delta transforms, the Actions of a strip with a mode and one without, its place in each."""
+    obj = new_object("Tool", order)
+    deltas, actions, wanted = give_own_deltas(obj) if own else Own(), [], []
+    data = obj.animation_data_create()
+    for seed, mode in enumerate(("dq_sclerp", "BLENDER")):
+        data.action = None
+        key(obj, KEYS, seed=seed)
+        set_mode(obj, mode, KEYS)
+        actions.append(data.action)
+        wanted.append(expected_bases(obj, ACTION_FRAMES, deltas))
+    slots, data.action = [action.slots[0] for action in actions], None
+    for start, action, slot in zip((1, 101), actions, slots, strict=True):
+        strip = data.nla_tracks.new().strips.new("Strip", start, action)
+        strip.action_slot, strip.extrapolation = slot, "NOTHING"
+    bpy.context.view_layer.update()
+    return obj, deltas, actions, wanted
+
+
+def held_in(action: bpy.types.Action) -> set[str]:
+    """The delta transforms that an Action has channels of."""
+    bag = action.layers[0].strips[0].channelbags[0]
+    return {fcurve.data_path for fcurve in bag.fcurves if fcurve.data_path.startswith("delta_")}
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "ZYX"])
+def test_a_strip_without_a_mode_keeps_the_own_delta_transforms_beside_one_with_a_mode(live_file, order):
+    obj, _, actions, wanted = two_strips(order)
+    for start, worlds in zip((1, 101), wanted, strict=True):
+        assert_at(obj, ACTION_FRAMES + start - 1, worlds)
+    rotation = "delta_rotation_quaternion" if order == "QUATERNION" else "delta_rotation_euler"
+    assert held_in(actions[1]) == {"delta_location", rotation}, "and no other"
+    assert tuple(actions[1].curve_frame_range) == (KEYS[0], KEYS[-1])
+
+
+def test_what_a_strip_holds_goes_and_comes_with_the_mode_of_the_other(live_file):
+    obj, own, actions, wanted = two_strips()
+    tweak(obj, obj.animation_data.nla_tracks[0].strips[0])
+    set_mode(obj, "BLENDER", KEYS)
+    assert held_in(actions[0]) == held_in(actions[1]) == set()
+    assert tuple(obj.delta_location) == own.location
+    set_mode(obj, "pga_lerp", KEYS)
+    assert held_in(actions[0]) == held_in(actions[1]) != set()
+    obj.animation_data.use_tweak_mode = False
+    bpy.context.view_layer.update()
+    assert_at(obj, ACTION_FRAMES + 100, wanted[1])
+    tweak(obj, obj.animation_data.nla_tracks[1].strips[0])
+    set_mode(obj, "cga_slerp", KEYS)
+    assert_at(obj, ACTION_FRAMES + 100, expected_bases(obj, ACTION_FRAMES, own))
+
+
+def test_baking_the_other_strip_and_back_keeps_the_own_delta_transforms(live_file):
+    obj, _, actions, wanted = two_strips()
+    strips = [track.strips[0] for track in obj.animation_data.nla_tracks]
+    for act in (bake, unbake):
+        act(obj)
+        bpy.context.view_layer.update()
+        for start, worlds in zip((1, 101), wanted, strict=True):
+            assert_at(obj, ACTION_FRAMES + start - 1, worlds)
+        assert (held_in(actions[1]) == set()) == (act is bake)
+        assert (strips[0].action == actions[0]) == (act is unbake)
+
+
+def test_what_a_strip_holds_is_written_once(live_file, monkeypatch):
+    obj, _, actions, _ = two_strips()
+    monkeypatch.setattr(filling, "_write", lambda *_: pytest.fail("written again"))
+    refresh()
+    refresh([obj])
+    actions[1].layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1].co_ui.y += 1.0
+    bpy.context.view_layer.update()
+
+
+def test_delta_keys_of_the_animators_are_left_alone_in_the_other_strip(live_file):
+    _, _, actions, _ = two_strips()
+    bag = actions[1].layers[0].strips[0].channelbags[0]
+    for index in range(3):
+        bag.fcurves.remove(bag.fcurves.find("delta_location", index=index))
+    bag.fcurves.new("delta_location", index=1).keyframe_points.insert(5.0, 0.25)
+    bpy.context.view_layer.update()
+    refresh()
+    (kept,) = [fcurve for fcurve in bag.fcurves if fcurve.data_path == "delta_location"]
+    assert [tuple(point.co) for point in kept.keyframe_points] == [(5.0, 0.25)]
+
+
+@pytest.mark.parametrize("frame", [np.nan, np.inf, -1e30])
+def test_a_strip_with_damaged_keys_holds_them_too(live_file, frame):
+    _, _, actions, _ = two_strips()
+    bag = actions[1].layers[0].strips[0].channelbags[0]
+    for fcurve in [fcurve for fcurve in bag.fcurves if fcurve.data_path.startswith("delta_")]:
+        bag.fcurves.remove(fcurve)
+    for fcurve in bag.fcurves:
+        points = np.empty(2 * len(fcurve.keyframe_points), np.float32)
+        fcurve.keyframe_points.foreach_get("co", points)
+        points[::2] = frame
+        fcurve.keyframe_points.foreach_set("co", points)
+    refresh()
+    assert held_in(actions[1]) == {"delta_location", "delta_rotation_quaternion"}
+
+
+def test_where_there_are_no_own_delta_transforms_the_other_strip_holds_none(live_file):
+    _, _, actions, _ = two_strips(own=False)
+    assert held_in(actions[1]) == set()
+
+
+def test_an_action_of_two_objects_holds_what_both_have(live_file):
+    obj, _, actions, wanted = two_strips()
+    twin = obj.copy()
+    live_file.collection.objects.link(twin)
+    bpy.context.view_layer.update()
+    refresh()
+    assert held_in(actions[1]) != set()
+    for start, worlds in zip((1, 101), wanted, strict=True):
+        assert_at(twin, ACTION_FRAMES + start - 1, worlds)
+
+
+def test_an_action_of_two_objects_with_other_delta_transforms_holds_those_of_neither(live_file):
+    _, _, actions, _ = two_strips()
+    other = new_object("Tool, too")
+    strip = other.animation_data_create().nla_tracks.new().strips.new("Strip", 1, actions[1])
+    strip.action_slot = actions[1].slots[0]
+    bpy.context.view_layer.update()
+    refresh()
+    assert held_in(actions[1]) == set()
 
 
 def test_an_action_that_is_in_two_strips_and_cycles_is_filled_in_as_far_as_either_shows_it(live_file):
