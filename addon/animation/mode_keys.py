@@ -69,7 +69,7 @@ def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
 def _modes_in(obj: bpy.types.Object, curves: Curves, frames: np.ndarray) -> list[int]:
     """The modes at these frames, as `MODE_IDS` counts them; Blender's own where there is what is no mode."""
     fcurve = curves.get((MODE_PATH, 0))
-    if fcurve is None or not fcurve.keyframe_points:
+    if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
         modes = [mode_of(obj)] * len(frames)
     else:
         modes = [_value(fcurve, frame) for frame in frames.tolist()]
@@ -122,6 +122,8 @@ def set_mode_in(slot: Slot, mode: str, frames: Sequence[float]) -> None:
     chosen, keyed = np.asarray(frames, dtype=np.float64), _frames_in(curves)
     before = _modes_in(slot.users[0], curves, keyed)
     fcurve = curves.get((MODE_PATH, 0)) or _new(slot)
+    # Muted it has no say. Now it has, and all other segments keep the mode that they had without.
+    fcurve.mute = False
     for frame, old, is_chosen in zip(keyed.tolist(), before, _is_among(chosen, keyed).tolist(), strict=True):
         wanted = MODE_IDS.index(mode) if is_chosen else old
         if is_chosen or not len(fcurve.keyframe_points) or _value(fcurve, frame) != wanted:

@@ -89,7 +89,7 @@ def key_frames(obj: bpy.types.Object) -> np.ndarray:
 def mode_at(obj: bpy.types.Object, frame: float) -> str:
     """The mode of the segment that begins on this frame."""
     fcurve = curves_of(obj).get(("rigid_motion.mode", 0))
-    if fcurve is None or not len(fcurve.keyframe_points):
+    if fcurve is None or fcurve.mute or not len(fcurve.keyframe_points):
         return obj.rigid_motion.mode
     return MODE_IDS[round(fcurve.evaluate(frame + 0.002))]
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import problem_of, refresh, set_mode, write_channel
+from addon.animation import modes_of, problem_of, refresh, set_mode, write_channel
 from addon.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, curves_of, key_frames, rotation_path, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas, random_values
@@ -99,6 +99,21 @@ def test_a_muted_channel_has_no_say(live_file):
     obj = key(new_object("Tool", "XYZ"))
     curves_of(obj)["location", 2].mute = curves_of(obj)["rotation_euler", 0].mute = True
     set_mode_leaving_keys(obj, "pga_lerp")
+    assert_shown([obj], PLAYED)
+
+
+def test_a_muted_mode_channel_has_no_say_until_a_mode_is_chosen(live_file):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    set_mode(obj, "pga_lerp", FRAMES[:2])
+    channel = curves_of(obj)["rigid_motion.mode", 0]
+    channel.mute = True
+    refresh()
+    assert modes_of(obj, np.array(FRAMES[:-1])) == ["dq_sclerp"] * (len(FRAMES) - 1)
+    assert_shown([obj], PLAYED)
+    set_mode(obj, "cga_slerp", FRAMES[1:2])
+    assert not channel.mute
+    assert modes_of(obj, np.array(FRAMES[:3])) == ["dq_sclerp", "cga_slerp", "dq_sclerp"]
     assert_shown([obj], PLAYED)
 
 
