@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from .inbetweens import Deltas, deltas
-from .slots import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, slots_of
+from .slots import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, is_replacing, slots_of
 from .sources import LOCATION, ROTATION, SCALE, Source
 
 FARTHEST = 1_000_000
@@ -180,18 +180,23 @@ def hold_own(slot: Slot, curves: Curves) -> None:
 
 def _held(slot: Slot, curves: Curves) -> dict[tuple[str, int], float]:
     """The channels that a slot which is not filled in has to have, and what they hold."""
-    first, *others = (_held_for(obj) for obj in slot.users)
-    if not curves or any(held != first for held in others):
+    first, *others = (_held_for(obj, slot) for obj in slot.users)
+    if any(held != first for held in others):
         return {}
-    animated = {path for (path, index), fcurve in curves.items() if path in OWN and not is_filled_in(fcurve)}
-    return {key: value for key, value in first.items() if key[0] not in animated}
+    # What it does not key may be another strip's to move, below it, and then so are the delta transforms of that.
+    animated = {path for (path, _), fcurve in curves.items() if not is_filled_in(fcurve)}
+    return {
+        (path, index): value
+        for (path, index), value in first.items()
+        if path not in animated and path.removeprefix("delta_") in animated
+    }
 
 
-def _held_for(obj: bpy.types.Object) -> dict[tuple[str, int], float]:
-    if not len(obj.animation_data.nla_tracks):
+def _held_for(obj: bpy.types.Object, slot: Slot) -> dict[tuple[str, int], float]:
+    if not (len(obj.animation_data.nla_tracks) and is_replacing(obj, slot)):
         return {}
     filled = {
-        path for slot in slots_of([obj]) if recorded(slot) for path, _ in curves_in(slot.channelbag) if path in OWN
+        path for other in slots_of([obj]) if recorded(other) for path, _ in curves_in(other.channelbag) if path in OWN
     }
     owns = {path: getattr(obj.rigid_motion, OWN[path][0])[:] for path in sorted(filled)}
     return {

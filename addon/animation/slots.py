@@ -158,6 +158,16 @@ def _strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip
         yield from _strips(strip.strips)
 
 
+def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
+    """Whether a slot, wherever it moves an object in the NLA, takes the place of what is below it: nothing is added."""
+    data = obj.animation_data
+    if data.action == slot.action and data.action_blend_type != "REPLACE":
+        return False
+    # Without an Action it is a strip of strips, and these may be in it.
+    strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
+    return all(strip.blend_type == "REPLACE" for strip in strips if strip.action in (None, slot.action))
+
+
 def curves_in(channelbag: bpy.types.ActionChannelbag | None) -> Curves:
     """The F-curves of a slot, by data path and index."""
     if channelbag is None:

@@ -230,6 +230,27 @@ def test_a_strip_with_damaged_keys_holds_them_too(live_file, frame):
     assert held_in(actions[1]) == {"delta_location", "delta_rotation_quaternion"}
 
 
+def test_above_a_strip_with_a_mode_one_that_keys_something_else_leaves_it_its_in_betweens(live_file):
+    obj, _, actions, wanted = two_strips()
+    bag = actions[1].layers[0].strips[0].channelbags[0]
+    bag.fcurves.clear()
+    bag.fcurves.new("color", index=1).keyframe_points.insert(KEYS[0], 0.5)
+    obj.animation_data.nla_tracks[1].strips[0].frame_start = 1.0
+    bpy.context.view_layer.update()
+    refresh()
+    assert held_in(actions[1]) == set()
+    assert_at(obj, ACTION_FRAMES, wanted[0])
+
+
+def test_a_strip_that_adds_holds_nothing(live_file):
+    obj, _, actions, _ = two_strips()
+    assert held_in(actions[1]) != set()
+    obj.animation_data.nla_tracks[1].strips[0].blend_type = "ADD"
+    bpy.context.view_layer.update()
+    refresh()
+    assert held_in(actions[1]) == set()
+
+
 def test_where_there_are_no_own_delta_transforms_the_other_strip_holds_none(live_file):
     _, _, actions, _ = two_strips(own=False)
     assert held_in(actions[1]) == set()
