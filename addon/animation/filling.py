@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import cache
 
 import bpy
 import numpy as np
@@ -141,9 +142,14 @@ def _new(
 
 def adopt(slot: Slot, curves: Curves) -> None:
     """Remember the own delta transforms of objects that move by a slot which is filled in already."""
-    paths = {path for (path, _), fcurve in curves.items() if path in OWN and is_filled_in(fcurve)}
+    paths = {path for path, _ in _filled(curves)}
     for obj in slot.users:
         _remember(obj, paths)
+
+
+def _filled(curves: Curves) -> Curves:
+    """Those of a slot's F-curves that in-betweens are in."""
+    return {key: fcurve for key, fcurve in curves.items() if key[0] in OWN and is_filled_in(fcurve)}
 
 
 def _remember(obj: bpy.types.Object, paths: Iterable[str]) -> None:
@@ -164,9 +170,7 @@ def hold_own(slot: Slot, curves: Curves) -> None:
     """
     held = _held(slot, curves)
     there = {
-        key: next((point.co[1] for point in fcurve.sampled_points), None)
-        for key, fcurve in curves.items()
-        if key[0] in OWN and is_filled_in(fcurve)
+        key: next((point.co[1] for point in fcurve.sampled_points), None) for key, fcurve in _filled(curves).items()
     }
     if held != there:
         # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
@@ -193,18 +197,21 @@ def _held(slot: Slot, curves: Curves) -> dict[tuple[str, int], float]:
 
 
 def _held_for(obj: bpy.types.Object, slot: Slot) -> dict[tuple[str, int], float]:
-    if not (len(obj.animation_data.nla_tracks) and is_replacing(obj, slot)):
+    if not len(obj.animation_data.nla_tracks):
         return {}
-    filled = {
-        path for other in slots_of([obj]) if recorded(other) for path, _ in curves_in(other.channelbag) if path in OWN
-    }
-    owns = {path: getattr(obj.rigid_motion, OWN[path][0])[:] for path in sorted(filled)}
-    return {
-        (path, index): value
-        for path, own in owns.items()
-        if all(map(math.isfinite, own)) and own != tuple(obj.bl_rna.properties[path].default_array)
-        for index, value in enumerate(own)
-    }
+    owns = {path: getattr(obj.rigid_motion, own)[:] for path, (own, _) in OWN.items()}
+    owns = {path: own for path, own in owns.items() if all(map(math.isfinite, own)) and own != _default(path)}
+    # All objects of the file are gone through for the rest: only for the few that have delta transforms of their own.
+    if not (owns and is_replacing(obj, slot)):
+        return {}
+    filled = {path for other in slots_of([obj]) if recorded(other) for path, _ in curves_in(other.channelbag)}
+    return {(path, index): value for path, own in owns.items() if path in filled for index, value in enumerate(own)}
+
+
+@cache
+def _default(path: str) -> tuple[float, ...]:
+    """What a delta transform is where an object has none of its own."""
+    return tuple(bpy.types.Object.bl_rna.properties[path].default_array)
 
 
 def give_back(obj: bpy.types.Object) -> None:

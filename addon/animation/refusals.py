@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import bpy
 import numpy as np
 
 from .fcurves import Keys
-from .slots import GROUP, WIDTHS, Curves, Refused, Slot, Transformable, is_filled_in
+from .slots import GROUP, Curves, Refused, Slot, Transformable, is_filled_in
 from .sources import MODE_IDS, UNKNOWN, Source
 
 MOST_FRAMES = 250_000
@@ -30,9 +29,9 @@ def refuse_what_is_taken(what: Transformable, slot: Slot, curves: Curves) -> Non
             raise Refused(
                 f"{block.name} is linked from another file: make it local first (Object > Relations > Make Local)"
             )
-    transforms, deltas = _paths(what.prefix, what.rotation)
+    deltas = what.deltas.values()
     for driver in what.animated.animation_data.drivers:
-        if driver.data_path in transforms or any(driver.data_path == path for path, _ in deltas):
+        if any(driver.data_path == path for path, _ in (*what.channels.values(), *deltas)):
             raise Refused(f"{what.name}: {_label(driver)} is driven: remove the driver, or bake it to keys")
     for key in deltas:
         fcurve = curves.get(key)
@@ -47,14 +46,6 @@ def refuse_what_is_taken(what: Transformable, slot: Slot, curves: Curves) -> Non
                 f"{what.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
                 f"{prop.replace('_', ' ')} (Object > Apply > Animated Transforms to Deltas does the reverse)"
             )
-
-
-@cache
-def _paths(prefix: str, rotation: str) -> tuple[frozenset[str], tuple[tuple[str, int], ...]]:
-    """The data paths of transforms, and those of delta transforms with each index."""
-    names = ("location", rotation, "scale")
-    deltas = ((f"{prefix}delta_{name}", index) for name in names for index in range(WIDTHS[name]))
-    return frozenset(prefix + name for name in names), tuple(deltas)
 
 
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:

@@ -64,19 +64,28 @@ class Transformable:
     @property
     def properties(self) -> dict[str, str]:
         """Location, rotation and scale, and which property each of them is."""
-        return {LOCATION: "location", ROTATION: self.rotation, SCALE: "scale"}
+        return _properties(self.rotation)
 
     @property
     def channels(self) -> dict[int, tuple[str, int]]:
         """Data path and index of each of its components, by their rows."""
         return _channels(self.prefix, self.rotation)
 
+    @property
+    def deltas(self) -> dict[int, tuple[str, int]]:
+        """The same of its delta transforms."""
+        return _channels(f"{self.prefix}delta_", self.rotation)
+
+
+def _properties(rotation: str) -> dict[str, str]:
+    return {LOCATION: "location", ROTATION: rotation, SCALE: "scale"}
+
 
 @cache
 def _channels(prefix: str, rotation: str) -> dict[int, tuple[str, int]]:
     return {
         ROWS[name].start + index: (prefix + prop, index)
-        for name, prop in ((LOCATION, "location"), (ROTATION, rotation), (SCALE, "scale"))
+        for name, prop in _properties(rotation).items()
         for index in range(WIDTHS[prop])
     }
 

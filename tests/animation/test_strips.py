@@ -150,10 +150,13 @@ def two_strips(
     return obj, deltas, actions, wanted
 
 
+def fcurves_of(action: bpy.types.Action) -> bpy.types.ActionChannelbagFCurves:
+    return action.layers[0].strips[0].channelbags[0].fcurves
+
+
 def held_in(action: bpy.types.Action) -> set[str]:
     """The delta transforms that an Action has channels of."""
-    bag = action.layers[0].strips[0].channelbags[0]
-    return {fcurve.data_path for fcurve in bag.fcurves if fcurve.data_path.startswith("delta_")}
+    return {fcurve.data_path for fcurve in fcurves_of(action) if fcurve.data_path.startswith("delta_")}
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "ZYX"])
@@ -199,29 +202,29 @@ def test_what_a_strip_holds_is_written_once(live_file, monkeypatch):
     monkeypatch.setattr(filling, "_write", lambda *_: pytest.fail("written again"))
     refresh()
     refresh([obj])
-    actions[1].layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1].co_ui.y += 1.0
+    fcurves_of(actions[1])[0].keyframe_points[1].co_ui.y += 1.0
     bpy.context.view_layer.update()
 
 
 def test_delta_keys_of_the_animators_are_left_alone_in_the_other_strip(live_file):
     _, _, actions, _ = two_strips()
-    bag = actions[1].layers[0].strips[0].channelbags[0]
+    fcurves = fcurves_of(actions[1])
     for index in range(3):
-        bag.fcurves.remove(bag.fcurves.find("delta_location", index=index))
-    bag.fcurves.new("delta_location", index=1).keyframe_points.insert(5.0, 0.25)
+        fcurves.remove(fcurves.find("delta_location", index=index))
+    fcurves.new("delta_location", index=1).keyframe_points.insert(5.0, 0.25)
     bpy.context.view_layer.update()
     refresh()
-    (kept,) = [fcurve for fcurve in bag.fcurves if fcurve.data_path == "delta_location"]
+    (kept,) = [fcurve for fcurve in fcurves if fcurve.data_path == "delta_location"]
     assert [tuple(point.co) for point in kept.keyframe_points] == [(5.0, 0.25)]
 
 
 @pytest.mark.parametrize("frame", [np.nan, np.inf, -1e30])
 def test_a_strip_with_damaged_keys_holds_them_too(live_file, frame):
     _, _, actions, _ = two_strips()
-    bag = actions[1].layers[0].strips[0].channelbags[0]
-    for fcurve in [fcurve for fcurve in bag.fcurves if fcurve.data_path.startswith("delta_")]:
-        bag.fcurves.remove(fcurve)
-    for fcurve in bag.fcurves:
+    fcurves = fcurves_of(actions[1])
+    for fcurve in [fcurve for fcurve in fcurves if fcurve.data_path.startswith("delta_")]:
+        fcurves.remove(fcurve)
+    for fcurve in fcurves:
         points = np.empty(2 * len(fcurve.keyframe_points), np.float32)
         fcurve.keyframe_points.foreach_get("co", points)
         points[::2] = frame
@@ -232,9 +235,9 @@ def test_a_strip_with_damaged_keys_holds_them_too(live_file, frame):
 
 def test_above_a_strip_with_a_mode_one_that_keys_something_else_leaves_it_its_in_betweens(live_file):
     obj, _, actions, wanted = two_strips()
-    bag = actions[1].layers[0].strips[0].channelbags[0]
-    bag.fcurves.clear()
-    bag.fcurves.new("color", index=1).keyframe_points.insert(KEYS[0], 0.5)
+    fcurves = fcurves_of(actions[1])
+    fcurves.clear()
+    fcurves.new("color", index=1).keyframe_points.insert(KEYS[0], 0.5)
     obj.animation_data.nla_tracks[1].strips[0].frame_start = 1.0
     bpy.context.view_layer.update()
     refresh()
