@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ..motion.eulers import quaternions_from_eulers
-from .fcurves import cycled
+from .curves import cycled
 from .filling import recorded
 from .mode_keys import active_slot
 from .sources import MODE_IDS, SAME_FRAME, Source

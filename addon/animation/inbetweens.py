@@ -21,7 +21,7 @@ from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
 from ..motion.piecewise import blocks, combine
 from ..motion.poses import beyond
 from ..motion.quaternions import conjugate, multiply
-from .fcurves import Keys, evaluate
+from .curves import Keys, evaluate
 from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
 
 AT_ONCE = 131072

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..motion.eulers import ORDERS, quaternions_from_eulers
-from .fcurves import Keys, read_keys
+from .curves import Keys, read_keys
 from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
 from .slots import MODE_PATH, Curves, Refused, Slot, Transformable
 from .sources import MODE_IDS, PART_OF, REST, ROTATION, ROWS, UNKNOWN, Source

@@ -19,7 +19,7 @@ from ..motion.best_of import least_errors
 from . import live
 from .bake import channel_values
 from .channels import code_of
-from .fcurves import CODE, CONSTANT, LINEAR, Keys
+from .curves import CODE, CONSTANT, LINEAR, Keys
 from .inbetweens import in_betweens
 from .mode_keys import segment_modes, set_mode_in
 from .originals import (

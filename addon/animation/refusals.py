@@ -7,7 +7,7 @@ import math
 import bpy
 import numpy as np
 
-from .fcurves import Keys
+from .curves import Keys
 from .slots import GROUP, Curves, Refused, Slot, Transformable, is_filled_in
 from .sources import MODE_IDS, UNKNOWN, Source
 

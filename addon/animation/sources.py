@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..motion import KEYFRAME_MODES
-from .fcurves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
+from .curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
 
 MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
 """What the values of the mode channel stand for: Blender's own in-betweens, and then the modes in their order."""

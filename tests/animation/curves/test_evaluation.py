@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.animation.fcurves import (
+from addon.animation.curves import (
     BEZIER,
     CONSTANT,
     EASINGS,

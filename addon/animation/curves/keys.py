@@ -1,0 +1,105 @@
+"""F-curves as arrays: their keys, what their codes mean, and their cycles.
+
+Frames and values are Blender's, in its single precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import bpy
+import numpy as np
+
+INTERPOLATIONS = {
+    item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items
+}
+"""From the code of `Keyframe.interpolation` to its name."""
+
+EASINGS = {item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items}
+"""From the code of `Keyframe.easing` to its name."""
+
+CONSTANT, LINEAR, BEZIER, ELASTIC = (
+    {name: code for code, name in INTERPOLATIONS.items()}[name] for name in ("CONSTANT", "LINEAR", "BEZIER", "ELASTIC")
+)
+
+AUTO = {name: code for code, name in EASINGS.items()}["AUTO"]
+
+CODE = np.uint8
+"""The type that Blender keeps codes in: any other takes longer to read."""
+
+KEY_TOLERANCE = float(np.float32(1e-4))
+"""Frames from a key within which Blender takes its value."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """A Cycles modifier. Modes are NONE, REPEAT, REPEAT_OFFSET or MIRROR; a count of 0 is without end."""
+
+    before: str
+    after: str
+    before_count: int
+    after_count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """c F-curves that are keyed together: n keys each, on the same frames, with the same extrapolation and cycles.
+
+    Frames and values are in single precision, codes are `INTERPOLATIONS` and `EASINGS`. What does not bear on the
+    values of the curves is None.
+    """
+
+    points: np.ndarray
+    """Frame and value, shape (c, n, 2)."""
+
+    interpolation: np.ndarray
+    """Codes of the segments that the keys begin, shape (c, n)."""
+
+    left: np.ndarray | None = None
+    """The handles before the keys, frame and value, shape (c, n, 2)."""
+
+    right: np.ndarray | None = None
+    """The handles behind the keys, frame and value, shape (c, n, 2)."""
+
+    easing: np.ndarray | None = None
+    """Codes, shape (c, n)."""
+
+    easing_settings: np.ndarray | None = None
+    """BACK's overshoot, ELASTIC's amplitude and ELASTIC's period in frames, shape (3, c, n)."""
+
+    linear: bool = False
+    """Whether the curves go on at their slope outside of the keys, instead of holding their value."""
+
+    cycles: Cycles | None = None
+
+    is_sound: bool = True
+    """Whether all numbers that were read are finite, and the keys in the order of their frames."""
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Frames of the keys, shape (n,), double precision."""
+        return self.points[0, :, 0].astype(np.float64)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Values of the keys, shape (c, n)."""
+        return self.points[..., 1]
+
+    def only(self, channels: Sequence[int]) -> Keys:
+        """The keys of these channels alone."""
+        points, interpolation, left, right, easing = (
+            None if array is None else array[channels]
+            for array in (self.points, self.interpolation, self.left, self.right, self.easing)
+        )
+        settings = None if self.easing_settings is None else self.easing_settings[:, channels]
+        return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles, self.is_sound)
+
+    @property
+    def raw(self) -> bytes:
+        """All of it as bytes, for a digest that tells whether anything has changed."""
+        arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
+        present = [array for array in arrays if array is not None]
+        header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles};"
+        return b"".join((header.encode(), *(array.tobytes() for array in present)))

@@ -1,0 +1,109 @@
+"""From Blender's F-curves to `Keys`, those of many owners at once."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import bpy
+import numpy as np
+
+from .keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LINEAR, Cycles, Keys
+
+
+def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
+    """The keys of F-curves, and the first Cycles modifier of each that is not muted; none of their other modifiers.
+
+    Parameters
+    ----------
+    fcurves : sequence of sequences of bpy.types.FCurve
+        Those of each owner, with keys: of a sampled curve there are none. Many owners are read quicker at once.
+
+    Returns
+    -------
+    list of lists of (list of int, Keys)
+        For each owner those together that are keyed together: their places in its sequence, and their keys.
+    """
+    batches: dict[tuple, list[tuple]] = {}
+    for owner, curves in enumerate(fcurves):
+        for place, fcurve in enumerate(curves):
+            keys = fcurve.keyframe_points
+            cycles = _read_cycles(fcurve.modifiers) if fcurve.modifiers else None
+            batches.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((owner, place, keys))
+    result: list[list[tuple[list[int], Keys]]] = [[] for _ in fcurves]
+    for (_, extrapolation, cycles), batch in batches.items():
+        owners, places, channels = zip(*batch, strict=True)
+        for rows, keys in _read_batch(owners, channels, extrapolation == "LINEAR", cycles):
+            result[owners[rows[0]]].append(([places[row] for row in rows], keys))
+    for keys_of_owner in result:
+        keys_of_owner.sort(key=lambda pair: pair[0])
+    return result
+
+
+def _read_batch(
+    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None
+) -> Iterator[tuple[list[int], Keys]]:
+    """The keys of channels, from their `keyframe_points` with equally many each: the rows of those keyed together."""
+    points = _read_property("co", channels, np.float32, 2)
+    groups = _keyed_together(owners, points[..., 0])
+    order = [row for rows in groups for row in rows]
+    if order != list(range(len(order))):
+        channels, points = [channels[row] for row in order], points[order]
+    sizes = np.array([len(rows) for rows in groups])
+    bounds = np.concatenate(((0,), np.cumsum(sizes)))
+
+    def any_in_group(of_keys: np.ndarray) -> np.ndarray:
+        return np.logical_or.reduceat(of_keys.any(axis=1), bounds[:-1])
+
+    interpolation = _read_property("interpolation", channels, CODE)
+    _replace_unknown(interpolation, INTERPOLATIONS, CONSTANT)
+    bezier = interpolation == BEZIER
+    eased = any_in_group(~(bezier | (interpolation == LINEAR) | (interpolation == CONSTANT)))
+    curved = any_in_group(bezier) | (eased & linear)
+    rows = np.flatnonzero(curved.repeat(sizes)).tolist()
+    left, right = (_read_property(name, channels, np.float32, 2, rows=rows) for name in ("handle_left", "handle_right"))
+    rows = np.flatnonzero(eased.repeat(sizes)).tolist()
+    easing = _read_property("easing", channels, CODE, rows=rows)
+    _replace_unknown(easing, EASINGS, AUTO)
+    settings = [_read_property(name, channels, np.float32, rows=rows) for name in ("back", "amplitude", "period")]
+    numbers = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
+    sound = ~any_in_group(~np.isfinite(numbers)) & ~any_in_group(~(points[:, 1:, 0] >= points[:, :-1, 0]))
+    slices = itertools.starmap(slice, itertools.pairwise(bounds))
+    for number, (rows, at) in enumerate(zip(groups, slices, strict=True)):
+        handles = (left[at], right[at]) if curved[number] else (None, None)
+        easings = (easing[at], np.stack([values[at] for values in settings])) if eased[number] else (None, None)
+        yield rows, Keys(points[at], interpolation[at], *handles, *easings, linear, cycles, bool(sound[number]))
+
+
+def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
+    """The rows of channels with keys on these frames (c, n), those together of one owner and on the same frames."""
+    raw, width = frames.tobytes(), frames.shape[1] * frames.itemsize
+    groups: dict[tuple[int, bytes], list[int]] = {}
+    for row, owner in enumerate(owners):
+        groups.setdefault((owner, raw[row * width : (row + 1) * width]), []).append(row)
+    return list(groups.values())
+
+
+def _read_property(
+    name: str, channels: Sequence, dtype: type, *width: int, rows: Sequence[int] | None = None
+) -> np.ndarray:
+    """A property of the n keys of each of c channels, (c, n) or (c, n, width); read for these rows, else zero."""
+    values = np.zeros((len(channels), len(channels[0]) * math.prod(width)), dtype)
+    read_all = rows is None or len(rows) == len(channels)
+    pairs = zip(channels, values, strict=True) if read_all else ((channels[row], values[row]) for row in rows)
+    for keys, buffer in pairs:
+        keys.foreach_get(name, buffer)
+    return values.reshape(len(values), -1, *width) if width else values
+
+
+def _replace_unknown(codes: np.ndarray, names: dict[int, str], replacement: int) -> None:
+    """Treat codes without a meaning, in a damaged file, as Blender does. Those with a meaning have no gaps."""
+    codes[(codes < min(names)) | (codes > max(names))] = replacement
+
+
+def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
+    for modifier in modifiers:
+        if modifier.type == "CYCLES" and not modifier.mute:
+            return Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
+    return None

@@ -1,0 +1,99 @@
+"""Bezier segments as cubics, and the parameter at which such a cubic reaches a given time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+NEWTON_TOLERANCE = 1e-5
+"""Last step of Newton's method: the error left is about its square."""
+
+NEWTON_STEPS = 4
+"""How many steps Newton's method takes before bisection helps it."""
+
+BRACKETED_STEPS = 100
+"""More than bisection alone takes to the last bit."""
+
+
+def bezier_cubics(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Bezier curves as cubics, after the correction that keeps frames from running backwards.
+
+    Parameters
+    ----------
+    start, right, left, end : array, shape (k, 2)
+        Key, its handle, the handle of the next key and that key. Single precision: Blender's rounding matters where
+        frames are many and segments short.
+
+    Returns
+    -------
+    array, shape (3, k, 2)
+        Coefficients of t, t^2 and t^3 for frame and value from the first key on.
+    """
+    duration = end[:, :1] - start[:, :1]
+    rises = (one[:, 1] - other[:, 1] for one, other in ((start, end), (right, left), (left, end)))
+    flat = np.logical_and.reduce([np.abs(rise) < np.finfo(np.float32).eps for rise in rises])
+    right, left = _shortened(start, right, duration), _shortened(end, left, duration)
+    cubics = np.stack(
+        (3.0 * (right - start), 3.0 * (start - 2.0 * right + left), end - start + 3.0 * (right - left))
+    ).astype(np.float64)
+    cubics[:, flat, 1] = 0.0
+    return cubics
+
+
+def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.ndarray:
+    """The handle, no longer in time than the segment."""
+    arm = key - handle
+    length = np.abs(arm[:, :1])
+    long = length > duration
+    return np.where(long, key - duration / length * arm, handle) if long.any() else handle
+
+
+def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
+    """The t from 0 to 1 at which the cubic c1 t + c2 t^2 + c3 t^3 is u.
+
+    There is one for every u from 0 to 1: the cubic goes from 0 to 1, and handles no longer than the segment let it turn
+    at most before it leaves 0 for good and after it has reached 1.
+
+    Parameters
+    ----------
+    u : array, shape (m,)
+        Time, 0 to 1.
+    cubics : array, shape (3, m)
+        c1, c2 and c3.
+
+    Returns
+    -------
+    array, shape (m,)
+        t, to about the square of `NEWTON_TOLERANCE`.
+    """
+    c1, c2, c3 = cubics
+    twice, thrice = 2.0 * c2, 3.0 * c3
+    # Newton's method, from the cubic in u that goes through both ends with the slopes that t has there.
+    at_start, at_end = (np.clip(1.0 / slope, 0.0, 3.0) for slope in (c1, c1 + twice + thrice))
+    t = u * (at_start + u * (3.0 - 2.0 * at_start - at_end + u * (at_start + at_end - 2.0)))
+    for _ in range(NEWTON_STEPS):
+        step = (((c3 * t + c2) * t + c1) * t - u) / ((thrice * t + twice) * t + c1)
+        t -= step
+        np.abs(step, out=step)
+        if step.max(initial=0.0) < NEWTON_TOLERANCE:
+            break
+    missed = np.flatnonzero(~((step < NEWTON_TOLERANCE) & (np.abs(t - 0.5) < 0.5 + NEWTON_TOLERANCE)))
+    if len(missed):
+        t[missed] = _solve_bracketed(u[missed], cubics[:, missed])
+    return t
+
+
+def _solve_bracketed(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
+    """As `solve_cubics`, for the few near a vanishing slope: Newton's steps, or bisection where they lead out."""
+    c1, c2, c3 = cubics
+    low, high = np.zeros_like(u), np.ones_like(u)
+    t = np.clip(u, 0.0, 1.0)
+    for _ in range(BRACKETED_STEPS):
+        excess = ((c3 * t + c2) * t + c1) * t - u
+        low, high = np.where(excess < 0.0, t, low), np.where(excess > 0.0, t, high)
+        following = t - excess / ((3.0 * c3 * t + 2.0 * c2) * t + c1)
+        following = np.where((following > low) & (following < high), following, 0.5 * (low + high))
+        following = np.where(excess == 0.0, t, following)
+        if not np.any(np.abs(following - t) > 1e-12):
+            break
+        t = following
+    return t
