@@ -2,7 +2,7 @@
 
 slots       what moves an object, by which F-curves     refusals    why not, and the way out
 reading     what is keyed, from Blender's data          sources     the same as arrays
-curves      F-curves in NumPy, a room of its own
+curves      F-curves in NumPy: keys, cycles, easings, values
 inbetweens  from sources to delta transforms            filling     writing those
 live        refreshing after every edit                 insertion   keys that are inserted in between
 mode_keys   choosing modes                              bake        real keys for every frame

@@ -60,21 +60,21 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
         begin, end = keys.times[[0, -1]].tolist()
         period = end - begin
         inside = times[(times >= begin) & (times <= end)]
-        for mode, count, room, side in (
+        for mode, count, length, side in (
             (keys.cycles.before, keys.cycles.before_count, begin - first, -1.0),
             (keys.cycles.after, keys.cycles.after_count, last - end, 1.0),
         ):
-            if mode == "NONE" or not (0.0 < period < np.inf and room > 0.0) or count < 0:
+            if mode == "NONE" or not (0.0 < period < np.inf and length > 0.0) or count < 0:
                 continue
-            rounds = np.ceil(room / period)
+            rounds = np.ceil(length / period)
             rounds = min(rounds, count) if count else rounds
             if rounds * len(inside) > MAX_COPIES:
                 raise ValueError(f"{rounds:.0f} rounds of {period:g} frames are too many: give Cycles a count")
             number = np.arange(1.0, rounds + 1.0)[:, None]
             mirrored = (number % 2 == 1) & (mode == "MIRROR")
             copies.append((np.where(mirrored, begin + end - inside, inside) + side * number * period).ravel())
-    found = np.unique(np.concatenate(copies))
-    return found[(found >= first) & (found <= last)]
+    copied = np.unique(np.concatenate(copies))
+    return copied[(copied >= first) & (copied <= last)]
 
 
 def fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -99,16 +99,16 @@ def fold(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndar
         distance = folded[outside] - near
         cycle = side * distance / period
         reached = (cycle <= count) | (count == 0)
-        where = np.flatnonzero(outside)[reached]
+        at = np.flatnonzero(outside)[reached]
         distance, cycle = distance[reached], cycle[reached]
-        rest = np.fmod(distance, period)
+        remainder = np.fmod(distance, period)
         odd = (np.trunc(cycle) % 2 == 1) & (mode == "MIRROR")
         reverse = (np.trunc(cycle.astype(np.float64) + 1.0) % 2 == 1) & (mode == "MIRROR")
-        time = np.where(reverse, near - rest, begin + rest)
-        time = np.where(rest == 0.0, np.where(odd, far, near), time)
-        folded[where] = np.where(time < begin, time + period, time)
-        backwards[where] = reverse
+        time = np.where(reverse, near - remainder, begin + remainder)
+        time = np.where(remainder == 0.0, np.where(odd, far, near), time)
+        folded[at] = np.where(time < begin, time + period, time)
+        backwards[at] = reverse
         if mode == "REPEAT_OFFSET":
-            whole = np.floor if side < 0 else np.ceil
-            rounds[where] = whole(distance / period)
+            away_from_keys = np.floor if side < 0 else np.ceil
+            rounds[at] = away_from_keys(distance / period)
     return folded.astype(np.float64), backwards, rounds

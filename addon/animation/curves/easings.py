@@ -35,7 +35,7 @@ def ease(interpolation: str, easing: str, u: np.ndarray, back: np.ndarray | floa
     if interpolation == "BACK" and easing == "EASE_IN_OUT":
         back = 1.525 * back
     ease_in = EASE_IN[interpolation]
-    return _turned(lambda time: ease_in(time, back), easing, u, 1.0)
+    return _directed(lambda time: ease_in(time, back), easing, u, 1.0)
 
 
 def elastic(
@@ -82,13 +82,13 @@ def elastic(
             moved = swing * np.exp2(10.0 * left) * np.sin((lag - left) * (2.0 * np.pi / period))
         return np.where(time == 0.0, 0.0, size * moved)
 
-    return _turned(ease_in, "EASE_OUT" if easing == "AUTO" else easing, u, change)
+    return _directed(ease_in, "EASE_OUT" if easing == "AUTO" else easing, u, change)
 
 
-def _turned(
+def _directed(
     ease_in: Callable[[np.ndarray], np.ndarray], easing: str, u: np.ndarray, change: np.ndarray | float
 ) -> np.ndarray:
-    """An easing in from 0 to `change`, made one out or both."""
+    """What eases in from 0 to `change`, made to ease in, out, or in and out."""
     if easing == "EASE_IN":
         return ease_in(u)
     if easing == "EASE_OUT":

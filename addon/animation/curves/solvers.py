@@ -47,6 +47,7 @@ def _shortened(key: np.ndarray, handle: np.ndarray, duration: np.ndarray) -> np.
     return np.where(long, key - duration / length * arm, handle) if long.any() else handle
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def solve_cubics(u: np.ndarray, cubics: np.ndarray) -> np.ndarray:
     """The t from 0 to 1 at which the cubic c1 t + c2 t^2 + c3 t^3 is u.
 

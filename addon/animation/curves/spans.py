@@ -71,7 +71,9 @@ class Spans:
     """Whether ELASTIC is worked out for a change of 1, see `evaluate`."""
 
     @classmethod
+    @np.errstate(all="ignore")
     def of(cls, curves: Sequence[Keys], unit_elastic: bool) -> Spans:
+        """The spans of all curves of these keys, in their order."""
         curves = [keys if len(keys.times) else _without_keys(len(keys.points)) for keys in curves]
         channels = [len(keys.points) for keys in curves]
         first_span = np.concatenate(((0,), np.cumsum(np.repeat([len(keys.times) + 1 for keys in curves], channels))))
@@ -80,13 +82,7 @@ class Spans:
         key = np.arange(first_span[-1]) - np.repeat(np.arange(1, len(first_span)), np.diff(first_span))
         key[before] += 1
 
-        points = np.concatenate([keys.points.reshape(-1, 2) for keys in curves]).take(key, axis=0)
-        left, right = (
-            np.concatenate([(keys.points if side is None else side).reshape(-1, 2) for keys, side in handles])
-            for handles in ([(keys, keys.left) for keys in curves], [(keys, keys.right) for keys in curves])
-        )
-        left, right = left.take(key, axis=0), right.take(key, axis=0)
-        codes = np.concatenate([keys.interpolation.ravel() for keys in curves]).take(key)
+        points, left, right, codes = (array.take(key, axis=0) for array in _concatenated(curves))
         next_points, next_left = np.roll(points, -1, axis=0), np.roll(left, -1, axis=0)
         duration = next_points[:, 0] - points[:, 0]
         crowded = ~(duration > 2.1 * KEY_TOLERANCE)
@@ -105,9 +101,10 @@ class Spans:
             polynomials[1:, curved] = cubics[..., 1]
         linear = np.flatnonzero(np.repeat([keys.linear for keys in curves], channels))
         if len(linear):
-            for outside, inwards, handles in ((before[linear], 2, left), (after[linear], -1, right)):
-                # The neighbour of an only key is that key itself.
-                neighbours = np.clip(outside + inwards, before[linear] + 1, after[linear])
+            first, last = before[linear], after[linear]
+            # The neighbour of an only key is that key itself.
+            second, last_but_one = np.minimum(first + 2, last), np.maximum(last - 1, first + 1)
+            for outside, neighbours, handles in ((first, second, left), (last, last_but_one, right)):
                 slopes = _slopes(points[outside], points[neighbours], handles[outside], codes[outside])
                 polynomials[1, outside] = slopes
 
@@ -213,6 +210,17 @@ class Spans:
 def _without_keys(channels: int) -> Keys:
     """Stands for curves without keys, which are 0 everywhere in Blender."""
     return Keys(np.zeros((channels, 1, 2), np.float32), np.full((channels, 1), CONSTANT, CODE))
+
+
+def _concatenated(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points, left and right handles (n, 2) and codes (n,) of the keys of all curves; points where handles are None."""
+    points = [keys.points.reshape(-1, 2) for keys in curves]
+    left, right = (
+        [on_key if handles is None else handles.reshape(-1, 2) for on_key, handles in zip(points, side, strict=True)]
+        for side in ([keys.left for keys in curves], [keys.right for keys in curves])
+    )
+    codes = [keys.interpolation.ravel() for keys in curves]
+    return tuple(np.concatenate(arrays) for arrays in (points, left, right, codes))
 
 
 def _easings(curves: Sequence[Keys]) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Easings by what is known of them without Blender; `test_fcurves.py` compares them with Blender's own."""
+"""Easings by what is known of them without Blender; `test_evaluation.py` compares them with Blender's own."""
 
 from __future__ import annotations
 

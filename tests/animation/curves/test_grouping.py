@@ -1,0 +1,166 @@
+"""Curves that share the work: the values of each are those that it has alone."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from addon.animation.curves import EASINGS, Cycles, Keys, evaluate
+from addon.animation.curves.grouping import BLOCK, Group, blocks, group_by_timing
+from addon.animation.curves.spans import Spans
+from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.tuples(curves(), st.none() | all_cycles), min_size=2, max_size=8), st.booleans())
+def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic):
+    together = [dataclasses.replace(keys, cycles=cycles) for keys, cycles in drawn]
+    together += [dataclasses.replace(keys, points=keys.points * (1, -2)) for keys in together]
+    frames = frames_about(together[0])
+    times = [frames, frames.copy(), frames[::3]] * len(together)
+    found = evaluate(together, times[: len(together)], unit_elastic=unit_elastic)
+    for keys, own_times, (own,) in zip(together, times, found, strict=False):
+        alone = evaluate_one(keys, own_times, unit_elastic=unit_elastic)
+        size = max(np.abs(alone).max(), *(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right)))
+        np.testing.assert_allclose(own, alone, rtol=0.0, atol=1e-6 * size)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(curves(), min_size=2, max_size=5), st.none() | all_cycles, st.booleans())
+def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles, unit_elastic):
+    count = min(len(keys.times) for keys in drawn)
+    fewer = {name: lambda rows: rows[:, :count] for name in ("points", "interpolation", "left", "right", "easing")}
+    fewer["easing_settings"] = lambda rows: rows[..., :count]
+    alone = []
+    for keys in drawn:
+        parts = {name: few(getattr(keys, name)) for name, few in fewer.items()}
+        shift = drawn[0].points[:, :count, :1] - parts["points"][..., :1]
+        # On the frames of the first; handles stay where they are, and keep timings apart.
+        parts["points"] = parts["points"] + np.concatenate((shift, np.zeros_like(shift)), axis=2)
+        alone.append(dataclasses.replace(keys, **parts, linear=drawn[0].linear, cycles=cycles))
+    frames = frames_about(alone[0])
+    (found,) = evaluate([joined(alone)], [frames], unit_elastic=unit_elastic)
+    for keys, own in zip(alone, found, strict=True):
+        expected = evaluate_one(keys, frames, unit_elastic=unit_elastic)
+        size = max(np.abs(rows[..., 1]).max() for rows in (keys.points, keys.left, keys.right))
+        np.testing.assert_allclose(own, expected, rtol=1e-9, atol=1e-6 * size)
+
+
+def test_many_curves_on_many_frames_have_the_values_that_each_has_alone():
+    """More than are worked on at once."""
+    random = np.random.default_rng(8)
+    points = random.normal(size=(40, 6))
+    together = [
+        keys_of(
+            np.arange(0, 120, 20) + i % 3,
+            row,
+            "BEZIER",
+            left=np.column_stack((np.arange(0, 120, 20) + i % 3 - 7, row)),
+            right=np.column_stack((np.arange(0, 120, 20) + i % 3 + 5, row + 1.0)),
+        )
+        for i, row in enumerate(points)
+    ]
+    frames = np.linspace(-5.0, 110.0, 6000)
+    for keys, (own,) in zip(together, evaluate(together, [frames] * 40), strict=True):
+        np.testing.assert_allclose(own, evaluate_one(keys, frames), rtol=0.0, atol=1e-9)
+
+
+@settings(deadline=None, max_examples=50)
+@given(curves(), st.none() | all_cycles)
+def test_the_order_of_frames_does_not_matter(keys, cycles):
+    keys = dataclasses.replace(keys, cycles=cycles)
+    frames = frames_about(keys)
+    order = np.random.default_rng(1).permutation(len(frames))
+    rising, mixed = evaluate_one(keys, frames), evaluate_one(keys, frames[order])
+    np.testing.assert_array_equal(mixed, rising[order])
+
+
+@pytest.mark.parametrize("easing", EASINGS)
+def test_the_elastic_timing_of_channels_is_their_own_or_that_of_a_curve_from_0_to_1(easing):
+    ways = (8.0, -3.0, 1.0)
+    settings = {"easing": np.full(2, easing, np.int32), "easing_settings": ((0, 0), (1.5, 1.5), (7, 7))}
+    together = [keys_of((1, 21), (0, way), "ELASTIC", **settings) for way in ways]
+    frames = np.arange(1.0, 21.5, 0.25)
+    alone = [evaluate_one(keys, frames) for keys in together]
+    np.testing.assert_array_equal(np.concatenate(evaluate(together, [frames] * 3)), alone)
+    np.testing.assert_array_equal(evaluate([joined(together)], [frames])[0], alone)
+    unit = np.concatenate(evaluate(together, [frames] * 3, unit_elastic=True))
+    np.testing.assert_allclose(unit, np.multiply.outer(ways, alone[2]), rtol=0.0, atol=1e-12)
+    assert not np.allclose(unit[:2], alone[:2])
+
+
+def groups_of(curves: Sequence[Keys], times: Sequence[np.ndarray]) -> list[Group]:
+    return list(group_by_timing(curves, times, Spans.of(curves, unit_elastic=False)))
+
+
+def channels_with(frames: Sequence[float], interpolation: str = "LINEAR", **others: object) -> Keys:
+    """Seven channels keyed together."""
+    return joined([keys_of(frames, np.arange(len(frames)) * row, interpolation, **others) for row in range(7)])
+
+
+def test_curves_with_the_same_timing_on_the_same_frames_are_one_group():
+    frames = np.arange(20.0)
+    curves = [channels_with((1, 5, 9)), channels_with((2, 5, 9)), channels_with((1, 5, 9))]
+    groups = groups_of(curves, [frames, frames, frames.copy()])
+    assert [[number for number, _ in group.members] for group in groups] == [[0, 2], [1]]
+    assert [group.curves.tolist() for group in groups] == [[*range(7), *range(14, 21)], [*range(7, 14)]]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        channels_with((1, 5, 9), "CONSTANT"),
+        channels_with((1, 5, 9), cycles=Cycles("REPEAT", "NONE", 0, 0)),
+        channels_with((1, 5, 9), left=((0, 0), (4, 0), (7, 0))),
+    ],
+    ids=["interpolation", "cycles", "handles"],
+)
+def test_curves_that_differ_in_what_timing_depends_on_are_groups_apart(other):
+    assert len(groups_of([channels_with((1, 5, 9)), other], [np.arange(20.0)] * 2)) == 2
+
+
+def test_values_are_no_part_of_the_timing():
+    curves = [
+        channels_with((1, 5)),
+        dataclasses.replace(channels_with((1, 5)), points=np.float32([[[1, 8], [5, 9]]] * 7)),
+    ]
+    assert len(groups_of(curves, [np.arange(9.0)] * 2)) == 1
+
+
+def test_elastic_curves_have_a_timing_each_unless_their_change_is_taken_as_1():
+    settings = {"easing": np.zeros(2, np.int32), "easing_settings": ((0, 0), (1.5, 1.5), (7, 7))}
+    curves = [keys_of((1, 5), (0, value), "ELASTIC", **settings) for value in (1.0, 2.0)]
+    for unit_elastic, count in ((False, 2), (True, 1)):
+        spans = Spans.of(curves, unit_elastic)
+        assert len(list(group_by_timing(curves, [np.arange(9.0)] * 2, spans))) == count
+
+
+def test_a_group_tells_how_many_frames_each_span_has():
+    (group,) = groups_of([keys_of((1, 5, 9), (0, 1, 2))], [np.arange(12.0)])
+    assert dict(zip(group.spans.tolist(), group.counts.tolist(), strict=True)) == {0: 1, 1: 4, 2: 4, 3: 3}
+
+
+def test_blocks_hold_every_group_once_and_those_of_equally_many_curves_together():
+    frames = np.arange(BLOCK / 4)
+    curves = [channels_with((1, last)) for last in range(5, 14)] + [keys_of((1, last), (0, 1)) for last in (20, 21, 22)]
+    groups = groups_of(curves, [frames] * len(curves))
+    worked_on = list(blocks(groups))
+    assert [len(block) for block in worked_on] == [3, 4, 4, 1]
+    assert all(len({len(group.curves) for group in block}) == 1 for block in worked_on)
+    assert {id(group) for block in worked_on for group in block} == {id(group) for group in groups}
+
+
+@pytest.mark.parametrize("size", [1, 7, 10, 1000])
+def test_chunks_are_the_curves_of_a_group_in_their_order(size):
+    cycles = Cycles("NONE", "REPEAT_OFFSET", 0, 0)
+    (group,) = groups_of([channels_with((1, 5, 9), cycles=cycles) for _ in range(5)], [np.arange(20.0)] * 5)
+    chunks = list(group.chunks(size))
+    assert [row for chunk, _ in chunks for row in range(chunk.start, chunk.stop)] == list(range(35))
+    assert [member for _, part in chunks for member in part.members] == group.members
+    np.testing.assert_array_equal(np.concatenate([part.curves for _, part in chunks]), group.curves)
+    np.testing.assert_array_equal(np.concatenate([part.offsets for _, part in chunks]), group.offsets)

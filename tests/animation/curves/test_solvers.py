@@ -1,0 +1,84 @@
+"""Bezier segments as cubics, and the parameter that belongs to a time, by what is known of them without Blender."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from addon.animation.curves.solvers import bezier_cubics, solve_cubics
+
+T = np.linspace(0.0, 1.0, 1001)
+
+lengths = st.integers(0, 64).map(lambda number: number / 64.0)
+
+
+def cubics_from(handles: np.ndarray) -> np.ndarray:
+    """Cubics (3, k) from 0 to 1 whose handles (k, 2) are so long, as a share of the segment."""
+    first, second = np.asarray(handles, np.float64).T
+    return np.stack((3.0 * first, 3.0 * (1.0 - second - 2.0 * first), 3.0 * first + 3.0 * second - 2.0))
+
+
+def time_of(cubic: np.ndarray, t: np.ndarray) -> np.ndarray:
+    return ((cubic[2] * t + cubic[1]) * t + cubic[0]) * t
+
+
+def de_casteljau(points: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """The Bezier curve of points (4, 2) by halving lines, shape (m, 2)."""
+    points = points[:, None, :]
+    while len(points) > 1:
+        points = points[:-1] + (points[1:] - points[:-1]) * t[:, None]
+    return points[0]
+
+
+@given(lengths, lengths)
+def test_solving_finds_the_parameter_of_every_time(first, second):
+    cubic = np.repeat(cubics_from([(first, second)]), len(T), axis=1)
+    t = solve_cubics(T, cubic)
+    assert np.all((t > -1e-5) & (t < 1.0 + 1e-5))
+    np.testing.assert_allclose(time_of(cubic, t), T, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "handles", [(1.0, 1.0), (0.0, 0.0), (0.0, 1.0), (1.0, 0.0)], ids=["level in the middle", "steep", "left", "right"]
+)
+def test_times_at_which_the_curve_is_level_are_solved_too(handles):
+    u = np.concatenate((T, 0.5 + np.array((-1e-3, -1e-6, -1e-9, 0.0, 1e-9, 1e-6, 1e-3))))
+    cubic = np.repeat(cubics_from([handles]), len(u), axis=1)
+    np.testing.assert_allclose(time_of(cubic, solve_cubics(u, cubic)), u, rtol=0.0, atol=1e-9)
+
+
+def test_each_time_may_have_its_own_cubic():
+    handles = np.random.default_rng(3).uniform(size=(len(T), 2))
+    cubics = cubics_from(handles)
+    alone = [solve_cubics(T[[i]], cubics[:, [i]])[0] for i in range(len(T))]
+    np.testing.assert_allclose(solve_cubics(T, cubics), alone, rtol=0.0, atol=1e-9)
+
+
+def test_no_times_have_no_parameters():
+    assert solve_cubics(np.empty(0), np.empty((3, 0))).shape == (0,)
+
+
+def test_a_cubic_is_its_bezier_curve():
+    points = np.array(((1.0, 2.0), (3.0, 5.0), (7.0, -4.0), (9.0, 1.0)), np.float32)
+    c1, c2, c3 = bezier_cubics(*points[:, None, :])
+    found = points[0] + ((c3 * T[:, None] + c2) * T[:, None] + c1) * T[:, None]
+    np.testing.assert_allclose(found, de_casteljau(points.astype(np.float64), T), rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("reach", [5.0, 40.0])
+def test_handles_longer_than_their_segment_are_shortened_in_their_direction(reach):
+    """Then time does not run backwards."""
+    start, end = np.float32([[0.0, 0.0]]), np.float32([[4.0, 1.0]])
+    right, left = np.float32([[reach, 2.0 * reach]]), np.float32([[4.0 - reach, 1.0 - reach]])
+    cubics = bezier_cubics(start, right, left, end)
+    np.testing.assert_allclose(
+        cubics, bezier_cubics(start, np.float32([[4, 8]]), np.float32([[0, -3]]), end), atol=1e-5
+    )
+    assert np.all(np.diff(time_of(cubics[:, 0, 0], T)) >= -1e-9)
+
+
+def test_a_segment_that_is_level_but_for_rounding_is_level():
+    level = np.float32([[0.0, 1e-8]]), np.float32([[1.0, 3e-8]]), np.float32([[2.0, 0.0]]), np.float32([[3.0, 2e-8]])
+    assert not np.any(bezier_cubics(*level)[..., 1])
