@@ -16,7 +16,7 @@ tests compare with it. It is written again because Blender offers its own in two
   Action. How much of its chord an object has covered is worked out from channels at many sub-frames, on every edit,
   and the animator's curves must not be touched for that.
 
-For 100 objects of 7 channels with 10 Bezier keys each, on 1000 frames (Blender 5.2.3, one core): 285 ms by `evaluate`,
+For 100 objects of 7 channels with 10 Bezier keys each, on 1000 frames (Blender 5.2.3, two cores): 285 ms by `evaluate`,
 31 ms by `convert_to_samples` on copies, and 9 ms here, reading the keys included.
 """
 
