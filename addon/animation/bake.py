@@ -12,14 +12,15 @@ import numpy as np
 from ..motion import Poses
 from ..motion.eulers import ORDERS, eulers_from_quaternions
 from ..motion.quaternions import align_signs, conjugate, multiply
-from . import live
-from .channels import code_of, write_channel
+from .acting import Readings, Targets, act_on
+from .channels import add_cycles, code_of, write_channel
 from .inbetweens import InBetweens, in_betweens
-from .mode_keys import set_mode_in
+from .mode_keys import set_mode_in, set_whole
 from .originals import BAKED, has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
-from .reading import read
-from .slots import Refused, Slot, Transformable, curves_in, slots_of
+from .refusals import refuse_numbers
+from .slots import SlotTransform
 from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, Source
+from .transforms import Refused, Transform, transform_of
 
 FIELDS = {
     "co": (2, np.float32),
@@ -73,20 +74,27 @@ def _rotation(obj: bpy.types.Object, quaternions: np.ndarray) -> tuple[str, np.n
 
 
 def bake(
-    obj: bpy.types.Object, *, step: float = 1.0, first: float | None = None, last: float | None = None
+    targets: Targets,
+    *,
+    step: float = 1.0,
+    first: float | None = None,
+    last: float | None = None,
+    refused: list[Refused] | None = None,
 ) -> tuple[float, float]:
-    """Put the in-betweens of an object on its own channels, as real keys.
+    """Put in-betweens on the channels that they are between, as real keys.
 
     The animator's keys stay where they are; the others are of type GENERATED, and straight lines run between all of
-    them. The object gets a copy of its Action for it. The original stays in the file, for `unbake`.
+    them. Every target gets a copy of its Action for it. The original stays in the file, for `unbake`.
 
     Parameters
     ----------
-    obj : bpy.types.Object
+    targets : bpy.types.Object, or several of them
     step : float
         Frames from key to key, counted from the first. The animator's own keys are kept whatever the step.
     first, last : float, optional
         The frames to bake, widened to whole segments. From the first key to the last, otherwise.
+    refused : list, optional
+        Takes the refusals, and all other targets are baked.
 
     Returns
     -------
@@ -96,49 +104,85 @@ def bake(
     Raises
     ------
     Refused
-        Where there is nothing to bake, or no way. Nothing is changed then.
+        Where there is nothing to bake of a target, or no way, and there is no list to take that. Nothing is changed
+        then.
     """
     if not step > 0.0:
-        raise Refused(f"{obj.name}: the step between baked keys has to be above zero, not {step}")
-    refuse_tweak_mode(obj)
-    readings = [(slot, read(slot, curves_in(slot.channelbag))) for slot in slots_of([obj])]
-    readings = [(slot, source) for slot, source in readings if source.is_live]
-    if not readings:
-        raise Refused(f"{obj.name} has no rigid in-betweens to bake: choose a mode for its keys first")
-    ranges = [_widened(obj, source, first, last) for _, source in readings]
-    with live.paused():
-        for (slot, source), (begin, end) in zip(readings, ranges, strict=True):
-            _bake_slot(obj, slot, source, _frames(source, begin, end, step))
-    live.refresh([obj])
-    return min(begin for begin, _ in ranges), max(end for _, end in ranges)
+        raise Refused(f"the step between baked keys has to be above zero, not {step}")
+
+    def plan(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source, np.ndarray]]:
+        refuse_tweak_mode(transform)
+        live = live_sources(transform, readings)
+        if not live:
+            raise Refused(f"{transform.name} has no rigid in-betweens to bake: choose a mode for its keys first")
+        return [
+            (place, source, _frames(source, *_widened(transform, source, first, last), step)) for place, source in live
+        ]
+
+    def act(transform: Transform, planned: list[tuple[SlotTransform, Source, np.ndarray]]) -> tuple[float, float]:
+        for place, source, frames in planned:
+            _bake_place(transform, place, source, frames)
+        return (
+            min(float(frames[0]) for *_, frames in planned),
+            max(float(frames[-1]) for *_, frames in planned),
+        )
+
+    ranges = act_on(targets, plan, act, refused).values()
+    return min((begin for begin, _ in ranges), default=0.0), max((end for _, end in ranges), default=0.0)
 
 
-def unbake(obj: bpy.types.Object) -> None:
-    """Give an object the Actions back that it had before it was baked, to the last handle.
+def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Give the Actions back that there were before baking, to the last handle.
+
+    Parameters
+    ----------
+    targets : bpy.types.Object, or several of them
+    refused : list, optional
+        Takes the refusals, and all other targets are un-baked.
 
     Raises
     ------
     Refused
-        Where it is not baked, or its Actions cannot be exchanged. Nothing is changed then.
+        Where a target is not baked, or its Actions cannot be exchanged, and there is no list to take that. Nothing is
+        changed then.
     """
-    refuse_without_original(obj, BAKED)
-    refuse_tweak_mode(obj)
-    put_back(obj, BAKED)
+    go_back(targets, BAKED, refused)
 
 
-def is_baked(obj: bpy.types.Object) -> bool:
-    """Whether an object moves by an Action with baked keys, and its original is still in the file."""
-    return has_original(obj, BAKED)
+def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
+    """Give targets their original Actions back."""
+
+    def plan(transform: Transform, _readings: Readings) -> None:
+        refuse_without_original(transform, kind)
+        refuse_tweak_mode(transform)
+
+    act_on(targets, plan, lambda transform, _: put_back(transform, kind), refused)
 
 
-def _widened(obj: bpy.types.Object, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
+def is_baked(target: bpy.types.Object | Transform) -> bool:
+    """Whether something moves by an Action with baked keys, and its original is still in the file."""
+    return has_original(transform_of(target), BAKED)
+
+
+def live_sources(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
+    """What there is of a transform that a mode moves. `Refused` where one of its slots cannot be read."""
+    for _, source in readings:
+        if isinstance(source, Refused):
+            raise source
+        refuse_numbers(transform.name, source)
+    return [(place, source) for place, source in readings if source.is_live]
+
+
+def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
     """The range from key to key that has the frames from first to last in it."""
     keys = source.key_frames
-    if source.span is not None:
-        # What goes on outside of the keys is baked as far as it is seen, and all of it: cycles end where keys are.
-        return tuple(map(float, source.frame_range))
+    if source.cyclic is not None:
+        # Cycles go on from the outermost keys. Where these are no round for all channels, what is seen is baked.
+        return source.keyed_range if source.repeats else tuple(map(float, source.seen_range))
     if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
-        raise Refused(f"{obj.name} has its keys from frame {keys[0]:g} to {keys[-1]:g}: none of them is in that range")
+        raise Refused(
+            f"{transform.name} has its keys from frame {keys[0]:g} to {keys[-1]:g}: none of them is in that range"
+        )
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     return float(keys[np.clip(begin, 0, len(keys) - 2)]), float(keys[np.clip(end, 1, len(keys) - 1)])
@@ -155,20 +199,27 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
     )
 
 
-def _bake_slot(obj: bpy.types.Object, slot: Slot, source: Source, frames: np.ndarray) -> None:
+def _bake_place(transform: Transform, place: SlotTransform, source: Source, frames: np.ndarray) -> None:
     motion = in_betweens(source, frames)
-    copy = move_by_copy(obj, slot, BAKED)
-    curves = curves_in(copy.channelbag)
-    for path, values in channel_values(Transformable.of(obj), source, motion).items():
+    copy = move_by_copy(transform, place, BAKED)
+    fcurves = copy.slot.channelbag.fcurves
+    cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
+    for path, values in channel_values(transform, source, motion).items():
         for index, column in enumerate(values.T):
-            fcurve = curves.get((path, index)) or copy.channelbag.fcurves.new(path, index=index)
+            fcurve = copy.curves.get((path, index)) or fcurves.new(path, index=index)
             _bake_channel(fcurve, frames, column)
-    set_mode_in(copy, "BLENDER", frames[:-1])
+            if cycles is not None:
+                add_cycles(fcurve, cycles)
+    begin, end = source.keyed_range
+    if frames[0] <= begin + SAME_FRAME and frames[-1] >= end - SAME_FRAME:
+        set_whole(copy, "BLENDER")
+    else:
+        set_mode_in(copy.read_again(), "BLENDER", frames[:-1])
 
 
-def channel_values(what: Transformable, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
+def channel_values(transform: Transform, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
     """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
-    own, poses, channels = source.own, motion.wanted, {}
+    own, poses, channels = source.original, motion.wanted, {}
     first = source.values_at(motion.frames[:1])[:, 0]
     if LOCATION in source.keyed:
         channels["location"] = poses.positions - own[:3]
@@ -176,10 +227,10 @@ def channel_values(what: Transformable, source: Source, motion: InBetweens) -> d
         # In the sign and the turn that the animator's first key has.
         quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))
         if source.order is None:
-            channels[what.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
+            channels[transform.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
         else:
             angles = eulers_from_quaternions(quaternions, source.order)
-            channels[what.rotation] = _beginning_near(first[3:6], angles, source.order)
+            channels[transform.rotation] = _beginning_near(first[3:6], angles, source.order)
     if poses.scales is not None and own[7:].mean() != 0.0:
         # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
         segments = np.searchsorted(source.key_frames, motion.frames, side="right") - 1
@@ -193,10 +244,10 @@ def channel_values(what: Transformable, source: Source, motion: InBetweens) -> d
         (-1, keys[-1] > motion.frames[-1] + SAME_FRAME),
     ):
         if goes_on:
-            for name, prop in what.properties.items():
+            for name, prop in transform.properties.items():
                 if prop in channels:
                     channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
-    return {what.prefix + prop: values for prop, values in channels.items()}
+    return {transform.prefix + prop: values for prop, values in channels.items()}
 
 
 def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:
@@ -205,8 +256,8 @@ def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.nda
     middle = "XYZ".index(order[1])
     others = angles + np.pi
     others[:, middle] = np.pi - angles[:, middle]
-    near = [some + 2.0 * np.pi * np.rint((first - some[0]) / (2.0 * np.pi)) for some in (angles, others)]
-    return min(near, key=lambda some: float(np.abs(some[0] - first).sum()))
+    near = [turned + 2.0 * np.pi * np.rint((first - turned[0]) / (2.0 * np.pi)) for turned in (angles, others)]
+    return min(near, key=lambda turned: float(np.abs(turned[0] - first).sum()))
 
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
@@ -216,6 +267,7 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     for name, numbers in old.items():
         keys.foreach_get(name, numbers.ravel())
     at = old["co"][:, 0]
+    slopes = _slopes_outside(fcurve)
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
     new = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in FIELDS.items()}
     own = np.flatnonzero(~(before | behind))
@@ -237,6 +289,8 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     new["co"] = points
     for name in ("handle_left_type", "handle_right_type"):
         new[name][[0, -1]] = code_of(name, "FREE")
+    if slopes is not None:
+        _keep_slopes(new, slopes, first=not before.any(), last=not behind.any())
     keys.clear()
     keys.add(int(before.sum() + len(frames) + behind.sum()))
     for name, numbers in new.items():
@@ -244,3 +298,29 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     for modifier in list(fcurve.modifiers):
         fcurve.modifiers.remove(modifier)
     fcurve.update()
+
+
+def _slopes_outside(fcurve: bpy.types.FCurve) -> tuple[float, float] | None:
+    """What a channel that goes on at its slope changes by in a frame, before its keys and behind them."""
+    if fcurve.extrapolation != "LINEAR" or not fcurve.keyframe_points or fcurve.modifiers:
+        return None
+    first, last = fcurve.range()
+    return (
+        fcurve.evaluate(first) - fcurve.evaluate(first - 1.0),
+        fcurve.evaluate(last + 1.0) - fcurve.evaluate(last),
+    )
+
+
+def _keep_slopes(keys: dict[str, np.ndarray], slopes: tuple[float, float], *, first: bool, last: bool) -> None:
+    """Let the outermost keys go on at these slopes outside, by their handles; the segments inside stay straight."""
+    points, bezier, free = keys["co"], code_of("interpolation", "BEZIER"), code_of("handle_left_type", "FREE")
+    if first:
+        keys["interpolation"][0] = bezier
+        keys["handle_left"][0] = points[0] - (1.0, slopes[0])
+        keys["handle_right"][0] = points[0] + (points[1] - points[0]) / 3.0
+        keys["handle_left"][1] = points[1] - (points[1] - points[0]) / 3.0
+        for name in ("handle_left_type", "handle_right_type"):
+            keys[name][:2] = free
+    if last:
+        keys["interpolation"][-1] = bezier
+        keys["handle_right"][-1] = points[-1] + (1.0, slopes[1])

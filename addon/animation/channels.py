@@ -11,6 +11,7 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..motion import Poses
+from .curves import Cycles
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
@@ -58,21 +59,59 @@ def write_channel(
     """
     channelbag = channelbag_of(animated)
     fcurves = channelbag.fcurves
-    points = np.empty((len(frames), 2), dtype=np.float32)
-    points[:, 0] = frames
     for index, column in enumerate(np.asarray(values).reshape(len(frames), -1).T):
         if (old := fcurves.find(data_path, index=index)) is not None:
             fcurves.remove(old)
         fcurve = fcurves.new(data_path, index=index)
         if group:
             fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
-        points[:, 1] = column
-        keys = fcurve.keyframe_points
-        keys.add(len(frames))
-        keys.foreach_set("co", points.ravel())
-        for name, value in (("interpolation", interpolation), ("type", key_type)):
-            keys.foreach_set(name, np.full(len(frames), code_of(name, value), dtype=np.int32))
-        fcurve.update()
+        replace_keys(fcurve, frames, column, interpolation=interpolation, key_type=key_type)
+
+
+def replace_keys(
+    fcurve: bpy.types.FCurve,
+    frames: np.ndarray,
+    values: np.ndarray,
+    *,
+    interpolation: str = "LINEAR",
+    key_type: str = "KEYFRAME",
+    handle_type: str | None = None,
+    selected: np.ndarray | None = None,
+) -> None:
+    """Give an F-curve these keys in place of those it has.
+
+    Parameters
+    ----------
+    fcurve : bpy.types.FCurve
+    frames, values : array, shape (n,)
+        Frames rise. They need not be whole.
+    interpolation, key_type, handle_type : str
+        What every key gets; the names are those of `bpy.types.Keyframe`. Handles are Blender's default without.
+    selected : array of bool, shape (n,), optional
+        Which keys are selected; Blender's default, otherwise.
+    """
+    points = np.empty((len(frames), 2), dtype=np.float32)
+    points[:, 0], points[:, 1] = frames, values
+    keys = fcurve.keyframe_points
+    keys.clear()
+    keys.add(len(frames))
+    keys.foreach_set("co", points.ravel())
+    codes = {"interpolation": interpolation, "type": key_type}
+    if handle_type is not None:
+        codes |= {"handle_left_type": handle_type, "handle_right_type": handle_type}
+    for name, value in codes.items():
+        keys.foreach_set(name, np.full(len(frames), code_of(name, value), dtype=np.int32))
+    if selected is not None:
+        for part in ("select_control_point", "select_left_handle", "select_right_handle"):
+            keys.foreach_set(part, selected)
+    fcurve.update()
+
+
+def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:
+    """Give an F-curve a Cycles modifier like this."""
+    modifier = fcurve.modifiers.new("CYCLES")
+    modifier.mode_before, modifier.mode_after = cycles.before, cycles.after
+    modifier.cycles_before, modifier.cycles_after = cycles.before_count, cycles.after_count
 
 
 def code_of(name: str, value: str) -> int:

@@ -12,9 +12,10 @@ import numpy as np
 
 from ..motion.eulers import quaternions_from_eulers
 from .curves import cycled
-from .filling import recorded
-from .mode_keys import active_slot
-from .sources import MODE_IDS, SAME_FRAME, Source
+from .mode_keys import active_place
+from .records import recorded_digest
+from .sources import MODE_NAMES, SAME_FRAME, Source
+from .transforms import Transform, transform_of
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -40,7 +41,7 @@ class SegmentFacts:
     """The frame of the key that decides its mode: its first one, or what that is a copy of where cycles repeat it."""
 
     mode: str
-    """One of `MODE_IDS`."""
+    """The name of its mode."""
 
     turn: float
     """The angle from its first pose to its last, 0 to pi."""
@@ -81,7 +82,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         first=float(ends[0]),
         last=float(ends[1]),
         key=_deciding_key(source, ends[0]),
-        mode=MODE_IDS[source.modes[place]],
+        mode=MODE_NAMES[source.modes[place]],
         turn=2.0 * float(np.arccos(np.clip(abs(alike), 0.0, 1.0))),
         distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
         long_way=bool(np.any(swept > HALF_TURN)) if source.order else -1.0 + NEAR < alike < -NEAR,
@@ -89,9 +90,10 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
     )
 
 
-def is_up_to_date(obj: bpy.types.Object, source: Source) -> bool:
-    """Whether an object is filled in from its keys as they are, which it need not be while live update is off."""
-    return recorded(active_slot(obj)) == (source.digest if source.is_live else "")
+def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
+    """Whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
+    place = active_place(transform_of(target))
+    return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
 
 
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:

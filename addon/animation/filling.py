@@ -1,194 +1,275 @@
-"""Writing in-betweens: delta transforms as sampled F-curves, in the slot that has the keys.
+"""Writing in-betweens: differences as sampled F-curves, in the slot that has the keys.
 
 A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
-nothing of it. The delta transforms that an object has of its own are remembered while in-betweens are in their place.
+nothing of it. There are samples only where a mode counts, and only of components that it changes; none lies outside of
+the keys, so that no Action, strip or export is longer for it.
+
+Blender reads a sampled curve between two whole frames below zero one frame late. The samples of a range that begins
+there go round in a ring behind frame 0 instead, see `_Layout`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
 
-from .inbetweens import Deltas, deltas
-from .slots import GROUP, WIDTHS, Curves, Slot, curves_in, is_filled_in, is_replacing, slots_of
-from .sources import LOCATION, ROTATION, SCALE, Source
+from .curves import Cycles
+from .inbetweens import differences
+from .records import record_in_betweens, recorded_digest, recorded_rows
+from .slots import GROUP, SlotTransform, is_filled_in, is_replacing, slot_transforms_of
+from .sources import Source
+from .transforms import ORIGINALS, Channel, Transform, default_of
 
 FARTHEST = 1_000_000
 """Frames from 0 up to which Blender can show any."""
 
-OWN = {
-    "delta_location": ("own_location", 0),
-    "delta_rotation_quaternion": ("own_quaternion", 1),
-    "delta_rotation_euler": ("own_euler", 2),
-    "delta_scale": ("own_scale", 3),
-}
-"""Each delta transform: where an object's own is remembered, and its place in `filled`."""
+ENDLESS = 2.0**20
+"""A step, in frames, that ends behind whatever Blender can show."""
 
 
-def fill_in(readings: Sequence[tuple[Slot, Curves, Source]]) -> None:
-    """Compute and write the in-betweens of these slots."""
-    for (slot, curves, source), delta in zip(readings, deltas([source for *_, source in readings]), strict=True):
-        _write(slot, curves, _values(source, delta), source.frame_range)
-        _record(slot, source.digest)
+@dataclass(frozen=True)
+class _Layout:
+    """How the samples on the whole frames of a range lie in an F-curve.
 
-
-def is_complete(curves: Curves, source: Source) -> bool:
-    """Whether all F-curves are there that the in-betweens of a source go into, from its first frame to its last."""
-    first, last = source.frame_range
-    wanted = [(path, index) for path in _paths(source) for index in range(WIDTHS[path.removeprefix("delta_")])]
-    return all(name in curves and _covers(curves[name], first, last - first + 1) for name in wanted)
-
-
-def clear(slot: Slot, curves: Curves) -> None:
-    """Take the in-betweens out of a slot, and give its objects their own delta transforms back."""
-    _write(slot, curves, {}, (0, 0))
-    _record(slot, "")
-
-
-def recorded(slot: Slot) -> str:
-    """The digest of the source that a slot was filled in from, "" where it was not."""
-    return next((record.digest for record in slot.action.rigid_motion.slots if record.handle == slot.handle), "")
-
-
-def _record(slot: Slot, digest: str) -> None:
-    records = slot.action.rigid_motion.slots
-    for place, record in enumerate(records):
-        if record.handle == slot.handle:
-            if digest:
-                record.digest = digest
-            else:
-                records.remove(place)
-            return
-    if digest:
-        record = records.add()
-        record.handle, record.digest = slot.handle, digest
-
-
-def _paths(source: Source) -> dict[str, str]:
-    """The delta transforms that a source needs, and which of its properties each is for."""
-    rotation = "delta_rotation_quaternion" if source.order is None else "delta_rotation_euler"
-    paths = {"delta_location": LOCATION, rotation: ROTATION}
-    needed = {path: name for path, name in paths.items() if name in source.keyed}
-    return {**needed, "delta_scale": SCALE} if source.uniform_scale else needed
-
-
-def _values(source: Source, delta: Deltas) -> dict[str, np.ndarray]:
-    return {path: getattr(delta, name) for path, name in _paths(source).items()}
-
-
-def _write(slot: Slot, curves: Curves, values: dict[str, np.ndarray], frames: tuple[int, int]) -> None:
-    """Replace the in-betweens of a slot by these samples of delta transforms, from the first of the frames to the last.
-
-    A row (2 m,) for each channel has frame and value of every sample. Delta transforms that have no samples, or another
-    number of them, are taken out.
+    A range of n frames that begins below zero lies in a ring: frame f on f modulo n, and what is asked for below zero
+    is looked up a number of rounds later, by a Cycles modifier. Two Stepped modifiers hold the outermost frames.
     """
-    first, last = frames
-    for obj in slot.users:
-        _remember(obj, values)
-    for path, rows in values.items():
-        for index, samples in enumerate(rows):
-            fcurve = curves.get((path, index))
-            points = () if fcurve is None else fcurve.sampled_points
-            if len(points) != last - first + 1:
-                if fcurve is not None:
-                    _remove(slot, curves, path, index)
-                points = _new(slot.channelbag, curves, path, index, first, last).sampled_points
-            points.foreach_set("co", samples)
-    others = OWN.keys() - values.keys()
-    gone = [key for key, fcurve in curves.items() if key[0] in others and is_filled_in(fcurve)]
-    for key in gone:
-        _remove(slot, curves, *key)
+
+    first: int
+    last: int
+
+    ends: tuple[float, float]
+    """Where the outermost samples lie: not outside of the keys."""
+
+    cycles: Cycles | None = None
+    """How the channels repeat, and the differences with them."""
+
+    is_ring: bool = False
+
+    @classmethod
+    def of(cls, source: Source) -> _Layout:
+        first, last = source.frame_range
+        begin, end = source.keyed_range
+        cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
+        return cls(first, last, (max(first, begin), min(last, end)), cycles, first < 0 and cycles is None)
+
+    @property
+    def count(self) -> int:
+        """How many samples there are in the F-curve."""
+        return self.last - self.first + (2 if self.is_ring else 1)
+
+    @property
+    def outermost(self) -> tuple[float, float]:
+        """The frames that the first and the last sample lie on."""
+        return (0.0, float(self.count - 1)) if self.is_ring else self.ends
+
+    @cached_property
+    def _order(self) -> np.ndarray:
+        """Which sample of the range lies on each place of the ring."""
+        period = self.count - 1
+        return (np.arange(self.count) - self.first) % period
+
+    def points(self, samples: np.ndarray) -> np.ndarray:
+        """What goes into the F-curve, from frame and value of every sample by turns."""
+        points = samples.reshape(-1, 2)
+        if self.is_ring:
+            points = points[self._order]
+            points[:, 0] = np.arange(self.count)
+        else:
+            points[0, 0], points[-1, 0] = self.ends
+        return points.ravel()
+
+    def fits(self, fcurve: bpy.types.FCurve) -> bool:
+        """Whether an F-curve has its samples so, and repeats them so."""
+        points = fcurve.sampled_points
+        return (
+            len(points) == self.count
+            and (points[0].co[0], points[self.count - 1].co[0]) == self.outermost
+            and [modifier.type for modifier in fcurve.modifiers] == [kind for kind, _ in self._modifiers]
+            and all(
+                getattr(modifier, name) == value
+                for modifier, (_, settings) in zip(fcurve.modifiers, self._modifiers, strict=True)
+                for name, value in settings.items()
+            )
+        )
+
+    def modify(self, fcurve: bpy.types.FCurve) -> None:
+        """Give an F-curve the modifiers that it needs, in place of those it has."""
+        if not (len(fcurve.modifiers) or self._modifiers):
+            return
+        for modifier in list(fcurve.modifiers):
+            fcurve.modifiers.remove(modifier)
+        for kind, settings in self._modifiers:
+            modifier = fcurve.modifiers.new(kind)
+            for name, value in settings.items():
+                setattr(modifier, name, value)
+
+    @cached_property
+    def _modifiers(self) -> list[tuple[str, dict[str, object]]]:
+        """Types and settings. Blender asks the last one first."""
+        if self.cycles is not None:
+            # The difference repeats as it is also where the channels go on from where they have come.
+            before, after = (mode.removesuffix("_OFFSET") for mode in (self.cycles.before, self.cycles.after))
+            settings = {"mode_before": before, "mode_after": after}
+            counts = {"cycles_before": self.cycles.before_count, "cycles_after": self.cycles.after_count}
+            return [("CYCLES", settings | counts)]
+        if not self.is_ring:
+            return []
+        first, last = float(self.first), float(self.last)
+        return [
+            ("CYCLES", {"mode_before": "REPEAT", "mode_after": "NONE", "cycles_before": 0}),
+            ("STEPPED", {"frame_step": ENDLESS, "frame_offset": first, "use_frame_end": True, "frame_end": first}),
+            ("STEPPED", {"frame_step": ENDLESS, "frame_offset": last, "use_frame_start": True, "frame_start": last}),
+        ]
+
+
+def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
+    """Compute and write the in-betweens of these."""
+    # However far cycles are seen, one round is all that is written.
+    rounds = [source if source.seen is None else replace(source, seen=None) for _, source in readings]
+    for (place, source), samples in zip(readings, differences(rounds), strict=True):
+        layout = _Layout.of(source)
+        channels = _channels(place, source)
+        _write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
+        record_in_betweens(place, source.digest, samples)
+    _limit_ranges({place.slot.action for place, _ in readings})
+
+
+def is_complete(place: SlotTransform, source: Source) -> bool:
+    """Whether all F-curves are as they were written for a source."""
+    layout, channels, curves = _Layout.of(source), _channels(place, source), place.curves
+    written = [channels.get(row) for row in recorded_rows(place)]
+    return (
+        all(channel in curves and layout.fits(curves[channel]) for channel in written)
+        and len(place.filled) == len(written)
+        and all(user.is_noted(channel for channel in written if channel) for user in place.users)
+    )
+
+
+def clear(place: SlotTransform) -> None:
+    """Take the in-betweens out of a slot, and give its users their original differences back."""
+    _write(place, {}, None)
+    record_in_betweens(place, "", ())
+    _limit_ranges({place.slot.action})
+
+
+def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
+    """The channels that the differences of a source go into, by their rows."""
+    rotation = "rotation_quaternion" if source.order is None else "rotation_euler"
+    return place.users[0].differences_for(rotation)
+
+
+def _write(place: SlotTransform, points: dict[Channel, np.ndarray], layout: _Layout | None) -> None:
+    """Replace the in-betweens of a transform by these samples, frame and value of each by turns.
+
+    Channels that have none are taken out.
+    """
+    for user in place.users:
+        user.note_original(points)
+    gone = [channel for channel in place.filled if channel not in points]
+    for channel, samples in points.items():
+        fcurve = place.curves.get(channel)
+        if fcurve is None or len(fcurve.sampled_points) != layout.count:
+            if fcurve is not None:
+                _remove(place, channel)
+            fcurve = _new(place, channel, layout.count)
+        fcurve.sampled_points.foreach_set("co", samples)
+        layout.modify(fcurve)
+    for channel in gone:
+        _remove(place, channel)
     if gone:
-        _tidy(slot)
-        for obj in slot.users:
-            give_back(obj)
-    for obj in slot.users:
-        obj.update_tag(refresh={"TIME"})
+        _tidy(place)
+        restore_originals(place.users)
+    for user in place.users:
+        user.animated.update_tag(refresh={"TIME"})
 
 
-def _remove(slot: Slot, curves: Curves, path: str, index: int) -> None:
-    slot.channelbag.fcurves.remove(curves.pop((path, index)))
+def _remove(place: SlotTransform, channel: Channel) -> None:
+    place.slot.channelbag.fcurves.remove(place.curves.pop(channel))
 
 
-def _tidy(slot: Slot) -> None:
+def _tidy(place: SlotTransform) -> None:
     """Take out the group of the in-betweens where nothing is left in it."""
-    groups = slot.channelbag.groups
+    groups = place.slot.channelbag.groups
     group = groups.get(GROUP)
     if group is not None and not group.channels:
         groups.remove(group)
 
 
-def _covers(fcurve: bpy.types.FCurve, first: int, count: int) -> bool:
-    points = fcurve.sampled_points
-    return len(points) == count and points[0].co[0] == first
-
-
-def _new(
-    channelbag: bpy.types.ActionChannelbag, curves: Curves, path: str, index: int, first: int, last: int
-) -> bpy.types.FCurve:
+def _new(place: SlotTransform, channel: Channel, count: int) -> bpy.types.FCurve:
     """A sampled F-curve out of the animator's way: locked, and hidden in the Graph Editor."""
-    fcurve = curves[path, index] = channelbag.fcurves.new(path, index=index)
+    path, index = channel
+    channelbag = place.slot.channelbag
+    fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
     fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
-    fcurve.keyframe_points.insert(first, 0.0)
-    fcurve.convert_to_samples(first, last + 1)
+    fcurve.keyframe_points.insert(0.0, 0.0)
+    fcurve.convert_to_samples(0, count)
     fcurve.lock = fcurve.hide = True
     fcurve.select = False
     return fcurve
 
 
-def adopt(slot: Slot, curves: Curves) -> None:
-    """Remember the own delta transforms of objects that move by a slot which is filled in already."""
-    paths = {path for path, _ in _filled(curves)}
-    for obj in slot.users:
-        _remember(obj, paths)
+def _limit_ranges(actions: Iterable[bpy.types.Action]) -> None:
+    """Have Actions end with their keys where samples lie in a ring behind these, by a manual frame range.
+
+    One that the animator has set stays, and so does none where no samples need it.
+    """
+    for action in actions:
+        ours = action.rigid_motion.range_is_ours
+        if action.use_frame_range and not ours:
+            continue
+        curves = [
+            fcurve
+            for layer in action.layers
+            for strip in layer.strips
+            for bag in strip.channelbags
+            for fcurve in bag.fcurves
+        ]
+        rings = any(len(fcurve.modifiers) == 3 and is_filled_in(fcurve) for fcurve in curves)
+        if rings:
+            ranges = np.array([fcurve.range() for fcurve in curves if not is_filled_in(fcurve)])
+            begin, end = ranges[:, 0].min(), ranges[:, 1].max()
+            if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
+                action.use_frame_range = True
+                action.frame_start, action.frame_end = begin, end
+            action.rigid_motion.range_is_ours = True
+        elif ours:
+            action.use_frame_range = action.rigid_motion.range_is_ours = False
 
 
-def _filled(curves: Curves) -> Curves:
-    """Those of a slot's F-curves that in-betweens are in."""
-    return {key: fcurve for key, fcurve in curves.items() if key[0] in OWN and is_filled_in(fcurve)}
-
-
-def _remember(obj: bpy.types.Object, paths: Iterable[str]) -> None:
-    """Keep the object's own delta transforms, which in-betweens take the place of."""
-    motion = obj.rigid_motion
-    filled = tuple(motion.filled)
-    for path in paths:
-        own, place = OWN[path]
-        if not filled[place]:
-            setattr(motion, own, getattr(obj, path))
-            motion.filled[place] = True
-
-
-def hold_own(slot: Slot, curves: Curves) -> None:
-    """Let a slot that is not filled in hold its objects' own delta transforms where another slot of theirs is.
+def hold_originals(place: SlotTransform) -> None:
+    """Let a slot that is not filled in hold its users' original differences where another slot of theirs is.
 
     While a strip plays whose Action lacks a channel that another strip's has, Blender puts that channel to its default.
     """
-    held = _held(slot, curves)
-    there = {
-        key: next((point.co[1] for point in fcurve.sampled_points), None) for key, fcurve in _filled(curves).items()
+    held = _held(place)
+    present = {
+        channel: next((point.co[1] for point in fcurve.sampled_points), None)
+        for channel, fcurve in place.filled.items()
     }
-    if held != there:
+    if held != present:
         # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
-        starts = [start for fcurve in curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
+        starts = [start for fcurve in place.curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
         first = math.floor(min(starts, default=0.0))
-        values: dict[str, list[np.ndarray]] = {}
-        for (path, _), value in held.items():
-            values.setdefault(path, []).append(np.array((first, value, first + 1, value), dtype=np.float32))
-        _write(slot, curves, values, (first, first + 1))
+        layout = _Layout(first, first + 1, (first, first + 1))
+        points = {
+            channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()
+        }
+        _write(place, points, layout)
 
 
-def _held(slot: Slot, curves: Curves) -> dict[tuple[str, int], float]:
+def _held(place: SlotTransform) -> dict[Channel, float]:
     """The channels that a slot which is not filled in has to have, and what they hold."""
-    first, *others = (_held_for(obj, slot) for obj in slot.users)
+    first, *others = (_held_for(user, place) for user in place.users)
     if any(held != first for held in others):
         return {}
-    # What it does not key may be another strip's to move, below it, and then so are the delta transforms of that.
-    animated = {path for (path, _), fcurve in curves.items() if not is_filled_in(fcurve)}
+    # What it does not key may be another strip's to move, below it, and then so are the differences of that.
+    animated = {path for (path, _), fcurve in place.curves.items() if not is_filled_in(fcurve)}
     return {
         (path, index): value
         for (path, index), value in first.items()
@@ -196,31 +277,33 @@ def _held(slot: Slot, curves: Curves) -> dict[tuple[str, int], float]:
     }
 
 
-def _held_for(obj: bpy.types.Object, slot: Slot) -> dict[tuple[str, int], float]:
-    if not len(obj.animation_data.nla_tracks):
+def _held_for(user: Transform, place: SlotTransform) -> dict[Channel, float]:
+    if not len(user.animated.animation_data.nla_tracks):
         return {}
-    owns = {path: getattr(obj.rigid_motion, own)[:] for path, (own, _) in OWN.items()}
-    owns = {path: own for path, own in owns.items() if all(map(math.isfinite, own)) and own != _default(path)}
+    originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
+    originals = {
+        path: values
+        for path, values in originals.items()
+        if all(map(math.isfinite, values)) and values != default_of(path)
+    }
     # All objects of the file are gone through for the rest: only for the few that have delta transforms of their own.
-    if not (owns and is_replacing(obj, slot)):
+    if not (originals and is_replacing(user.animated, place.slot)):
         return {}
-    filled = {path for other in slots_of([obj]) if recorded(other) for path, _ in curves_in(other.channelbag)}
-    return {(path, index): value for path, own in owns.items() if path in filled for index, value in enumerate(own)}
+    filled = {path for other in slot_transforms_of([user]) if recorded_digest(other) for path, _ in other.filled}
+    return {
+        (path, index): value
+        for path, values in originals.items()
+        if path in filled
+        for index, value in enumerate(values)
+    }
 
 
-@cache
-def _default(path: str) -> tuple[float, ...]:
-    """What a delta transform is where an object has none of its own."""
-    return tuple(bpy.types.Object.bl_rna.properties[path].default_array)
-
-
-def give_back(obj: bpy.types.Object) -> None:
-    """Give an object its own delta transforms back where no in-betweens are in their place any more."""
-    motion = obj.rigid_motion
-    if not any(motion.filled):
+def restore_originals(transforms: Iterable[Transform]) -> None:
+    """Give transforms their original differences back where no in-betweens are in their place any more."""
+    noted = [transform for transform in transforms if any(transform.motion.filled)]
+    if not noted:
         return
-    curves = {path for slot in slots_of([obj]) for path, _ in curves_in(slot.channelbag)}
-    for path, (own, place) in OWN.items():
-        if motion.filled[place] and path not in curves:
-            setattr(obj, path, getattr(motion, own))
-            motion.filled[place] = False
+    places = slot_transforms_of(noted)
+    for transform in noted:
+        filled = [channel for place in places if transform in place.users for channel in place.curves]
+        transform.restore_original(filled)

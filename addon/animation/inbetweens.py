@@ -22,7 +22,7 @@ from ..motion.piecewise import blocks, combine
 from ..motion.poses import beyond
 from ..motion.quaternions import conjugate, multiply
 from .curves import Keys, evaluate
-from .sources import LOCATION, MODE_IDS, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
+from .sources import LOCATION, MODE_NAMES, MODE_NUMBERS, PART_OF, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -30,9 +30,17 @@ AT_ONCE = 131072
 BLOCK = 24576
 """Samples worked on at once: few enough for the processor's caches."""
 
+NOTHING = 1e-9
+"""What a component varies by that is always the same but for rounding errors."""
 
-SMOOTH = [number for number, mode in enumerate(MODE_IDS) if number and KEYFRAME_MODES[mode].is_smooth]
-"""The codes of modes for which the keys around a segment count."""
+
+SMOOTH = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
+"""The numbers of modes for which the keys around a segment count."""
+
+if any(mode.behind > 1 or mode.ahead > 1 for mode in KEYFRAME_MODES.values()):
+    raise NotImplementedError(
+        "a mode for keyframes can look one key behind and ahead of a segment: see _with_neighbours"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,22 +57,9 @@ class InBetweens:
     """What the modes make of them, shape (m,)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Deltas:
-    """Delta transforms on the m whole frames of a source, as sampled F-curves take them.
-
-    A row for each component, with the frame and the value of every sample by turns, in single precision; None where
-    they are left alone.
-    """
-
-    location: np.ndarray | None
-    """Shape (3, 2 m)."""
-
-    rotation: np.ndarray | None
-    """Shape (4, 2 m) or, for a source that turns by Euler angles, (3, 2 m)."""
-
-    scale: np.ndarray | None
-    """Shape (3, 2 m)."""
+Samples = dict[int, np.ndarray]
+"""The differences of one source on the m whole frames of its range, by the rows of their components where there is any.
+Frame and value of every sample by turns, in single precision, each of shape (2 m,)."""
 
 
 def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> InBetweens:
@@ -80,7 +75,7 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     frames = np.asarray(frames, dtype=np.float64)
     native, delta = np.empty((2, _height([source]), len(frames)))
     delta = delta[: _filled_height([source])]
-    _move([source], [frames], native, delta, None if mode is None else MODE_IDS.index(mode))
+    _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
 
     def moved_by(deltas: np.ndarray) -> Poses:
         return Poses(
@@ -89,11 +84,15 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
             (native[ROWS[SCALE]] * deltas[ROWS[SCALE]]).mean(axis=0) if source.uniform_scale else None,
         )
 
-    return InBetweens(frames, moved_by(source.own[:, None]), moved_by(delta))
+    return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
 
 
-def deltas(sources: Sequence[Source]) -> list[Deltas]:
-    """The delta transforms that turn Blender's in-betweens into the wanted ones, on the whole frames of each source."""
+def differences(sources: Sequence[Source]) -> list[Samples]:
+    """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source.
+
+    The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
+    location is added, scale multiplied. Components that are the source's original ones throughout are left out.
+    """
     found = {}
     for portion in _portions(sources):
         of_range = {span: np.arange(span[0], span[1] + 1.0) for span in {source.frame_range for source in portion}}
@@ -108,17 +107,40 @@ def deltas(sources: Sequence[Source]) -> list[Deltas]:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
+        starts = [place.start for _, place in samples]
+        first, differs = delta[:, starts], _range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
-        for source, place in samples:
-            own = points[:, place].reshape(len(points), -1)
-            found[id(source)] = Deltas(
-                own[ROWS[LOCATION]] if LOCATION in source.keyed else None,
-                own[ROWS[ROTATION]][: 4 if order is None else 3] if ROTATION in source.keyed else None,
-                own[ROWS[SCALE]] if source.uniform_scale else None,
-            )
+        for number, (source, place) in enumerate(samples):
+            changing = {row for row in source.filled_rows if differs[row, number]}
+            held = _held_rows(source, changing, first[:, number])
+            found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
     return [found[id(source)] for source in sources]
+
+
+def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:
+    """The rows that never change, and have to be held all the same, of what is constant (.,) in them.
+
+    The components of a quaternion are one by one only where they are zero. In the NLA Blender puts what a strip has no
+    channel of to its default.
+    """
+    turning = source.order is None and any(PART_OF[row] == ROTATION for row in changing)
+    default = REST if source.order is None else np.where((REST == 1.0) & (np.arange(10) == 3), 0.0, REST)
+    return {
+        row
+        for row in source.filled_rows
+        if row not in changing
+        and (
+            (turning and PART_OF[row] == ROTATION and abs(constant[row]) > NOTHING)
+            or (source.in_nla and abs(constant[row] - default[row]) > NOTHING)
+        )
+    }
+
+
+def _range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
+    """By how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
+    return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)
 
 
 def _portions(sources: Sequence[Source]) -> Iterator[list[Source]]:
@@ -167,7 +189,7 @@ def _move(
     weights, offsets = _weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
-    own = np.stack([source.own[: len(delta)] for source in sources], axis=1)
+    original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
     ends = _Ends.of(start, end, segments, smooth=np.isin(modes, SMOOTH))
 
     every_frame = np.concatenate(frames)
@@ -176,16 +198,15 @@ def _move(
         combine(weights[None, :, some], timing[:, place], counts[some], progress)
         progress = progress[0] - offsets[some].repeat(counts[some])
         _turn_into_quaternions(native[:, place], order)
-        default = own[:, ends.owners[some]]
+        default = original[:, ends.owners[some]]
         ends.keep_even(some, counts[some], every_frame[place], progress)
         _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
     # A key is the animator's: nothing is added to it, not even a rounding error.
-    delta[:, on_keys] = own[:, owners]
+    delta[:, on_keys] = original[:, owners]
     for number, (source, place) in enumerate(samples):
-        if source.cyclic is not None:
-            before, after = source.used_up
-            outside = (frames[number] < before) | (frames[number] > after)
-            delta[:, place][:, outside] = own[:, number, None]
+        outside = ~source.shows_mode(frames[number])
+        if outside.any():
+            delta[:, place][:, outside] = original[:, number, None]
 
 
 def _fill(
@@ -207,7 +228,7 @@ def _fill(
         if not mode:
             delta[:, some] = own.repeat(here, axis=1)
             continue
-        wanted = ends.poses(segment, here, progress[some], MODE_IDS[mode])
+        wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode])
         part = delta if every else np.empty((len(delta), int(here.sum())))
         _differ(wanted, native[:, some], part)
         if wanted.scales is not None:
@@ -250,7 +271,7 @@ class _Ends:
             ],
             axis=1,
         )
-        keys = _key_poses(start, end, np.stack([source.own for source in sources], axis=1)[:, owners], sources[0])
+        keys = _key_poses(start, end, np.stack([source.original for source in sources], axis=1)[:, owners], sources[0])
         if not smooth.any():
             return cls(owners, times, keys, smooth, None)
         holds = np.concatenate([source.holds for source in sources])

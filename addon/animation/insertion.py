@@ -1,67 +1,131 @@
-"""The one place where a key of the animator's is changed: a key inserted in between keeps the pose on the screen.
+"""The one place where a key of the animator's is changed: a key inserted in between keeps the pose that it is of.
 
-The screen shows Blender's own in-between with the delta transform; the new key is given Blender's own alone, and the
-object would jump. So the new key gets what was to be seen, in all channels of the object. A key with any other value
-than the object had at that moment was meant to have it (pasted, typed, written by a script), and stays as it is.
+The screen shows Blender's own in-between with the difference on top; a key has no difference. What was keyed tells
+which of the two its value is:
+
+- It differs from what the property had: it was written to the F-curve (pasted keys, the Graph Editor, a script), and
+  stays as it is.
+- The property had it when it was last evaluated. Then the animator saw it with the difference on top, be it the
+  in-between as it was or a pose made by hand, and the key gets the pose that was to be seen.
+- The property was set and keyed in one go. If an operator did it (*Snap*, *Paste*), or more than one of location,
+  rotation
+  and scale have changed, then a pose was computed for the world, and Blender has taken the difference off:
+  `matrix_world = M` sets all three of them. The key gets that pose. A single property (`location = v`, a value typed
+  with Auto Key) is the value that somebody wanted, and stays as it is.
+
+Where a key gets a pose, so do all keyed channels of the transform.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from .slots import WIDTHS, Curves, Slot, Transformable
-from .sources import LOCATION, REST, ROTATION, SAME_FRAME, SCALE, Source
+from .slots import SlotTransform
+from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, SCALE, Source
+from .transforms import Transform
 
-REMEMBERED = 4096
-"""Sources kept for comparison: as many as a long session undoes."""
+MOST_BYTES = 32 * 2**20
+"""Of sources that are kept for comparison: hundreds of undo steps of an ordinary file."""
+
+MOST_INSERTED = 256
+"""Insertions that undo and redo can bring back as they were."""
 
 TOLERANCE = 1e-5
 """Differences of single precision, relative to the value or absolute below 1."""
 
-_sources: OrderedDict[str, Source] = OrderedDict()
-_posed: dict[int, tuple[float, np.ndarray]] = {}
-_inserted: dict[tuple[str, str], np.ndarray] = {}
-"""What undo and redo bring back is decided as it was: what was on the screen, by the digests before and after."""
+
+@dataclass(frozen=True)
+class _Posed:
+    """How a transform was posed, without a key yet."""
+
+    frame: float
+    """Of the scene."""
+
+    components: np.ndarray
+    """Its properties, shape (10,)."""
+
+    on_top: bool
+    """Whether the pose is that with the difference on top."""
+
+
+class _Sources(OrderedDict[str, Source]):
+    """By their digests, those used last behind the others; what is too much in bytes is dropped."""
+
+    size = 0
+
+    def keep(self, source: Source) -> None:
+        self.drop(source.digest)
+        self[source.digest] = source
+        self.size += _size(source)
+        while self.size > MOST_BYTES and len(self) > 1:
+            self.drop(next(iter(self)))
+
+    def drop(self, digest: str) -> None:
+        if (source := self.pop(digest, None)) is not None:
+            self.size -= _size(source)
+
+
+_sources = _Sources()
+_posed: dict[tuple[int, str], _Posed] = {}
+_inserted: OrderedDict[tuple[str, str], np.ndarray] = OrderedDict()
+"""What undo and redo bring back is decided as it was: the components on the screen, by the digests before and after."""
 
 
 def remember(source: Source) -> None:
     """Keep what a slot is filled in from, by its digest."""
-    _sources[source.digest] = source
-    _sources.move_to_end(source.digest)
-    if len(_sources) > REMEMBERED:
-        _sources.popitem(last=False)
+    _sources.keep(source)
 
 
-def notice_pose(obj: bpy.types.Object, frame: float) -> None:
-    """Keep how an object was posed by hand, without a key yet, on the frame that is shown."""
-    _posed[obj.session_uid] = frame, _components(obj)
+def forget_file() -> None:
+    """Forget all of a file that is no longer open."""
+    _sources.clear()
+    _sources.size = 0
+    _posed.clear()
+    _inserted.clear()
 
 
-def forget_poses(objects: Iterable[bpy.types.Object] | None = None) -> None:
-    """Forget how these objects were posed by hand, or all of them: their Actions have moved them again."""
-    if objects is None:
+def notice_pose(transform: Transform, frame: float) -> None:
+    """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
+    _posed[_identity(transform)] = _Posed(frame, transform.components(), True)
+
+
+def notice_assignment(transform: Transform, evaluated: bpy.types.Object, frame: float, *, by_operator: bool) -> None:
+    """Keep what the properties of a transform were set to, where they have not been evaluated so yet."""
+    carrier = transform.carrier
+    changed = sum(
+        tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
+        for prop in ("location", transform.rotation, "scale")
+    )
+    if changed:
+        _posed[_identity(transform)] = _Posed(frame, transform.components(), by_operator or changed > 1)
+
+
+def forget_poses(transforms: Iterable[Transform] | None = None) -> None:
+    """Forget how these were posed, or all: their Actions have moved them again."""
+    if transforms is None:
         _posed.clear()
     else:
-        for obj in objects:
-            _posed.pop(obj.session_uid, None)
+        for transform in transforms:
+            _posed.pop(_identity(transform), None)
 
 
-def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: float, *, again: bool) -> bool:
-    """Give a key that was inserted in between the pose on the screen.
+def keep_pose(place: SlotTransform, before: str, source: Source, frame: float, *, again: bool) -> bool:
+    """Give a key that was inserted in between the pose that it is of.
 
     Parameters
     ----------
-    slot, curves, source
+    place, source
         As they are now, with the new key.
     before : str
         The digest of the source that the slot is filled in from.
     frame : float
-        The frame that is shown.
+        The frame that is shown, of the scene.
     again : bool
         Whether undo or redo brought the key back, and not an edit.
 
@@ -71,27 +135,44 @@ def keep_pose(slot: Slot, curves: Curves, before: str, source: Source, frame: fl
         Whether there was such a key.
     """
     old = _sources.get(before)
-    if old is None or source.key_count <= old.key_count:
+    if old is None or source.key_count <= old.key_count or old.order != source.order:
         return False
-    obj = next((user for user in slot.users if user.animation_data.action == slot.action), None)
-    if obj is None or old.order != source.order:
+    users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
+    if not users:
         return False
-    if obj.animation_data.use_tweak_mode:
-        frame = obj.animation_data.nla_tweak_strip_time_to_scene(frame, invert=True)
+    posed = next((_posed[identity] for identity in map(_identity, users) if identity in _posed), None)
+    posed = posed if posed is not None and posed.frame == frame else None
+    data = users[0].animated.animation_data
+    if data.use_tweak_mode:
+        frame = data.nla_tweak_strip_time_to_scene(frame, invert=True)
     if not _is_inserted(old, source, frame):
         return False
     shown = _inserted.get((before, source.digest)) if again else None
     if shown is None:
-        shown = _before_the_key(obj, old, frame)
-        if not _has_values(source, frame, shown):
+        shown = old.values_at(np.array([frame]))[:, 0] if posed is None else posed.components
+        if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
             return False
         _inserted[before, source.digest] = shown
-    what = Transformable.of(obj)
-    for prop, values in _on_screen(what, curves, old, shown, frame).items():
-        for index, value in enumerate(values):
-            if (fcurve := curves.get((what.prefix + prop, index))) is not None:
-                _set_key(fcurve, frame, value)
+        if len(_inserted) > MOST_INSERTED:
+            _inserted.popitem(last=False)
+    for channel, value in _on_screen(users[0], place, old, shown, frame).items():
+        if (fcurve := place.curves.get(channel)) is not None:
+            _set_key(fcurve, frame, value)
     return True
+
+
+def _identity(transform: Transform) -> tuple[int, str]:
+    return transform.animated.session_uid, transform.prefix
+
+
+def _size(source: Source) -> int:
+    """About how many bytes a source has."""
+    arrays = (
+        array
+        for keys in source.curves
+        for array in (keys.points, keys.interpolation, keys.left, keys.right, keys.easing, keys.easing_settings)
+    )
+    return sum(array.nbytes for array in arrays if array is not None)
 
 
 def _is_inserted(old: Source, new: Source, frame: float) -> bool:
@@ -101,14 +182,6 @@ def _is_inserted(old: Source, new: Source, frame: float) -> bool:
         return False
     others = after[np.abs(after - frame) >= SAME_FRAME]
     return len(others) < len(after) and np.array_equal(others, before) and bool(old.modes_at(np.array([frame]))[0])
-
-
-def _before_the_key(obj: bpy.types.Object, old: Source, frame: float) -> np.ndarray:
-    """The components (10,) that the object's properties had when the key was made."""
-    posed_on, components = _posed.get(obj.session_uid, (None, None))
-    if posed_on == frame:
-        return components
-    return old.values_at(np.array([frame]))[:, 0]
 
 
 def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
@@ -123,34 +196,46 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
 
 
 def _on_screen(
-    what: Transformable, curves: Curves, old: Source, shown: np.ndarray, frame: float
-) -> dict[str, np.ndarray]:
-    """The values of the object's properties that, with its own delta transforms alone, look as the screen does."""
-    properties = what.properties
+    user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
+) -> dict[tuple[str, int], float]:
+    """The values of the channels that, with the original difference alone, look as the screen does."""
+    rows, values = user.differences, shown.copy()
 
-    def delta(name: str, default: np.ndarray) -> np.ndarray:
-        path = f"{what.prefix}delta_{properties[name]}"
-        channels = [curves.get((path, index)) for index in range(WIDTHS[properties[name]])]
-        return default if None in channels else np.array([fcurve.evaluate(frame) for fcurve in channels])
+    def difference(name: str) -> np.ndarray | None:
+        """What is on top of a property at the frame, None where there are no in-betweens of it."""
+        channels = [rows[row] for row in range(ROWS[name].start, ROWS[name].stop) if row in rows]
+        if not any(channel in place.curves for channel in channels):
+            return None
+        return np.array(
+            [
+                place.curves[channel].evaluate(frame)
+                if channel in place.curves
+                else user.animated.path_resolve(channel[0])[channel[1]]
+                for channel in channels
+            ]
+        )
 
-    own = {LOCATION: old.own[:3], ROTATION: old.own[3:7], SCALE: old.own[7:]}
-    values = {
-        properties[LOCATION]: shown[:3] + delta(LOCATION, own[LOCATION]) - own[LOCATION],
-        properties[SCALE]: shown[7:] * delta(SCALE, own[SCALE]) / np.where(own[SCALE] == 0.0, 1.0, own[SCALE]),
-    }
+    original = {name: old.original[part] for name, part in ROWS.items()}
+    if (added := difference(LOCATION)) is not None:
+        values[ROWS[LOCATION]] += added - original[LOCATION]
+    if (factor := difference(SCALE)) is not None:
+        values[ROWS[SCALE]] *= factor / np.where(original[SCALE] == 0.0, 1.0, original[SCALE])
+    own = Quaternion(original[ROTATION])
     if old.order is None:
         turned = Quaternion(shown[3:7])
-        seen = Quaternion(own[ROTATION]).inverted() @ Quaternion(delta(ROTATION, own[ROTATION])) @ turned
-        if seen.dot(turned) < 0.0:
-            seen.negate()
-        values[properties[ROTATION]] = np.array(seen)
+        added = difference(ROTATION)
+        if added is not None:
+            seen = own.inverted() @ Quaternion(added) @ turned
+            if seen.dot(turned) < 0.0:
+                seen.negate()
+            values[3:7] = seen
     else:
         angles = Euler(shown[3:6], old.order)
-        added = delta(ROTATION, None)
-        added = Quaternion(own[ROTATION]) if added is None else Euler(added, old.order).to_quaternion()
-        seen = Quaternion(own[ROTATION]).inverted() @ added @ angles.to_quaternion()
-        values[properties[ROTATION]] = np.array(seen.to_euler(old.order, angles))
-    return values
+        added = difference(ROTATION)
+        if added is not None:
+            seen = own.inverted() @ Euler(added, old.order).to_quaternion() @ angles.to_quaternion()
+            values[3:6] = seen.to_euler(old.order, angles)
+    return {channel: values[row] for row, channel in user.channels.items()}
 
 
 def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
@@ -168,14 +253,3 @@ def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
         if eased is not None:
             key.interpolation, key.easing = eased
     fcurve.update()
-
-
-def _components(obj: bpy.types.Object) -> np.ndarray:
-    """An object's properties as the ten components of a source."""
-    shown = REST.copy()
-    shown[:3], shown[7:] = obj.location, obj.scale
-    if obj.rotation_mode == "QUATERNION":
-        shown[3:7] = obj.rotation_quaternion
-    else:
-        shown[3:6] = obj.rotation_euler
-    return shown

@@ -10,19 +10,21 @@ from __future__ import annotations
 import functools
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import ClassVar
+from contextlib import contextmanager, suppress
 
 import bpy
 from bpy.app.handlers import persistent
 
 from . import insertion
-from .filling import clear, fill_in, give_back, hold_own, is_complete, recorded
-from .inbetweens import deltas
-from .reading import keyed_in, read
+from .filling import clear, fill_in, hold_originals, is_complete, restore_originals
+from .inbetweens import differences
+from .mode_property import adopt_from_properties, show_awaited, show_modes
+from .reading import differing_users, keyed_in, sources_of_users
+from .records import recorded_digest
 from .refusals import refuse_numbers
-from .slots import Curves, Refused, Slot, curves_in, slots_in, slots_of
+from .slots import SlotTransform, places_of, slot_transforms_in, slot_transforms_of
 from .sources import Source
+from .transforms import Refused, Transform, transform_of
 
 log = logging.getLogger(__package__)
 
@@ -48,8 +50,8 @@ class _State:
     edited = False
     """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
 
-    ranges: ClassVar[dict[int, tuple[int, int]]] = {}
-    """First and last frame of each scene when last seen, by session id."""
+    operators = 0
+    """The operator that had ended last when edits were last seen."""
 
 
 def set_enabled(enabled: bool) -> None:
@@ -57,86 +59,137 @@ def set_enabled(enabled: bool) -> None:
     _State.enabled, _State.unseen = enabled, enabled
 
 
-def refresh(objects: Iterable[bpy.types.Object] | None = None) -> int:
-    """Bring the in-betweens of these objects up to date, or of all in the file.
+def is_busy() -> bool:
+    """Whether the edits that Blender tells of at this moment are our own."""
+    return _State.busy
+
+
+def refresh(targets: Iterable[bpy.types.Object | Transform] | None = None) -> int:
+    """Bring the in-betweens of these up to date, or of all in the file.
 
     Returns
     -------
     int
-        How many slots had to be filled in anew.
+        How much had to be filled in anew, counted in transforms of slots.
     """
-    objects = list(bpy.data.objects) if objects is None else list(objects)
+    transforms = [transform_of(target) for target in (bpy.data.objects if targets is None else targets)]
     with _turn() as ours:
         if not ours:
             return 0
-        slots = slots_of(objects)
-        moved = {obj for slot in slots for obj in slot.users}
-        for obj in objects:
-            if obj not in moved:
-                give_back(obj)
-        return _refresh(slots)
+        places = slot_transforms_of(transforms)
+        moved = {user for place in places for user in place.users}
+        unmoved = [transform for transform in transforms if transform not in moved]
+        restore_originals(unmoved)
+        show_awaited(unmoved)
+        return _refresh(places)
 
 
-def problem_of(obj: bpy.types.Object) -> str:
-    """Why an object keeps Blender's own in-betweens whatever its mode, and the way out; "" where nothing is amiss."""
+def follow_original(transform: Transform) -> None:
+    """Follow an edit of what is written down of a transform's original difference."""
+    with _turn() as ours:
+        if not ours:
+            return
+        places = slot_transforms_of([transform])
+        transform.follow_original(channel for place in places for channel in place.filled)
+        _refresh(places)
+
+
+def problem_of(target: bpy.types.Object | Transform) -> str:
+    """Why something does not move as its mode says, and the way out; "" where nothing is amiss."""
+    transform = transform_of(target)
+    places = slot_transforms_of([transform])
     try:
-        for slot in slots_of([obj]):
-            source = read(slot, curves_in(slot.channelbag))
+        for place, sources in zip(places, sources_of_users(places), strict=True):
+            source = sources[place.users.index(transform)]
+            if isinstance(source, Refused):
+                raise source
+            refuse_numbers(transform.name, source)
             if source.is_live:
-                deltas([source])
+                differences([source])
+                _refuse_differing(transform, place)
     except Refused as problem:
         return str(problem)
     except ValueError as problem:
-        return f"{obj.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
+        return f"{transform.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
     return ""
 
 
-def _refresh(slots: Sequence[Slot]) -> int:
+def _refuse_differing(transform: Transform, place: SlotTransform) -> None:
+    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
+    if len(place.users) > 1 and transform in (differing := differing_users(place)):
+        leading = next(user for user in place.users if user not in differing)
+        raise Refused(
+            f"{transform.name} moves by the same Action slot as {leading.name}, but has another rotation mode or delta "
+            f"transform; the in-betweens are those of {leading.name}: give it an Action of its own "
+            "(Object > Relations > Make Single User)"
+        )
+
+
+def _refresh(places: Sequence[SlotTransform]) -> int:
+    show_modes(places)
     # What is linked has the in-betweens that its own file was saved with.
-    readings = [(slot, curves_in(slot.channelbag)) for slot in slots if slot.action.is_editable]
+    places = [place for place in places if place.slot.action.is_editable]
     stale, idle = [], []
-    for (slot, curves), source in zip(readings, keyed_in(readings), strict=True):
-        before = recorded(slot)
-        if not _is_wanted(slot, source, before):
+    for place, source in zip(places, keyed_in(places), strict=True):
+        before = recorded_digest(place)
+        _note_late_users(place)
+        if not _is_wanted(place, source, before):
             if before:
-                clear(slot, curves)
-            idle.append((slot, curves))
-            for obj in slot.users:
-                give_back(obj)
-        elif source.digest != before or not is_complete(curves, source):
-            if insertion.keep_pose(slot, curves, before, source, _State.frame, again=_State.again):
-                curves = curves_in(slot.channelbag)
-                (source,) = keyed_in([(slot, curves)])
-                if not _is_wanted(slot, source, before):
+                clear(place)
+            idle.append(place)
+            restore_originals(place.users)
+        elif source.digest != before or not is_complete(place, source):
+            if insertion.keep_pose(place, before, source, _State.frame, again=_State.again):
+                place = place.read_again()
+                (source,) = keyed_in([place])
+                if not _is_wanted(place, source, before):
                     continue
-            stale.append((slot, curves, source))
+            stale.append((place, source))
     try:
         fill_in(stale)
     except ValueError:
         # One of them has numbers that make no motion: it keeps Blender's own, and the others get theirs.
-        for one in stale:
+        for place, source in stale:
             try:
-                fill_in([one])
+                fill_in([(place, source)])
             except ValueError:
-                clear(*one[:2])
-                idle.append(one[:2])
-    for slot, curves in (*idle, *_beside(slots)):
-        hold_own(slot, curves)
+                clear(place)
+                idle.append(place)
+    for place in (*idle, *_beside(places)):
+        hold_originals(place)
     return len(stale)
 
 
-def _beside(slots: Sequence[Slot]) -> list[tuple[Slot, Curves]]:
-    """What else than these slots moves their objects in the NLA, and is not filled in."""
-    tracked = {obj for slot in slots for obj in slot.users if len(obj.animation_data.nla_tracks)}
-    known = {(slot.action, slot.handle) for slot in slots}
+def _beside(places: Sequence[SlotTransform]) -> list[SlotTransform]:
+    """What else than these moves their users in the NLA, and is not filled in."""
+    tracked = {user for place in places for user in place.users if len(user.animated.animation_data.nla_tracks)}
+    known = {(place.slot.action, place.slot.handle, place.prefix) for place in places}
     return [
-        (slot, curves_in(slot.channelbag))
-        for slot in (slots_of(tracked) if tracked else ())
-        if (slot.action, slot.handle) not in known and slot.action.is_editable and not recorded(slot)
+        place
+        for place in (slot_transforms_of(tracked) if tracked else ())
+        if (place.slot.action, place.slot.handle, place.prefix) not in known
+        and place.slot.action.is_editable
+        and not recorded_digest(place)
     ]
 
 
-def _is_wanted(slot: Slot, source: Source | Refused, before: str) -> bool:
+def _note_late_users(place: SlotTransform) -> None:
+    """Note the original differences of users that were evaluated with a slot before they could be."""
+    filled = place.filled
+    for user in place.users if filled else ():
+        if not user.is_noted(filled) and user.animated.is_editable:
+            user.note_original(filled, overwritten=_is_overwritten(user, filled))
+
+
+def _is_overwritten(user: Transform, filled: dict) -> bool:
+    """Whether what a user has for a difference is what in-betweens are on the frame that is shown."""
+    return all(
+        abs(user.animated.path_resolve(path)[index] - fcurve.evaluate(_State.frame)) < 1e-6
+        for (path, index), fcurve in filled.items()
+    )
+
+
+def _is_wanted(place: SlotTransform, source: Source | Refused, before: str) -> bool:
     """Whether there is more to a source than Blender's own in-betweens, and it can be had.
 
     `before` is the digest of what the slot is filled in from: that needs no second examination.
@@ -145,7 +198,7 @@ def _is_wanted(slot: Slot, source: Source | Refused, before: str) -> bool:
         return False
     if source.digest != before:
         try:
-            refuse_numbers(slot.users[0].name, source)
+            refuse_numbers(place.name, source)
         except Refused:
             return False
         if not source.is_live:
@@ -173,40 +226,75 @@ def _turn() -> Iterator[bool]:
             _State.busy = False
 
 
-def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[bpy.types.Object]:
-    """Refresh after an update in which Actions were edited or not, and say which objects those move."""
+def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[Transform]:
+    """Refresh after an update in which Actions were edited or not, and say what those move."""
     if _State.unseen:
         _look_through()
     if not edited:
         return set()
-    slots = slots_in(update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action))
+    places = slot_transforms_in(
+        update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)
+    )
     with _turn() as ours:
         if ours:
-            _refresh(slots)
-    return {obj for slot in slots for obj in slot.users}
+            _refresh(places)
+    return {user for place in places for user in place.users}
 
 
-def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[bpy.types.Object]) -> None:
-    """Refresh after an edit of scenes, or of other objects than these, and notice how one was posed by hand."""
+def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Transform]) -> None:
+    """Refresh after an edit of other objects than these, and notice how one was posed by hand."""
+    edited = []
     for update in depsgraph.updates:
         block = update.id
-        if isinstance(block, bpy.types.Object):
-            motion = block.rigid_motion
-            if (motion.mode != "BLENDER" or any(motion.filled)) and block.original not in seen:
-                insertion.notice_pose(block.original, frame)
-                refresh([block.original])
-        elif isinstance(block, bpy.types.Scene):
-            # Only the original has an identity: that of the evaluated scene is 0.
-            scene, frames = block.original, (block.frame_start, block.frame_end)
-            if _State.ranges.get(scene.session_uid, frames) != frames:
-                refresh(scene.objects)
-            _State.ranges[scene.session_uid] = frames
+        if isinstance(block, bpy.types.Object) and _concerns_us(block):
+            transform = transform_of(block.original)
+            if transform not in seen:
+                insertion.notice_pose(transform, frame)
+                edited.append(transform)
+    if edited:
+        refresh(edited)
+
+
+def _concerns_us(obj: bpy.types.Object) -> bool:
+    """Whether an object has, or had, anything to do with modes."""
+    motion = obj.rigid_motion
+    if motion.mode != "BLENDER" or motion.awaited != "BLENDER" or any(motion.filled):
+        return True
+    data = obj.animation_data
+    return data is not None and data.action is not None and len(data.action.rigid_motion.slots) > 0
+
+
+def _before_evaluation(depsgraphs: Iterable[bpy.types.Depsgraph], frame: float) -> None:
+    """Look at what was set and is not evaluated yet: what in-betweens will overwrite, and poses set in one go."""
+    operator = _last_operator()
+    by_operator, _State.operators = operator != _State.operators, operator
+    for depsgraph in depsgraphs:
+        for update in depsgraph.updates:
+            block = update.id
+            if not isinstance(block, bpy.types.Object) or not _concerns_us(block.original):
+                continue
+            transform = transform_of(block.original)
+            filled = [channel for place in places_of(transform) for channel in place.filled]
+            if not (filled and transform.animated.is_editable):
+                continue
+            with _turn() as ours:
+                if ours:
+                    transform.note_original(filled)
+            with suppress(Refused):
+                evaluated = transform.carrier.evaluated_get(depsgraph)
+                insertion.notice_assignment(transform, evaluated, frame, by_operator=by_operator)
+
+
+def _last_operator() -> int:
+    """Tells one operator that has ended from the next."""
+    manager = bpy.context.window_manager
+    operators = manager.operators if manager is not None else ()
+    return operators[-1].as_pointer() if len(operators) else 0
 
 
 def _look_through(*_: object) -> None:
     """Refresh all there is in the file."""
     _State.unseen = False
-    _State.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     refresh()
 
 
@@ -226,11 +314,17 @@ def _careful(handler: Callable) -> Callable:
 
 
 @_careful
+def _before_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if depsgraph.id_type_updated("OBJECT"):
+        _before_evaluation((depsgraph,), scene.frame_current_final)
+
+
+@_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
     seen = _follow(depsgraph, edited=depsgraph.id_type_updated("ACTION"))
     insertion.forget_poses(seen)
-    if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
+    if depsgraph.id_type_updated("OBJECT"):
         _follow_objects(depsgraph, _State.frame, seen)
 
 
@@ -239,7 +333,10 @@ def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
     graphs = [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
     _State.edited = any(graph.id_type_updated("ACTION") for graph in graphs)
     # A script that edits an object and goes on to another frame leaves no trace of which object it was.
-    _State.unseen |= any(graph.id_type_updated("OBJECT") for graph in graphs)
+    edited = [graph for graph in graphs if graph.id_type_updated("OBJECT")]
+    _State.unseen |= bool(edited)
+    if edited:
+        _before_evaluation(edited, _State.frame)
 
 
 @_careful
@@ -257,6 +354,17 @@ def _on_file(*_: object) -> None:
 
 
 @_careful
+def _on_load(*arguments: object) -> None:
+    insertion.forget_file()
+    with _turn() as ours:
+        if ours:
+            transforms = [transform_of(obj) for obj in bpy.data.objects]
+            moved = {user for place in slot_transforms_of(transforms) for user in place.users}
+            adopt_from_properties(transform for transform in transforms if transform not in moved)
+    _on_file(*arguments)
+
+
+@_careful
 def _on_undo(*arguments: object) -> None:
     _State.again = True
     try:
@@ -266,12 +374,13 @@ def _on_undo(*arguments: object) -> None:
 
 
 HANDLERS = {
+    "depsgraph_update_pre": _before_update,
     "depsgraph_update_post": _on_update,
     "frame_change_pre": _before_frame,
     "frame_change_post": _on_frame,
     "undo_post": _on_undo,
     "redo_post": _on_undo,
-    "load_post": _on_file,
+    "load_post": _on_load,
     "save_pre": _on_file,
     "render_init": _on_file,
 }

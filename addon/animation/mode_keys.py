@@ -1,61 +1,82 @@
-"""The mode channel: which segment is filled in how. A key of it decides from its frame on, until the next."""
+"""Choosing modes: which segment is filled in how.
+
+The mode of a transform is in the slot that moves it: in its mode channel, a key of which decides from its frame on
+until the next, or else in its record, for all segments. What was chosen before there was a slot waits on the transform.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from . import live
-from .reading import mode_of, read
-from .slots import GROUP, MODE_PATH, WIDTHS, Curves, Refused, Slot, Transformable, curves_in, slots_of
-from .sources import MODE_IDS, SAME_FRAME, UNKNOWN, Source, distinct
+from .acting import Readings, Targets, act_on
+from .channels import replace_keys
+from .mode_property import await_mode, is_keyed
+from .reading import read
+from .records import record_mode, recorded_mode
+from .refusals import refuse_numbers
+from .slots import GROUP, SlotTransform, slot_transforms_of
+from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
+from .transforms import WIDTHS, Channel, Refused, Transform, transform_of
 
 
-def active_slot(obj: bpy.types.Object) -> Slot | None:
-    """The slot whose keys the editors show: that of the object's Action, in tweak mode that of the strip."""
-    data = obj.animation_data
+def active_place(transform: Transform, places: Iterable[SlotTransform] | None = None) -> SlotTransform | None:
+    """The slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
+
+    `places` are those that are known already, else all of the transform's are looked up.
+    """
+    data = transform.animated.animation_data
     if data is None or data.action is None:
         return None
-    here = (data.action, data.action_slot_handle)
-    return next((slot for slot in slots_of([obj]) if (slot.action, slot.handle) == here), None)
+    active = (data.action, data.action_slot_handle)
+    places = slot_transforms_of([transform]) if places is None else places
+    return next(
+        (place for place in places if (place.slot.action, place.slot.handle) == active and transform in place.users),
+        None,
+    )
 
 
-def source_of(obj: bpy.types.Object) -> Source | None:
-    """What is keyed in an object's Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
-    slot = active_slot(obj)
-    source = None if slot is None else read(slot, curves_in(slot.channelbag))
+def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
+    """What is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
+    place = active_place(transform_of(carrier))
+    source = None if place is None else read(place)
     return source if source and source.channels else None
 
 
-def key_frames(obj: bpy.types.Object, *, selected: bool = False) -> np.ndarray:
-    """The frames of an object's location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
+def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
+    """The frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
 
     Keys of the mode channel count among the selected ones.
     """
-    slot = active_slot(obj)
-    return _frames_in(curves_in(slot.channelbag if slot else None), selected=selected)
+    place = active_place(transform_of(carrier))
+    return np.empty(0) if place is None else _frames_in(place, selected=selected)
 
 
-def modes_of(obj: bpy.types.Object, frames: np.ndarray) -> list[str]:
-    """The modes of an object's segments at these frames."""
-    slot = active_slot(obj)
-    curves = curves_in(slot.channelbag if slot else None)
-    return [MODE_IDS[number] for number in _modes_in(obj, curves, frames)]
+def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
+    """The modes of the segments at these frames. Without an Action, the mode that is awaited."""
+    transform = transform_of(carrier)
+    place = active_place(transform)
+    if place is None:
+        return [transform.motion.mode or "BLENDER"] * len(frames)
+    return [MODE_NAMES[number] for number in _modes_in(place, frames)]
 
 
-def segment_modes(slot: Slot) -> list[str]:
+def segment_modes(place: SlotTransform) -> list[str]:
     """The modes of the segments between the keys of a slot, one after the other."""
-    curves = curves_in(slot.channelbag)
-    return [MODE_IDS[number] for number in _modes_in(slot.users[0], curves, _frames_in(curves)[:-1])]
+    return [MODE_NAMES[number] for number in _modes_in(place, _frames_in(place)[:-1])]
 
 
-def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
+def _frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
     found = []
-    for (path, _), fcurve in curves.items():
-        if path in WIDTHS or (selected and path == MODE_PATH):
+    transform = place.users[0]
+    for channel, fcurve in place.curves.items():
+        path = channel[0].removeprefix(place.prefix)
+        if path in WIDTHS or (selected and channel == transform.mode_channel):
             keys = fcurve.keyframe_points
             points, chosen = np.empty(2 * len(keys), np.float32), np.ones(len(keys), dtype=bool)
             keys.foreach_get("co", points)
@@ -66,69 +87,123 @@ def _frames_in(curves: Curves, *, selected: bool = False) -> np.ndarray:
     return distinct(frames)
 
 
-def _modes_in(obj: bpy.types.Object, curves: Curves, frames: np.ndarray) -> list[int]:
-    """The modes at these frames, as `MODE_IDS` counts them; Blender's own where there is what is no mode."""
-    fcurve = curves.get((MODE_PATH, 0))
+def _modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
+    """The numbers of the modes at these frames; Blender's own where there is what is no mode."""
+    fcurve = place.curves.get(place.users[0].mode_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
-        modes = [mode_of(obj)] * len(frames)
+        modes = [recorded_mode(place)] * len(frames)
     else:
         modes = [_value(fcurve, frame) for frame in frames.tolist()]
-    return [mode if 0 <= mode < len(MODE_IDS) else 0 for mode in modes]
+    return [mode if mode in MODE_NAMES else 0 for mode in modes]
 
 
-def set_mode(obj: bpy.types.Object, mode: str, frames: Sequence[float] | None = None) -> None:
-    """Choose what happens between the keys of an object.
+def set_mode(
+    targets: Targets, mode: str, frames: Sequence[float] | None = None, *, refused: list[Refused] | None = None
+) -> None:
+    """Choose what happens between keys.
 
     Parameters
     ----------
-    obj : bpy.types.Object
+    targets : bpy.types.Object, or several of them
     mode : str
         One of `MODE_IDS`.
     frames : sequence of float, optional
         The frames of the keys that begin the segments meant. They get a key in the mode channel, and so does the key
-        behind them where another mode goes on; all other segments keep what they have. Without frames, the object
-        gets one mode for all, and the mode channel goes.
+        behind them where another mode goes on; all other segments keep what they have. Without frames, there is one
+        mode for all segments, and the mode channel goes.
+    refused : list, optional
+        Takes the refusals, and all other targets get the mode.
 
     Raises
     ------
     Refused
-        Where rigid motion cannot act on the object. Nothing is changed then.
+        Where rigid motion cannot act on one of them, and there is no list to take that. Nothing is changed then.
     """
-    slots = slots_of([obj])
-    if mode != "BLENDER":
-        check(obj, slots)
-    if frames is None:
-        for slot in slots:
-            if (fcurve := curves_in(slot.channelbag).get((MODE_PATH, 0))) is not None:
-                slot.channelbag.fcurves.remove(fcurve)
-        users = {obj, *(user for slot in slots for user in slot.users)}
-        with live.paused():
-            for user in users:
-                user.rigid_motion.mode = mode
-        live.refresh(users)
+
+    def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
+        if mode != "BLENDER":
+            check(transform, readings)
+        places = [place for place, _ in readings]
+        if frames is None:
+            return places
+        place = active_place(transform, places)
+        if place is None:
+            raise Refused(
+                f"{transform.name} has no Action with keys to set a mode on: "
+                "key it first, or enter a strip (NLA Editor, Tab)"
+            )
+        return [place]
+
+    def act(transform: Transform, places: list[SlotTransform]) -> None:
+        if not places:
+            await_mode(transform, mode)
+        for place in places:
+            if frames is not None:
+                set_mode_in(place, mode, frames)
+            elif place.slot.action.is_editable:
+                set_whole(place, mode)
+
+    if mode not in MODE_NUMBERS:
+        raise Refused(f"there is no mode {mode!r}; the modes are {', '.join(MODE_NUMBERS)}")
+    act_on(targets, plan, act, refused)
+
+
+def on_property(transform: Transform) -> None:
+    """Take it as a choice for the whole that somebody set the mode property."""
+    if live.is_busy():
         return
-    slot = active_slot(obj)
-    if slot is None:
-        raise Refused(
-            f"{obj.name} has no Action with keys to set a mode on: key it first, or enter a strip (NLA Editor, Tab)"
-        )
-    set_mode_in(slot, mode, frames)
-    live.refresh(slot.users)
+    mode = transform.motion.mode
+    places = [place for place in slot_transforms_of([transform]) if place.slot.action.is_editable]
+    if not places:
+        await_mode(transform, mode)
+    for place in places:
+        if not is_keyed(place):
+            record_mode(place, MODE_NUMBERS[mode])
+    live.refresh([transform])
 
 
-def set_mode_in(slot: Slot, mode: str, frames: Sequence[float]) -> None:
-    """Key the mode channel of one slot on these frames, and behind them where another mode goes on."""
-    curves = curves_in(slot.channelbag)
-    chosen, keyed = np.asarray(frames, dtype=np.float64), _frames_in(curves)
-    before = _modes_in(slot.users[0], curves, keyed)
-    fcurve = curves.get((MODE_PATH, 0)) or _new(slot)
+def set_whole(place: SlotTransform, mode: str) -> None:
+    """One mode for all segments of a slot."""
+    channel = place.users[0].mode_channel
+    if channel in place.curves:
+        place.slot.channelbag.fcurves.remove(place.curves.pop(channel))
+    record_mode(place, MODE_NUMBERS[mode])
+
+
+def set_mode_in(place: SlotTransform, mode: str, frames: Sequence[float]) -> None:
+    """Key the mode channel of a slot on these frames, and behind them where another mode goes on."""
+    chosen, keyed = np.asarray(frames, dtype=np.float64), _frames_in(place)
+    is_chosen = _is_among(chosen, keyed)
+    wanted = np.where(is_chosen, MODE_NUMBERS[mode], _modes_in(place, keyed))
+    channel = place.users[0].mode_channel
+    fcurve = place.curves.get(channel) or _new(place, channel)
     # Muted it has no say. Now it has, and all other segments keep the mode that they had without.
+    old = [] if fcurve.mute else _keys_in(fcurve)
     fcurve.mute = False
-    for frame, old, is_chosen in zip(keyed.tolist(), before, _is_among(chosen, keyed).tolist(), strict=True):
-        wanted = MODE_IDS.index(mode) if is_chosen else old
-        if is_chosen or not len(fcurve.keyframe_points) or _value(fcurve, frame) != wanted:
-            _set_key(fcurve, frame, wanted, selected=is_chosen)
-    fcurve.update()
+    keys: list[tuple[float, float, bool]] = []
+    passed = 0
+    for frame, number, meant in zip(keyed.tolist(), wanted.tolist(), is_chosen.tolist(), strict=True):
+        while passed < len(old) and old[passed][0] < frame - SAME_FRAME:
+            keys.append(old[passed])
+            passed += 1
+        replaced = passed < len(old) and old[passed][0] <= frame + SAME_FRAME
+        if meant or replaced or not keys or round(keys[-1][1]) != number:
+            # Selected as the key of the pose is, so that both move together.
+            keys.append((frame, number, meant or (replaced and old[passed][2])))
+        passed += replaced
+    frames, numbers, selected = zip(*keys, *old[passed:], strict=True)
+    replace_keys(fcurve, np.array(frames), np.array(numbers), interpolation="CONSTANT", selected=np.array(selected))
+
+
+def _keys_in(fcurve: bpy.types.FCurve) -> list[tuple[float, float, bool]]:
+    """Frame, value and whether it is selected, of each key."""
+    points, selected = (
+        np.empty(2 * len(fcurve.keyframe_points), np.float32),
+        np.empty(len(fcurve.keyframe_points), bool),
+    )
+    fcurve.keyframe_points.foreach_get("co", points)
+    fcurve.keyframe_points.foreach_get("select_control_point", selected)
+    return list(zip(points[::2].tolist(), points[1::2].tolist(), selected.tolist(), strict=True))
 
 
 def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
@@ -137,14 +212,17 @@ def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
 
-def check(obj: bpy.types.Object, slots: Sequence[Slot]) -> None:
-    """Raise `Refused` where an object, which these slots move, cannot have any mode but Blender's own."""
-    what = Transformable.of(obj)
-    what.rotation  # noqa: B018 - raises where it turns by axis and angle
-    if not obj.is_editable:
-        raise Refused(f"{obj.name} is linked from another file: make it local first (Object > Relations > Make Local)")
-    for slot in slots:
-        read(slot, curves_in(slot.channelbag), mode=1)
+def check(transform: Transform, readings: Readings) -> None:
+    """Raise `Refused` where a transform, which is keyed so, cannot have any mode but Blender's own."""
+    transform.rotation  # noqa: B018 - raises where it turns by axis and angle
+    if not transform.animated.is_editable:
+        raise Refused(
+            f"{transform.name} is linked from another file: make it local first (Object > Relations > Make Local)"
+        )
+    for _, source in readings:
+        if isinstance(source, Refused):
+            raise source
+        refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
 
 
 def _value(fcurve: bpy.types.FCurve, frame: float) -> int:
@@ -153,15 +231,9 @@ def _value(fcurve: bpy.types.FCurve, frame: float) -> int:
     return round(value) if math.isfinite(value) else UNKNOWN
 
 
-def _new(slot: Slot) -> bpy.types.FCurve:
-    channelbag = slot.channelbag
-    fcurve = channelbag.fcurves.new(MODE_PATH)
+def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
+    path, index = channel
+    channelbag = place.slot.channelbag
+    fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
     fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
     return fcurve
-
-
-def _set_key(fcurve: bpy.types.FCurve, frame: float, value: int, *, selected: bool) -> None:
-    """A key that holds, selected as the key of the pose is, so that both move together."""
-    key = fcurve.keyframe_points.insert(frame, value, options={"FAST"})
-    key.interpolation = "CONSTANT"
-    key.select_control_point = key.select_left_handle = key.select_right_handle = selected

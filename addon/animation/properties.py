@@ -1,12 +1,14 @@
-"""What is kept in the file: an object's mode and its own delta transforms, and what an Action was filled in for.
+"""What is kept in the file, on Actions and on objects. Without the extension all of it is inert, and stays in the file.
 
-Without the extension all of it is inert, and stays in the file.
+An Action keeps the modes of what it moves: see `records`. An object shows its own there, to be chosen and to be
+animated, and keeps the delta transforms that it has without in-betweens.
 """
 
 from __future__ import annotations
 
 import bpy
 from bpy.props import (
+    BoolProperty,
     BoolVectorProperty,
     CollectionProperty,
     EnumProperty,
@@ -18,24 +20,39 @@ from bpy.props import (
 )
 
 from ..motion import KEYFRAME_MODES
-from . import live
+from . import live, mode_keys
 from .originals import BAKED, REDUCED
+from .transforms import transform_of
+
+FIRST = ("motor_spline", "dq_sclerp")
+"""The modes that menus show first: those to take where nothing speaks for another."""
 
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
-    *((name, mode.label, mode.description, number) for number, (name, mode) in enumerate(KEYFRAME_MODES.items(), 1)),
+    *(
+        (name, KEYFRAME_MODES[name].label, KEYFRAME_MODES[name].description, KEYFRAME_MODES[name].number)
+        for name in (*FIRST, *(name for name in KEYFRAME_MODES if name not in FIRST))
+    ),
 ]
+"""The modes as items of an enumeration. Files have the numbers."""
 
 
 class SlotRecord(bpy.types.PropertyGroup):
-    """What the in-betweens of one slot were computed from."""
+    """One transform in one slot: its mode, and what its in-betweens were made from."""
 
     handle: IntProperty(options={"HIDDEN"})
+    prefix: StringProperty(options={"HIDDEN"})
+    mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
     digest: StringProperty(options={"HIDDEN"})
+    rows: StringProperty(options={"HIDDEN"})
 
 
 class ActionMotion(bpy.types.PropertyGroup):
     slots: CollectionProperty(type=SlotRecord)
+    range_is_ours: BoolProperty(
+        description="Whether the manual frame range was set for samples that lie behind the keys",
+        options={"HIDDEN"},
+    )
 
 
 class ChangedAction(bpy.types.PropertyGroup):
@@ -58,8 +75,12 @@ class ChangedAction(bpy.types.PropertyGroup):
     )
 
 
-def _refresh(motion: ObjectMotion, _context: bpy.types.Context) -> None:
-    live.refresh([motion.id_data])
+def _on_mode(motion: ObjectMotion, _context: bpy.types.Context) -> None:
+    mode_keys.on_property(transform_of(motion.id_data))
+
+
+def _on_original(motion: ObjectMotion, _context: bpy.types.Context) -> None:
+    live.follow_original(transform_of(motion.id_data))
 
 
 class ObjectMotion(bpy.types.PropertyGroup):
@@ -69,7 +90,13 @@ class ObjectMotion(bpy.types.PropertyGroup):
         items=MODE_ITEMS,
         options={"ANIMATABLE"},
         override={"LIBRARY_OVERRIDABLE"},
-        update=_refresh,
+        update=_on_mode,
+    )
+    awaited: EnumProperty(
+        description="The mode that was chosen before there was an Action to keep it",
+        items=MODE_ITEMS,
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
     )
     filled: BoolVectorProperty(
         description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
@@ -83,7 +110,7 @@ class ObjectMotion(bpy.types.PropertyGroup):
         subtype="TRANSLATION",
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
-        update=_refresh,
+        update=_on_original,
     )
     own_quaternion: FloatVectorProperty(
         name="Delta Rotation",
@@ -93,7 +120,7 @@ class ObjectMotion(bpy.types.PropertyGroup):
         subtype="QUATERNION",
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
-        update=_refresh,
+        update=_on_original,
     )
     own_euler: FloatVectorProperty(
         name="Delta Rotation",
@@ -101,7 +128,7 @@ class ObjectMotion(bpy.types.PropertyGroup):
         subtype="EULER",
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
-        update=_refresh,
+        update=_on_original,
     )
     own_scale: FloatVectorProperty(
         name="Delta Scale",
@@ -110,7 +137,7 @@ class ObjectMotion(bpy.types.PropertyGroup):
         subtype="XYZ",
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
-        update=_refresh,
+        update=_on_original,
     )
     bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 

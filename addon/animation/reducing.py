@@ -16,25 +16,25 @@ import numpy as np
 
 from ..motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ..motion.best_of import least_errors
-from . import live
-from .bake import channel_values
-from .channels import code_of
+from .acting import Readings, Targets, act_on
+from .bake import channel_values, go_back
+from .channels import replace_keys
 from .curves import CODE, CONSTANT, LINEAR, Keys
 from .inbetweens import in_betweens
 from .mode_keys import segment_modes, set_mode_in
 from .originals import (
     REDUCED,
+    discard_originals,
     entries_in_use,
     has_original,
-    let_go,
     move_by_copy,
-    put_back,
     refuse_tweak_mode,
     refuse_without_original,
 )
-from .reading import read
-from .slots import MODE_PATH, Refused, Slot, Transformable, curves_in, slots_of
-from .sources import MODE_IDS, ROWS, SAME_FRAME, SCALE, Source, distinct
+from .refusals import refuse_numbers
+from .slots import SlotTransform, slot_transforms_of
+from .sources import MODE_NAMES, MODE_NUMBERS, ROWS, SAME_FRAME, SCALE, Source, distinct
+from .transforms import Channel, Refused, Transform, transform_of
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far the object gets."""
@@ -61,19 +61,19 @@ class Reduction:
 class _Fewer:
     """The keys that one slot is to have, and what had them before."""
 
-    slot: Slot
+    place: SlotTransform
     before: int
     frames: np.ndarray
     """Shape (k,)."""
 
-    values: dict[tuple[str, int], np.ndarray]
+    values: dict[Channel, np.ndarray]
     """What is written on these frames, by data path and index, each of shape (k,)."""
 
     key_frames: np.ndarray
     """The same with frames of keys that a scale keeps, shape (n,)."""
 
     modes: np.ndarray
-    """What goes on from each of these, as `MODE_IDS` counts them, shape (n,)."""
+    """The numbers of the modes that go on from each of these, shape (n,)."""
 
     keeps_scale: bool
 
@@ -81,14 +81,15 @@ class _Fewer:
 
 
 def reduce_keys_of(
-    obj: bpy.types.Object,
+    targets: Targets,
     mode: str = "motor_spline",
     tolerance: float = 0.001,
     radius: float | None = None,
     *,
     best_of: bool = False,
-) -> Reduction:
-    """Leave an object only the keys that a mode needs to show the same motion.
+    refused: list[Refused] | None = None,
+) -> Reduction | None:
+    """Leave only the keys that a mode needs to show the same motion.
 
     A key is a pose: location, rotation and, where it is even, scale have keys on the same frames, with the values that
     the recording has there. A scale that differs from axis to axis as it changes keeps the keys it has, and so does
@@ -96,90 +97,129 @@ def reduce_keys_of(
 
     Parameters
     ----------
-    obj : bpy.types.Object
+    targets : bpy.types.Object, or several of them
     mode : str
         What fills in between the keys, one of `addon.motion.KEYFRAME_MODES`. It is keyed with them.
     tolerance : float
         The largest shell error on any frame, in the scene's units.
     radius : float, optional
-        Of the shell, in the scene's units. `radius_of` the object, otherwise.
+        Of the shell, in the scene's units. `radius_of` each target, otherwise.
     best_of : bool
         Give each segment between these keys the mode with the least RMS shell error there that keeps to the tolerance;
         of equally good ones `mode`.
+    refused : list, optional
+        Takes the refusals, and all other targets are reduced.
 
     Returns
     -------
-    Reduction
+    Reduction or None
+        That of the last target which did not refuse.
 
     Raises
     ------
     Refused
-        Where there are no keys, or no fewer will do, or rigid motion cannot act on them. Nothing is changed then.
+        Where there are no keys, or no fewer will do, or rigid motion cannot act on a target, and there is no list to
+        take that. Nothing is changed then.
     """
     if mode not in KEYFRAME_MODES:
-        raise Refused(f"{obj.name}: there is no mode {mode!r}; the modes are {', '.join(KEYFRAME_MODES)}")
+        raise Refused(f"there is no mode {mode!r}; the modes are {', '.join(KEYFRAME_MODES)}")
     if not 0.0 < tolerance < math.inf:
-        raise Refused(f"{obj.name}: the tolerance has to be a number above zero, not {tolerance:g}")
-    refuse_tweak_mode(obj)
-    radius = radius_of(obj) if radius is None else radius
-    readings = [(slot, read(slot, curves_in(slot.channelbag))) for slot in slots_of([obj])]
-    readings = [(slot, source) for slot, source in readings if source.channels]
-    if not readings:
-        raise Refused(_why_nothing_is_there(obj, 0))
-    found = [_fewer_keys(obj, slot, source, mode, tolerance, radius, best_of=best_of) for slot, source in readings]
-    fewer = [one for one in found if len(one.key_frames) < one.before]
-    if not fewer:
-        before, keeps_scale = sum(one.before for one in found), any(one.keeps_scale for one in found)
-        raise Refused(_why_no_fewer(obj, before, keeps_scale=keeps_scale))
-    with live.paused():
-        for one in fewer:
-            _write(obj, one)
-    live.refresh([obj])
-    return reduction_of(obj)
+        raise Refused(f"the tolerance has to be a number above zero, not {tolerance:g}")
+
+    def plan(transform: Transform, readings: Readings) -> list[_Fewer]:
+        refuse_tweak_mode(transform)
+        found = [
+            _fewer_keys(
+                transform, place, source, mode, tolerance, radius or radius_of(transform.carrier), best_of=best_of
+            )
+            for place, source in _keyed(transform, readings)
+        ]
+        if not found:
+            raise Refused(_why_nothing_is_keyed(transform, 0))
+        fewer = [reduced for reduced in found if len(reduced.key_frames) < reduced.before]
+        if not fewer:
+            before, keeps_scale = sum(kept.before for kept in found), any(kept.keeps_scale for kept in found)
+            raise Refused(_why_no_fewer(transform, before, keeps_scale=keeps_scale))
+        return fewer
+
+    def act(transform: Transform, fewer: list[_Fewer]) -> None:
+        for reduced in fewer:
+            _write(transform, reduced)
+
+    done = act_on(targets, plan, act, refused)
+    return reduction_of(list(done)[-1]) if done else None
 
 
-def reduction_of(obj: bpy.types.Object) -> Reduction | None:
-    """What became of the keys that an object moves by when they were reduced. None where they were not."""
-    entries = [entry for entry in entries_in_use(obj) if entry.kind == REDUCED]
+def _keyed(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
+    """What is keyed of a transform. `Refused` where one of its slots cannot be read."""
+    for _, source in readings:
+        if isinstance(source, Refused):
+            raise source
+        refuse_numbers(transform.name, source)
+    return [(place, source) for place, source in readings if source.channels]
+
+
+def reduction_of(target: bpy.types.Object | Transform) -> Reduction | None:
+    """What became of the keys that something moves by when they were reduced. None where they were not."""
+    transform = transform_of(target)
+    if not len(transform.motion.bakes):
+        return None
+    places = slot_transforms_of([transform])
+    entries = [entry for entry in entries_in_use(transform, places) if entry.kind == REDUCED]
     if not entries:
         return None
     reduced = {entry.changed for entry in entries}
+    modes = [mode for place in places if place.slot.action in reduced for mode in segment_modes(place)]
     return Reduction(
         sum(entry.keys_before for entry in entries),
         sum(entry.keys_after for entry in entries),
         max(entry.largest_error for entry in entries),
-        dict(Counter(mode for slot in slots_of([obj]) if slot.action in reduced for mode in segment_modes(slot))),
+        dict(Counter(modes)),
     )
 
 
-def is_reduced(obj: bpy.types.Object) -> bool:
-    """Whether an object moves by an Action with reduced keys, and its original is still in the file."""
-    return has_original(obj, REDUCED)
+def is_reduced(target: bpy.types.Object | Transform) -> bool:
+    """Whether something moves by an Action with reduced keys, and its original is still in the file."""
+    return has_original(transform_of(target), REDUCED)
 
 
-def restore_keys(obj: bpy.types.Object) -> None:
-    """Give an object all the keys back that it had before they were reduced, to the last handle.
+def restore_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Give all the keys back that there were before they were reduced, to the last handle.
 
-    Raises
-    ------
-    Refused
-        Where they are not reduced, or gone. Nothing is changed then.
-    """
-    refuse_without_original(obj, REDUCED)
-    refuse_tweak_mode(obj)
-    put_back(obj, REDUCED)
-
-
-def let_keys_go(obj: bpy.types.Object) -> None:
-    """Let the keys leave the file that an object had before they were reduced.
+    Parameters
+    ----------
+    targets : bpy.types.Object, or several of them
+    refused : list, optional
+        Takes the refusals, and all other targets get their keys back.
 
     Raises
     ------
     Refused
-        Where they are not reduced, or gone. Nothing is changed then.
+        Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
     """
-    refuse_without_original(obj, REDUCED)
-    let_go(obj, REDUCED)
+    go_back(targets, REDUCED, refused)
+
+
+def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Remove the keys from the file that there were before they were reduced.
+
+    Parameters
+    ----------
+    targets : bpy.types.Object, or several of them
+    refused : list, optional
+        Takes the refusals, and the dense keys of all other targets are removed.
+
+    Raises
+    ------
+    Refused
+        Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
+    """
+    act_on(
+        targets,
+        lambda transform, _: refuse_without_original(transform, REDUCED),
+        lambda transform, _: discard_originals(transform, REDUCED),
+        refused,
+    )
 
 
 def radius_of(obj: bpy.types.Object) -> float:
@@ -214,21 +254,28 @@ def _size(matrix: object) -> float:
 
 
 def _fewer_keys(
-    obj: bpy.types.Object, slot: Slot, source: Source, mode: str, tolerance: float, radius: float, *, best_of: bool
+    transform: Transform,
+    place: SlotTransform,
+    source: Source,
+    mode: str,
+    tolerance: float,
+    radius: float,
+    *,
+    best_of: bool,
 ) -> _Fewer:
     """The keys that one slot needs, which may be as many as it has."""
     before, frames = distinct(source.keyed_frames), _samples(source)
     # What goes on outside of the keys, by cycles or at a slope, has to stay as well.
-    around = np.arange(source.frame_range[0], source.frame_range[1] + 1.0)
+    around = np.arange(source.seen_range[0], source.seen_range[1] + 1.0)
     around = around[(around < frames[0]) | (around > frames[-1])]
     seen = np.concatenate((around[around < frames[0]], frames, around[around > frames[-1]]))
     truth, own = _poses(source, seen), np.isin(seen, frames)
-    unit, radius = _in_channels(obj, radius, truth.scales is not None)
+    unit, radius = _in_channels(transform.carrier, radius, truth.scales is not None)
     tolerance /= unit
     rounding = SMALLEST * (float(np.abs(truth.positions).max()) + radius)
     allowed = tolerance + rounding
-    values = _values(obj, source, frames)
-    chosen = _chosen(obj, source, frames, truth[own], mode, tolerance, radius)
+    values = _values(transform, source, frames)
+    chosen = _chosen(transform, source, frames, truth[own], mode, tolerance, radius)
     while True:
         fewer = _with_keys(source, frames[chosen], {row: column[chosen] for row, column in values.items()}, mode)
         error = shell_error(_poses(fewer, seen), truth, radius)
@@ -237,8 +284,8 @@ def _fewer_keys(
         more = _worst(chosen, error[own], allowed)
         if not len(more):
             raise Refused(
-                f"{obj.name} goes on outside of its keys, and with fewer of them would go elsewhere there: give its "
-                "channels constant extrapolation and no cycles, or cycles that all have the same range"
+                f"{transform.name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
+                "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
             )
         chosen = np.union1d(chosen, more)
     if best_of:
@@ -248,12 +295,12 @@ def _fewer_keys(
         if error_of_mixed.max() <= allowed:
             fewer, error = mixed, error_of_mixed
     key_frames = distinct(fewer.keyed_frames)
-    paths = Transformable.of(obj).channels
+    channels = transform.channels
     return _Fewer(
-        slot,
+        place,
         len(before),
         frames[chosen],
-        {paths[row]: column[chosen] for row, column in values.items()},
+        {channels[row]: column[chosen] for row, column in values.items()},
         key_frames,
         fewer.modes_at(key_frames + SAME_FRAME),
         SCALE in source.keyed and ROWS[SCALE].start not in values,
@@ -271,7 +318,7 @@ def _in_channels(obj: bpy.types.Object, radius: float, scaled: bool) -> tuple[fl
 
 
 def _chosen(
-    obj: bpy.types.Object,
+    transform: Transform,
     source: Source,
     frames: np.ndarray,
     poses: Poses,
@@ -284,7 +331,9 @@ def _chosen(
         # It stays what it is, and makes the object this large.
         radius, poses = radius * float(np.abs(poses.scales).max()), Poses(poses.positions, poses.quaternions)
     elif poses.scales is not None and not np.all(poses.scales > 0.0):
-        raise Refused(f"{obj.name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)")
+        raise Refused(
+            f"{transform.name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"
+        )
     return reduce_keys(frames, poses, mode, tolerance, radius)
 
 
@@ -293,10 +342,10 @@ def _with_best_modes(
 ) -> Source:
     """The source with the best mode in each segment, of those that keep within what is allowed on these frames."""
     keys = distinct(source.keyed_frames)
-    codes = np.array([source.mode, *(code for code in range(1, len(MODE_IDS)) if code != source.mode)])
-    errors = np.stack([shell_error(_poses(replace(source, mode=int(code)), frames), truth, radius) for code in codes])
+    numbers = np.array([source.mode, *(mode.number for mode in KEYFRAME_MODES.values() if mode.number != source.mode)])
+    errors = np.stack([shell_error(_poses(replace(source, mode=int(n)), frames), truth, radius) for n in numbers])
     best = least_errors(errors, np.searchsorted(frames, keys - SAME_FRAME), rounding, allowed)
-    points = np.stack((keys, codes[[*best, best[-1]]]), axis=-1)[None].astype(np.float32)
+    points = np.stack((keys, numbers[[*best, best[-1]]]), axis=-1)[None].astype(np.float32)
     return replace(source, mode=Keys(points, np.full(points.shape[:2], CONSTANT, CODE)))
 
 
@@ -327,20 +376,19 @@ def _poses(source: Source, frames: np.ndarray) -> Poses:
     return Poses(
         wanted.positions,
         wanted.quaternions,
-        (source.values_at(frames)[ROWS[SCALE]] * source.own[ROWS[SCALE], None]).mean(axis=0),
+        (source.values_at(frames)[ROWS[SCALE]] * source.original[ROWS[SCALE], None]).mean(axis=0),
     )
 
 
-def _values(obj: bpy.types.Object, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
+def _values(transform: Transform, source: Source, frames: np.ndarray) -> dict[int, np.ndarray]:
     """What the channels that get other keys have on these frames, each (n,), by their rows among the components."""
-    what = Transformable.of(obj)
-    by_path = channel_values(what, source, in_betweens(source, frames))
+    by_path = channel_values(transform, source, in_betweens(source, frames))
     if SCALE in source.keyed and not source.uniform_scale:
         scale = source.values_at(frames)[ROWS[SCALE]].T
         if np.all(_is_constant(scale)):
-            by_path[what.prefix + what.properties[SCALE]] = scale
+            by_path[transform.prefix + transform.properties[SCALE]] = scale
     keyed = {row for own, _ in source.channels for row in own}
-    columns = {row: by_path[path][:, index] for row, (path, index) in what.channels.items() if path in by_path}
+    columns = {row: by_path[path][:, index] for row, (path, index) in transform.channels.items() if path in by_path}
     return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
 
 
@@ -365,52 +413,40 @@ def _with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray]
         if places:
             channels.append(([own[place] for place in places], keys.only(places)))
     rest = {row: value for row, value in source.rest.items() if row not in values}
-    return replace(source, channels=tuple(channels), rest=rest, mode=MODE_IDS.index(mode))
+    return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode])
 
 
-def _write(obj: bpy.types.Object, fewer: _Fewer) -> None:
-    copy = move_by_copy(obj, fewer.slot, REDUCED)
-    entry = obj.rigid_motion.bakes[-1]
+def _write(transform: Transform, fewer: _Fewer) -> None:
+    copy = move_by_copy(transform, fewer.place, REDUCED)
+    entry = transform.motion.bakes[-1]
     entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
     entry.largest_error = fewer.largest_error
-    fcurves, curves = copy.channelbag.fcurves, curves_in(copy.channelbag)
+    fcurves = copy.slot.channelbag.fcurves
     for (path, index), values in fewer.values.items():
-        _set_keys(curves.get((path, index)) or fcurves.new(path, index=index), fewer.frames, values)
-    if (MODE_PATH, 0) in curves:
-        fcurves.remove(curves[MODE_PATH, 0])
+        fcurve = copy.curves.get((path, index)) or fcurves.new(path, index=index)
+        replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
+        fcurve.mute = False
+    copy = copy.read_again()
+    if transform.mode_channel in copy.curves:
+        fcurves.remove(copy.curves.pop(transform.mode_channel))
     for mode in np.unique(fewer.modes):
-        set_mode_in(copy, MODE_IDS[mode], fewer.key_frames[fewer.modes == mode])
+        set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
 
 
-def _set_keys(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
-    """Put these keys in place of those that a channel has."""
-    keys = fcurve.keyframe_points
-    keys.clear()
-    keys.add(len(frames))
-    keys.foreach_set("co", np.stack((frames, values), axis=1).astype(np.float32).ravel())
-    for name, value in (
-        ("interpolation", "LINEAR"),
-        ("handle_left_type", "AUTO_CLAMPED"),
-        ("handle_right_type", "AUTO_CLAMPED"),
-    ):
-        keys.foreach_set(name, np.full(len(frames), code_of(name, value), np.int32))
-    fcurve.mute = False
-    fcurve.update()
-
-
-def _why_no_fewer(obj: bpy.types.Object, count: int, *, keeps_scale: bool) -> str:
+def _why_no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> str:
     if count <= 2:
-        return _why_nothing_is_there(obj, count)
+        return _why_nothing_is_keyed(transform, count)
     if keeps_scale:
         return (
-            f"{obj.name} keeps its {count} keys: its scale changes differently along its axes, which is no part of a "
-            "pose; move that animation to a child, or remove keys of the scale by hand"
+            f"{transform.name} keeps its {count} keys: its scale changes differently along its axes, which is no "
+            "part of a pose; move that animation to a child, or remove keys of the scale by hand"
         )
-    return f"{obj.name} needs its {count} keys to stay within the tolerance: allow a larger one"
+    return f"{transform.name} needs its {count} keys to stay within the tolerance: allow a larger one"
 
 
-def _why_nothing_is_there(obj: bpy.types.Object, count: int) -> str:
-    """What moves an object that has hardly a key, and how that becomes keys."""
+def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
+    """What moves something that has hardly a key, and how that becomes keys."""
+    obj = transform.carrier
     has = f"{obj.name} has {count or 'no'} key{'s' * (count != 1)} of location, rotation or scale"
     constraints = {constraint.type for constraint in obj.constraints if constraint.enabled}
     if obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
@@ -425,7 +461,7 @@ def _why_nothing_is_there(obj: bpy.types.Object, count: int) -> str:
             f"{has}, constraints or drivers move it: bake them first "
             "(Object > Animation > Bake Action, with Visual Keying)"
         )
-    if any(path.startswith("pose.bones") for slot in slots_of([obj]) for path, _ in curves_in(slot.channelbag)):
+    if any(path.startswith("pose.bones") for place in slot_transforms_of([transform]) for path, _ in place.curves):
         return (
             f"{has}, its bones have: let an empty copy the transforms of a bone, bake the empty "
             "(Object > Animation > Bake Action, with Visual Keying), and reduce that"

@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 
 from .curves import Keys
-from .slots import GROUP, Curves, Refused, Slot, Transformable, is_filled_in
-from .sources import MODE_IDS, UNKNOWN, Source
+from .slots import GROUP, SlotTransform, is_filled_in
+from .sources import MODE_NAMES, UNKNOWN, Source
+from .transforms import Refused, Transform
 
 MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
@@ -22,28 +23,28 @@ COMPONENTS = (
 """What the rows of a source are called."""
 
 
-def refuse_what_is_taken(what: Transformable, slot: Slot, curves: Curves) -> None:
-    """Raise `Refused` where the delta transforms are not to be had."""
-    for block in (what.animated, slot.action):
+def refuse_what_is_taken(user: Transform, place: SlotTransform) -> None:
+    """Raise `Refused` where a user's channels, or what the differences go into, are not to be had."""
+    for block in (user.animated, place.slot.action):
         if not block.is_editable:
             raise Refused(
                 f"{block.name} is linked from another file: make it local first (Object > Relations > Make Local)"
             )
-    deltas = what.deltas.values()
-    for driver in what.animated.animation_data.drivers:
-        if any(driver.data_path == path for path, _ in (*what.channels.values(), *deltas)):
-            raise Refused(f"{what.name}: {_label(driver)} is driven: remove the driver, or bake it to keys")
-    for key in deltas:
-        fcurve = curves.get(key)
+    differences = user.differences.values()
+    for driver in user.animated.animation_data.drivers:
+        if any(driver.data_path == path for path, _ in (*user.channels.values(), *differences)):
+            raise Refused(f"{user.name}: {_label(driver)} is driven: remove the driver, or bake it to keys")
+    for channel in differences:
+        fcurve = place.curves.get(channel)
         if fcurve is not None and not is_filled_in(fcurve):
             if fcurve.group is not None and fcurve.group.name == GROUP:
                 raise Refused(
-                    f"{what.name}: {_label(fcurve)} has in-betweens that were turned into keys: "
+                    f"{user.name}: {_label(fcurve)} has in-betweens that were turned into keys: "
                     "delete that channel, and they are made anew (Dope Sheet, X)"
                 )
-            prop = key[0].rpartition("delta_")[2]
+            prop = channel[0].rpartition("delta_")[2]
             raise Refused(
-                f"{what.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
+                f"{user.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
                 f"{prop.replace('_', ' ')} (Object > Apply > Animated Transforms to Deltas does the reverse)"
             )
 
@@ -70,20 +71,14 @@ def refuse_numbers(name: str, source: Source) -> None:
     _refuse_modes(name, source.mode)
     if not source.channels:
         return
-    numbers = (*source.own.tolist(), *source.rest.values())
+    numbers = (*source.original.tolist(), *source.rest.values())
     if not (all(map(math.isfinite, numbers)) and all(keys.is_sound for keys in source.curves)):
         _explain_numbers(name, source)
-    first, last = source.frame_range
+    first, last = source.keyed_range
     if last - first > MOST_FRAMES:
-        keyed = max(keys.times[-1] for keys in source.curves) - min(keys.times[0] for keys in source.curves)
-        if keyed > MOST_FRAMES:
-            raise Refused(
-                f"{name} has keys over {keyed:.0f} frames, at most {MOST_FRAMES} can be filled in: "
-                "delete the keys that are far off"
-            )
         raise Refused(
-            f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most {MOST_FRAMES} "
-            "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+            f"{name} has keys over {last - first:.0f} frames, at most {MOST_FRAMES} can be filled in: "
+            "delete the keys that are far off"
         )
     try:
         source.key_frames  # noqa: B018 - raises where cycles make too many
@@ -134,7 +129,7 @@ def _refuse_modes(name: str, mode: int | Keys) -> None:
         if mode == UNKNOWN:
             raise Refused(f"{name} has a mode that this version does not know: choose another")
         return
-    known = (mode.values[0] > -0.5) & (mode.values[0] < len(MODE_IDS) - 0.5) & np.isfinite(mode.times)
+    known = np.isin(np.rint(mode.values[0]), list(MODE_NAMES)) & np.isfinite(mode.times)
     if not known.all():
         raise Refused(
             f"{name}: key {int(np.argmin(known)) + 1} of the mode channel has no mode that this version knows: "

@@ -1,98 +1,29 @@
-"""Which Action slots move an object, and the F-curves in them.
+"""Which Action slots move something, and the F-curves in them, transform by transform.
 
-Objects are what can be filled in. A pose bone has its channels in its armature's Action, under a prefix of its own, and
-no delta transforms: `Transformable` is where it will come in, for what is baked.
+A slot may have several users, and moves one transform of each: the object itself. Pose bones, with a prefix of their
+own in the slot of their armature, are to come in here: `transforms_in` is where a slot is taken apart.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..motion.eulers import ORDERS
-from .sources import LOCATION, ROTATION, ROWS, SCALE
-
-MODE_PATH = "rigid_motion.mode"
+from .transforms import MODE_PROPERTY, Channel, ObjectTransform, Transform
 
 GROUP = "Rigid Motion"
-"""The group of F-curves that the mode channel and the delta transforms are in."""
+"""The group of F-curves that the mode channel and the differences are in."""
 
-WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, SCALE: 3}
-
-Curves = dict[tuple[str, int], bpy.types.FCurve]
-
-
-class Refused(ValueError):
-    """Why rigid motion cannot act on something: names it, and the way out."""
-
-
-@dataclass(frozen=True)
-class Transformable:
-    """What has location, rotation and scale, told apart from the object whose Action holds the channels."""
-
-    animated: bpy.types.Object
-    carrier: bpy.types.Object | bpy.types.PoseBone
-    prefix: str = ""
-    """From the object to the carrier, in data paths."""
-
-    @classmethod
-    def of(cls, obj: bpy.types.Object) -> Transformable:
-        return cls(obj, obj)
-
-    @property
-    def name(self) -> str:
-        return self.carrier.name
-
-    @property
-    def rotation(self) -> str:
-        """The property that turns it. `Refused` where that is an axis and an angle."""
-        mode = self.carrier.rotation_mode
-        if mode == "QUATERNION":
-            return "rotation_quaternion"
-        if mode in ORDERS:
-            return "rotation_euler"
-        raise Refused(
-            f"{self.name} turns by axis and angle, which has no rigid in-betweens: "
-            "set its rotation mode to Quaternion first (sidebar, Item)"
-        )
-
-    @property
-    def properties(self) -> dict[str, str]:
-        """Location, rotation and scale, and which property each of them is."""
-        return _properties(self.rotation)
-
-    @property
-    def channels(self) -> dict[int, tuple[str, int]]:
-        """Data path and index of each of its components, by their rows."""
-        return _channels(self.prefix, self.rotation)
-
-    @property
-    def deltas(self) -> dict[int, tuple[str, int]]:
-        """The same of its delta transforms."""
-        return _channels(f"{self.prefix}delta_", self.rotation)
-
-
-def _properties(rotation: str) -> dict[str, str]:
-    return {LOCATION: "location", ROTATION: rotation, SCALE: "scale"}
-
-
-@cache
-def _channels(prefix: str, rotation: str) -> dict[int, tuple[str, int]]:
-    return {
-        ROWS[name].start + index: (prefix + prop, index)
-        for name, prop in _properties(rotation).items()
-        for index in range(WIDTHS[prop])
-    }
+Curves = dict[Channel, bpy.types.FCurve]
 
 
 @dataclass(frozen=True)
 class Slot:
-    """One of the slots that move an object, with everything else that it moves."""
+    """One of the slots that move something, with everything else that it moves."""
 
     action: bpy.types.Action
     handle: int
@@ -101,7 +32,7 @@ class Slot:
     """The frames of the Action that strips show; None where it plays by itself."""
 
     @property
-    def span(self) -> tuple[int, int]:
+    def seen(self) -> tuple[int, int]:
         """The frames that are seen: those of the strips, and of all scenes where it plays by itself."""
         spans = [strip for strip in self.strips if strip is not None]
         if None in self.strips:
@@ -110,9 +41,74 @@ class Slot:
         return min(first for first, _ in spans), max(last for _, last in spans)
 
     @property
+    def in_nla(self) -> bool:
+        """Whether a strip shows it, or stands beside it in the NLA of one of its users."""
+        return any(len(user.animation_data.nla_tracks) > 0 for user in self.users)
+
+    @property
     def channelbag(self) -> bpy.types.ActionChannelbag | None:
         slot = next((slot for slot in self.action.slots if slot.handle == self.handle), None)
         return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
+
+
+@dataclass(frozen=True, eq=False)
+class SlotTransform:
+    """One transform in one slot: of each of the slot's users the same one."""
+
+    slot: Slot
+    prefix: str
+    """From the user to what is moved, in data paths: none for the user itself."""
+
+    users: tuple[Transform, ...]
+    curves: Curves
+    """Its F-curves, those that in-betweens are in among them."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it: the name of its first user."""
+        return self.users[0].name
+
+    @property
+    def filled(self) -> Curves:
+        """Those of its F-curves that in-betweens are in."""
+        return {channel: fcurve for channel, fcurve in self.curves.items() if is_filled_in(fcurve)}
+
+    def read_again(self) -> SlotTransform:
+        """The same, with the F-curves that there are by now."""
+        return next(one for one in transforms_in(self.slot) if one.prefix == self.prefix)
+
+
+def transforms_in(slot: Slot) -> list[SlotTransform]:
+    """What a slot moves, transform by transform."""
+    return [SlotTransform(slot, "", tuple(map(ObjectTransform, slot.users)), curves_in(slot.channelbag))]
+
+
+def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
+    """The slots that move these, and of each slot what is in it of them. One look at all objects of the file."""
+    transforms = list(transforms)
+    prefixes: dict[bpy.types.Object, set[str]] = {}
+    for transform in transforms:
+        prefixes.setdefault(transform.animated, set()).add(transform.prefix)
+    return [
+        one
+        for slot in slots_of(prefixes)
+        for one in transforms_in(slot)
+        if any(one.prefix in prefixes.get(user, ()) for user in slot.users)
+    ]
+
+
+def slot_transforms_in(actions: Iterable[bpy.types.Action]) -> list[SlotTransform]:
+    """What these Actions move, transform by transform."""
+    return [place for slot in slots_in(actions) for place in transforms_in(slot)]
+
+
+def places_of(transform: Transform) -> list[SlotTransform]:
+    """What moves a transform, as if nothing else used the same slots: without a look at other objects."""
+    slots = (
+        Slot(action, handle, (transform.animated,), frozenset(strips))
+        for action, handle, strips in _uses(transform.animated).values()
+    )
+    return [place for slot in slots for place in transforms_in(slot) if place.prefix == transform.prefix]
 
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
@@ -187,4 +183,9 @@ def curves_in(channelbag: bpy.types.ActionChannelbag | None) -> Curves:
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is one that in-betweens are in: sampled, and in the group of them."""
     group = fcurve.group
-    return group is not None and group.name == GROUP and not fcurve.keyframe_points
+    return (
+        group is not None
+        and group.name == GROUP
+        and not fcurve.keyframe_points
+        and not fcurve.data_path.endswith(MODE_PROPERTY)
+    )

@@ -16,11 +16,20 @@ import numpy as np
 from ..motion import KEYFRAME_MODES
 from .curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
 
-MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
-"""What the values of the mode channel stand for: Blender's own in-betweens, and then the modes in their order."""
+MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
+"""The modes, and what the mode channel and saved files have for each. 0 is Blender's own in-betweens."""
+
+MODE_IDS = tuple(MODE_NUMBERS)
+"""The names of the modes."""
+
+MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
+"""From the number of a mode to its name."""
 
 UNKNOWN = -1
-"""The mode of an object from a file that is damaged, or of a later version."""
+"""The mode of something from a file that is damaged, or of a later version."""
+
+LAYOUT = b"2"
+"""How in-betweens are laid out in F-curves. With another number, those of older files are made anew."""
 
 LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
 ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
@@ -31,6 +40,8 @@ PART_OF = tuple(name for name, own in ROWS.items() for _ in range(own.start, own
 
 REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
 """The components of something that is not moved. Rotations are quaternions where they are not channels."""
+
+FULL_TURN = 2.0 * np.pi
 
 SAME_FRAME = 0.01
 """Keys closer than this are one key to Blender, and here."""
@@ -57,14 +68,17 @@ class Source:
     rest: dict[int, float]
     """The values of components that have no keys, of what is keyed, by their rows."""
 
-    own: np.ndarray
-    """The delta transforms that the object has of its own, as components, shape (10,)."""
+    original: np.ndarray
+    """The difference without in-betweens, as components, shape (10,): an object's own delta transforms."""
 
     mode: int | Keys
-    """The mode of all segments, as `MODE_IDS` counts them, or the mode channel."""
+    """The number of the mode of all segments, or the mode channel."""
 
-    span: tuple[int, int] | None
-    """First and last frame of the scenes it is in, where something goes on outside of the keys."""
+    in_nla: bool = False
+    """Whether there are NLA strips beside it, which Blender blends with the defaults of what it does not key."""
+
+    seen: tuple[int, int] | None = None
+    """First and last frame that are seen of it, in scenes and strips."""
 
     @cached_property
     def digest(self) -> str:
@@ -73,11 +87,12 @@ class Source:
         for rows, keys in self.channels:
             summary.update(bytes(rows))
             summary.update(keys.raw)
-        if self.rest:
-            summary.update(repr(self.rest).encode())
-        summary.update(self.own.tobytes())
+        # Where something stands that is not keyed does not change how far off its in-betweens are.
+        if any(row >= ROWS[ROTATION].start for row in self.rest):
+            summary.update(repr({row: value for row, value in self.rest.items() if row >= 3}).encode())
+        summary.update(self.original.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
-        summary.update(repr((self.order, self.span)).encode())
+        summary.update(LAYOUT + repr((self.order, self.in_nla)).encode())
         return summary.hexdigest()
 
     @property
@@ -102,28 +117,72 @@ class Source:
 
     @cached_property
     def key_frames(self) -> np.ndarray:
-        """The same without keys that are one to Blender, and with the copies that cycles make in the span, (n,)."""
+        """The same without keys that are one to Blender, and with the copies that cycles make, (n,).
+
+        Copies are there as far as it is seen, and a round on both sides at least.
+        """
         if self.is_together:
             return self.curves[0].times
         times = [keys.times for keys in self.curves]
         if self.cyclic is not None:
-            # A whole round more on both sides, for the span may begin and end in the middle of a segment.
-            margin = max(own[-1] - own[0] for own in times)
-            first = min(self.span[0], *(own[0] for own in times)) - margin
-            last = max(self.span[1], *(own[-1] for own in times)) + margin
+            first, last = self.keyed_range
+            margin = max(channel[-1] - channel[0] for channel in times)
+            seen = self.seen or (first, last)
+            first, last = min(seen[0], first) - margin, max(seen[1], last) + margin
             times = [cyclic_times(keys, keys.times, first, last) for keys in self.curves]
-        frames = np.unique(np.concatenate(times))
-        return distinct(frames)
+        return distinct(np.unique(np.concatenate(times)))
+
+    @cached_property
+    def keyed_range(self) -> tuple[float, float]:
+        """The first and the last frame with a key."""
+        return (
+            min(float(keys.times[0]) for keys in self.curves),
+            max(float(keys.times[-1]) for keys in self.curves),
+        )
+
+    @cached_property
+    def repeats(self) -> bool:
+        """Whether the difference to Blender's in-betweens in every round of its cycles is that in the first.
+
+        So it is where all channels go round together, over whole frames, and the body has turned and grown in a round
+        by nothing, or about one and the same axis. Otherwise Blender moves it outside of its keys.
+        """
+        cyclic = self.cyclic
+        if cyclic is None:
+            return False
+        ends = self.keyed_range
+        if any(keys.cycles != cyclic.cycles or tuple(keys.times[[0, -1]]) != ends for keys in self.curves):
+            return False
+        if not (ends[0] < ends[1] and all(end.is_integer() for end in ends)):
+            return False
+        if "REPEAT_OFFSET" not in (cyclic.cycles.before, cyclic.cycles.after):
+            return True
+        change = np.zeros(10)
+        turning = 0
+        for rows, keys in self.channels:
+            change[rows] = keys.values[:, -1] - keys.values[:, 0]
+            turning += sum(np.ptp(values) > 0.0 for row, values in zip(rows, keys.values, strict=True) if 3 <= row < 7)
+        if self.order is not None:
+            change[3:6] -= FULL_TURN * np.rint(change[3:6] / FULL_TURN) if turning > 1 else change[3:6]
+        return bool(np.abs(change[3:]).max() < 1e-6)
+
+    def shows_mode(self, frames: np.ndarray) -> np.ndarray:
+        """Whether modes count on these frames, (m,): between keys, and in the rounds of cycles that repeat them."""
+        if self.cyclic is None or not self.repeats:
+            first, last = self.keyed_range
+        else:
+            first, last = self.used_up
+        return (frames >= first) & (frames <= last)
 
     @cached_property
     def modes(self) -> np.ndarray:
-        """The mode of each segment, as `MODE_IDS` counts them, shape (n - 1,)."""
+        """The number of the mode of each segment, shape (n - 1,)."""
         # A moment into the segment; in a copy that runs backwards that is a moment before its original's end.
         starts = self.key_frames[:-1] + SAME_FRAME
         return self.modes_at(starts if self.cyclic is None else cycled(self.cyclic, starts)[0])
 
     def modes_at(self, frames: np.ndarray) -> np.ndarray:
-        """The modes at these frames, as `MODE_IDS` counts them: each key of the mode channel holds until the next."""
+        """The numbers of the modes at these frames: each key of the mode channel holds until the next."""
         if not isinstance(self.mode, Keys):
             return np.full(len(frames), self.mode)
         modes = self.mode.values[0, np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
@@ -137,11 +196,30 @@ class Source:
 
     @cached_property
     def frame_range(self) -> tuple[int, int]:
-        """The first and last whole frame that in-betweens are for."""
-        first, last = self.span or (np.inf, -np.inf)
-        first = min(first, *(float(keys.times[0]) for keys in self.curves))
-        last = max(last, *(float(keys.times[-1]) for keys in self.curves))
+        """The first and last whole frame that in-betweens are for: from the first segment with a mode to the last.
+
+        Cycles repeat all that there is between the keys.
+        """
+        first, last = self.keyed_range
+        if self.cyclic is None and self.is_live:
+            live = np.flatnonzero(self.modes)
+            first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
         return math.floor(first), math.ceil(last)
+
+    @cached_property
+    def seen_range(self) -> tuple[int, int]:
+        """The first and last whole frame that there is something to be seen on: where it goes on outside of its keys,
+        as far as it is looked at."""
+        first, last = self.keyed_range
+        if self.seen is not None and any(keys.linear or keys.cycles is not None for keys in self.curves):
+            first, last = min(first, self.seen[0]), max(last, self.seen[1])
+        return math.floor(first), math.ceil(last)
+
+    @property
+    def filled_rows(self) -> list[int]:
+        """The rows of the components that in-betweens may differ in from Blender's."""
+        rows = list(range(10) if self.uniform_scale else range(7))
+        return [row for row in rows if PART_OF[row] in self.keyed and not (row == 6 and self.order is not None)]
 
     @cached_property
     def uniform_scale(self) -> bool:
@@ -187,10 +265,10 @@ class Source:
 
     @cached_property
     def used_up(self) -> tuple[float, float]:
-        """Before and after which frame cycles with a count are through: Blender goes back to the outermost keys."""
+        """Before and after which frame cycles are through: Blender goes back to the outermost keys."""
         cycles = [keys.cycles for keys in self.curves if keys.cycles is not None]
-        before = any(one.before != "NONE" and one.before_count > 0 for one in cycles)
-        after = any(one.after != "NONE" and one.after_count > 0 for one in cycles)
+        before = any(one.before == "NONE" or one.before_count > 0 for one in cycles)
+        after = any(one.after == "NONE" or one.after_count > 0 for one in cycles)
         return float(self.key_frames[0]) if before else -np.inf, float(self.key_frames[-1]) if after else np.inf
 
     @cached_property

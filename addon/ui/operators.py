@@ -341,7 +341,7 @@ class RIGID_MOTION_OT_let_keys_go(_OnChanged, bpy.types.Operator):
 
     @staticmethod
     def on_one(obj: bpy.types.Object) -> str:
-        animation.let_keys_go(obj)
+        animation.discard_dense_keys(obj)
         return "the keys from before they were reduced are gone"
 
 

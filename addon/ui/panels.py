@@ -9,8 +9,8 @@ import bpy
 from .. import animation
 from ..animation.describing import SegmentFacts, frame_in_action, is_up_to_date, segment_at
 from ..animation.mode_keys import source_of
-from ..animation.slots import MODE_PATH
 from ..animation.sources import Source
+from ..animation.transforms import MODE_PROPERTY
 from . import overlay
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, fcurves_of, is_key_editor, modes_meant
@@ -36,7 +36,7 @@ class _Main:
         segment, notes = facts_and_notes(obj, context.scene.frame_current_final)
         if is_key_editor(context):
             _draw_mode_menu(labelled(layout, "Selected"), SELECTED, modes_meant(context, obj, SELECTED))
-        if any(fcurve.data_path == MODE_PATH for fcurve in fcurves_of(obj)):
+        if any(fcurve.data_path == MODE_PROPERTY for fcurve in fcurves_of(obj)):
             _draw_mode_menu(labelled(layout, "Object"), WHOLE, modes_meant(context, obj, WHOLE))
         else:
             labelled(layout, "Object").prop(obj.rigid_motion, "mode", text="")

@@ -1,0 +1,78 @@
+"""What all that can be done to motions has in common: many targets at once, one look at the slots, one refresh.
+
+Every target says first whether it can be done, before anything is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+import bpy
+
+from . import live
+from .reading import sources_of_users
+from .slots import SlotTransform, slot_transforms_of
+from .sources import Source
+from .transforms import Refused, Transform, transform_of
+
+Targets = bpy.types.Object | Transform | Iterable[bpy.types.Object | Transform]
+"""What to act on: one or several."""
+
+Readings = list[tuple[SlotTransform, Source | Refused]]
+"""The places that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
+
+Plan = TypeVar("Plan")
+Result = TypeVar("Result")
+
+
+def transforms_of(targets: Targets) -> list[Transform]:
+    """The transforms of targets, each once."""
+    single = isinstance(targets, bpy.types.Object | Transform)
+    return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
+
+
+def act_on(
+    targets: Targets,
+    plan: Callable[[Transform, Readings], Plan],
+    act: Callable[[Transform, Plan], Result],
+    refused: list[Refused] | None,
+) -> dict[Transform, Result]:
+    """Do something to each target.
+
+    Parameters
+    ----------
+    targets
+    plan
+        Says for one what there is to do, without doing any of it. May raise `Refused`.
+    act
+        Does it.
+    refused
+        Takes the refusals; without it nothing is done where there is one, and it is raised.
+
+    Returns
+    -------
+    dict
+        What `act` returned for each of those that did not refuse.
+    """
+    transforms = transforms_of(targets)
+    readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
+    places = slot_transforms_of(transforms)
+    for place, sources in zip(places, sources_of_users(places), strict=True):
+        for user, source in zip(place.users, sources, strict=True):
+            if user in readings:
+                readings[user].append((place, source))
+    plans, refusals = [], []
+    for transform, reading in readings.items():
+        try:
+            plans.append((transform, plan(transform, reading)))
+        except Refused as refusal:
+            refusals.append(refusal)
+    if refusals and refused is None:
+        raise refusals[0] if len(refusals) == 1 else Refused("\n".join(map(str, refusals)))
+    if refused is not None:
+        refused.extend(refusals)
+    with live.paused():
+        results = {transform: act(transform, planned) for transform, planned in plans}
+    live.refresh(transform for transform, _ in plans)
+    return results

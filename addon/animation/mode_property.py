@@ -1,0 +1,76 @@
+"""The mode property of what is moved: it shows the mode in the slot, and waits where there is no slot yet.
+
+The one home of a mode is the Action, see `records`. The property is there to choose by, from Python and by a button,
+and for the mode channel to animate; nothing else reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from .records import has_mode, record_mode, recorded_mode
+from .slots import SlotTransform
+from .sources import MODE_NAMES, MODE_NUMBERS
+from .transforms import Transform
+
+
+def await_mode(transform: Transform, mode: str) -> None:
+    """Keep a mode until there is an Action to keep it."""
+    transform.motion.awaited = transform.motion.mode = mode
+
+
+def is_keyed(place: SlotTransform) -> bool:
+    """Whether a mode channel decides."""
+    fcurve = place.curves.get(place.users[0].mode_channel)
+    return fcurve is not None and not fcurve.mute and len(fcurve.keyframe_points) > 0
+
+
+def show_modes(places: Iterable[SlotTransform]) -> None:
+    """Have the property of all users say what is in their slots, and have slots take what their users waited with."""
+    for place in places:
+        users = [user for user in place.users if _is_shown(user, place) and user.animated.is_editable]
+        if not has_mode(place) and place.slot.action.is_editable:
+            _adopt(place, users)
+        keyed = is_keyed(place)
+        mode = MODE_NAMES.get(recorded_mode(place), "BLENDER")
+        for user in users:
+            motion = user.motion
+            if motion.awaited != "BLENDER":
+                motion.awaited = "BLENDER"
+            if not keyed and motion.mode != mode:
+                motion.mode = mode
+
+
+def show_awaited(transforms: Iterable[Transform]) -> None:
+    """Have the property of what no slot moves any more say what it waits with."""
+    for transform in transforms:
+        motion = transform.motion
+        if motion.mode != motion.awaited and transform.animated.is_editable:
+            motion.mode = motion.awaited
+
+
+def adopt_from_properties(transforms: Iterable[Transform]) -> None:
+    """Read a file of a version that kept modes on objects: what no slot moves waits with its mode."""
+    for transform in transforms:
+        motion = transform.motion
+        if motion.mode not in ("BLENDER", "", motion.awaited) and transform.animated.is_editable:
+            motion.awaited = motion.mode
+
+
+def _is_shown(user: Transform, place: SlotTransform) -> bool:
+    """Whether a place is the one that a user's property speaks of: its Action, or a strip where it has none."""
+    data = user.animated.animation_data
+    return data.action is None or (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle)
+
+
+def _adopt(place: SlotTransform, users: Sequence[Transform]) -> None:
+    """Let a slot without a mode have that which a user waits with.
+
+    Where there are in-betweens already, it came from a version that kept the mode on the object, or from another
+    Action by one of Blender's operators that move slots: it goes on as its user shows it.
+    """
+    waiting = next((user.motion.awaited for user in users if user.motion.awaited not in ("BLENDER", "")), None)
+    if waiting is None and place.filled:
+        waiting = next((user.motion.mode for user in users if user.motion.mode not in ("BLENDER", "")), None)
+    if waiting:
+        record_mode(place, MODE_NUMBERS[waiting])

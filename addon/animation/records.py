@@ -1,0 +1,72 @@
+"""What an Action keeps about each transform in each of its slots: its mode, and what its in-betweens were made from.
+
+It goes where the Action goes: to another object, into another file, into a strip. The mode of a transform is in its
+mode channel where there is one with keys, and in its record otherwise; nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from .slots import SlotTransform
+from .sources import MODE_NAMES, MODE_NUMBERS, UNKNOWN
+
+
+def recorded_digest(place: SlotTransform) -> str:
+    """The digest of the source that a transform was filled in from, "" where it was not."""
+    record = record_of(place)
+    return "" if record is None else record.digest
+
+
+def recorded_rows(place: SlotTransform) -> list[int]:
+    """The rows of the components that in-betweens were written for."""
+    record = record_of(place)
+    return [] if record is None else [int(row, 16) for row in record.rows]
+
+
+def recorded_mode(place: SlotTransform) -> int:
+    """The number of the mode that a transform has throughout, `UNKNOWN` where it is none that is known."""
+    record = record_of(place)
+    if record is not None and record.is_property_set("mode"):
+        # A number that is no mode, from a damaged file or a later version, reads as an empty name.
+        return MODE_NUMBERS.get(record.mode, UNKNOWN)
+    return 0
+
+
+def has_mode(place: SlotTransform) -> bool:
+    """Whether a mode was ever chosen for a transform in this slot."""
+    record = record_of(place)
+    return record is not None and record.is_property_set("mode")
+
+
+def record_mode(place: SlotTransform, number: int) -> None:
+    """Keep the mode that a transform has throughout."""
+    record = _ensured(place)
+    if not record.is_property_set("mode") or record.mode != MODE_NAMES[number]:
+        record.mode = MODE_NAMES[number]
+
+
+def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -> None:
+    """Keep what in-betweens were made from, and which components they are in."""
+    if digest:
+        record = _ensured(place)
+        record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
+    elif (record := record_of(place)) is not None and record.digest:
+        record.digest = record.rows = ""
+
+
+def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
+    for record in place.slot.action.rigid_motion.slots:
+        if record.handle == place.slot.handle and record.prefix == place.prefix:
+            return record
+    return None
+
+
+def _ensured(place: SlotTransform) -> bpy.types.PropertyGroup:
+    record = record_of(place)
+    if record is None:
+        record = place.slot.action.rigid_motion.slots.add()
+        record.handle, record.prefix = place.slot.handle, place.prefix
+    return record
