@@ -1,8 +1,8 @@
 """Writing in-betweens: differences as sampled F-curves, in the slot that has the keys.
 
 A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
-nothing of it. There are samples only where a mode counts, and only of components that it changes; none lies outside of
-the keys, so that no Action, strip or export is longer for it.
+nothing of it. There are samples only where a mode counts, and only of components that it changes. Where some have to lie
+outside of the keys, a manual frame range keeps the Action, its strips and exports from being longer for it.
 
 Blender reads a sampled curve between two whole frames below zero one frame late. The samples of a range that begins
 there go round in a ring behind frame 0 instead, see `_Layout`.
@@ -54,9 +54,12 @@ class _Layout:
     @classmethod
     def of(cls, source: Source) -> _Layout:
         first, last = source.frame_range
-        begin, end = source.keyed_range
-        cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
-        return cls(first, last, (max(first, begin), min(last, end)), cycles, first < 0 and cycles is None)
+        ends = (float(first), float(last))
+        if source.repeats or not source.goes_on:
+            begin, end = source.keyed_range
+            ends = max(first, begin), min(last, end)
+        cycles = source.cyclic.cycles if source.repeats else None
+        return cls(first, last, ends, cycles, first < 0 and cycles is None)
 
     @property
     def count(self) -> int:
@@ -130,14 +133,17 @@ class _Layout:
 
 def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     """Compute and write the in-betweens of these."""
-    # However far cycles are seen, one round is all that is written.
-    rounds = [source if source.seen is None else replace(source, seen=None) for _, source in readings]
+    # However far cycles are seen, one round is all that is written where it repeats.
+    rounds = [replace(source, seen=None) if source.repeats else source for _, source in readings]
+    longer = set()
     for (place, source), samples in zip(readings, differences(rounds), strict=True):
         layout = _Layout.of(source)
         channels = _channels(place, source)
         _write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
         record_in_betweens(place, source.digest, samples)
-    _limit_ranges({place.slot.action for place, _ in readings})
+        if layout.outermost[0] < source.keyed_range[0] or layout.outermost[1] > source.keyed_range[1]:
+            longer.add(place.slot.action)
+    _limit_ranges({place.slot.action for place, _ in readings}, longer)
 
 
 def is_complete(place: SlotTransform, source: Source) -> bool:
@@ -155,7 +161,7 @@ def clear(place: SlotTransform) -> None:
     """Take the in-betweens out of a slot, and give its users their original differences back."""
     _write(place, {}, None)
     record_in_betweens(place, "", ())
-    _limit_ranges({place.slot.action})
+    _limit_ranges({place.slot.action}, set())
 
 
 def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
@@ -214,14 +220,14 @@ def _new(place: SlotTransform, channel: Channel, count: int) -> bpy.types.FCurve
     return fcurve
 
 
-def _limit_ranges(actions: Iterable[bpy.types.Action]) -> None:
-    """Have Actions end with their keys where samples lie in a ring behind these, by a manual frame range.
+def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types.Action]) -> None:
+    """Have Actions begin and end with their keys where samples lie outside of these, by a manual frame range.
 
-    One that the animator has set stays, and so does none where no samples need it.
+    `longer` are those in which samples were just written there. A range that the animator has set stays.
     """
     for action in actions:
         ours = action.rigid_motion.range_is_ours
-        if action.use_frame_range and not ours:
+        if (action.use_frame_range and not ours) or not (ours or action in longer):
             continue
         curves = [
             fcurve
@@ -230,16 +236,27 @@ def _limit_ranges(actions: Iterable[bpy.types.Action]) -> None:
             for bag in strip.channelbags
             for fcurve in bag.fcurves
         ]
-        rings = any(len(fcurve.modifiers) == 3 and is_filled_in(fcurve) for fcurve in curves)
-        if rings:
-            ranges = np.array([fcurve.range() for fcurve in curves if not is_filled_in(fcurve)])
-            begin, end = ranges[:, 0].min(), ranges[:, 1].max()
+        samples, keyed = [], []
+        for fcurve in curves:
+            if not fcurve.is_empty:
+                (samples if is_filled_in(fcurve) else keyed).append(fcurve.range())
+        if keyed and samples and not _is_within(samples, keyed):
+            begin, end = _union(keyed)
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
             action.rigid_motion.range_is_ours = True
         elif ours:
             action.use_frame_range = action.rigid_motion.range_is_ours = False
+
+
+def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    return min(begin for begin, _ in ranges), max(end for _, end in ranges)
+
+
+def _is_within(inner: Sequence[tuple[float, float]], outer: Sequence[tuple[float, float]]) -> bool:
+    (first, last), (begin, end) = _union(inner), _union(outer)
+    return begin <= first and last <= end
 
 
 def hold_originals(place: SlotTransform) -> None:

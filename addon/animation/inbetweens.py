@@ -204,8 +204,9 @@ def _move(
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = original[:, owners]
     for number, (source, place) in enumerate(samples):
-        outside = ~source.shows_mode(frames[number])
-        if outside.any():
+        if source.cyclic is not None:
+            before, after = source.used_up
+            outside = (frames[number] < before) | (frames[number] > after)
             delta[:, place][:, outside] = original[:, number, None]
 
 

@@ -11,6 +11,7 @@ import functools
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from typing import ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
@@ -22,7 +23,7 @@ from .mode_property import adopt_from_properties, show_awaited, show_modes
 from .reading import differing_users, keyed_in, sources_of_users
 from .records import recorded_digest
 from .refusals import refuse_numbers
-from .slots import SlotTransform, places_of, slot_transforms_in, slot_transforms_of
+from .slots import SlotTransform, actions_of, places_of, slot_transforms_in, slot_transforms_of
 from .sources import Source
 from .transforms import Refused, Transform, transform_of
 
@@ -50,8 +51,14 @@ class _State:
     edited = False
     """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
 
-    operators = 0
+    operator = 0
     """The operator that had ended last when edits were last seen."""
+
+    ranges: ClassVar[dict[int, tuple[int, int]]] = {}
+    """First and last frame of each scene when last seen, by session id."""
+
+    graphs: ClassVar[set[int]] = set()
+    """The dependency graphs that have been evaluated since the extension was switched on or the file was opened."""
 
 
 def set_enabled(enabled: bool) -> None:
@@ -89,9 +96,8 @@ def follow_original(transform: Transform) -> None:
     with _turn() as ours:
         if not ours:
             return
-        places = slot_transforms_of([transform])
-        transform.follow_original(channel for place in places for channel in place.filled)
-        _refresh(places)
+        transform.follow_original()
+        _refresh(slot_transforms_of([transform]))
 
 
 def problem_of(target: bpy.types.Object | Transform) -> str:
@@ -242,10 +248,16 @@ def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[Transform]:
 
 
 def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Transform]) -> None:
-    """Refresh after an edit of other objects than these, and notice how one was posed by hand."""
+    """Refresh after an edit of scenes, or of other objects than these, and notice how one was posed by hand."""
     edited = []
     for update in depsgraph.updates:
         block = update.id
+        if isinstance(block, bpy.types.Scene):
+            # Only the original has an identity: that of the evaluated scene is 0.
+            scene, frames = block.original, (block.frame_start, block.frame_end)
+            if _State.ranges.get(scene.session_uid, frames) != frames:
+                edited += map(transform_of, scene.objects)
+            _State.ranges[scene.session_uid] = frames
         if isinstance(block, bpy.types.Object) and _concerns_us(block):
             transform = transform_of(block.original)
             if transform not in seen:
@@ -260,29 +272,51 @@ def _concerns_us(obj: bpy.types.Object) -> bool:
     motion = obj.rigid_motion
     if motion.mode != "BLENDER" or motion.awaited != "BLENDER" or any(motion.filled):
         return True
-    data = obj.animation_data
-    return data is not None and data.action is not None and len(data.action.rigid_motion.slots) > 0
+    return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
 
 
-def _before_evaluation(depsgraphs: Iterable[bpy.types.Depsgraph], frame: float) -> None:
-    """Look at what was set and is not evaluated yet: what in-betweens will overwrite, and poses set in one go."""
+def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
+    """Look at what was set and is not evaluated yet: what in-betweens will overwrite, and poses set in one go.
+
+    Returns whether there is any such object.
+    """
+    edited = dict(_unevaluated(scene))
+    if not edited:
+        return False
     operator = _last_operator()
-    by_operator, _State.operators = operator != _State.operators, operator
-    for depsgraph in depsgraphs:
-        for update in depsgraph.updates:
-            block = update.id
-            if not isinstance(block, bpy.types.Object) or not _concerns_us(block.original):
-                continue
-            transform = transform_of(block.original)
-            filled = [channel for place in places_of(transform) for channel in place.filled]
-            if not (filled and transform.animated.is_editable):
-                continue
-            with _turn() as ours:
-                if ours:
-                    transform.note_original(filled)
+    by_operator, _State.operator = operator != _State.operator, operator
+    for obj, depsgraph in edited.items():
+        if not (_concerns_us(obj) and obj.is_editable):
+            continue
+        transform = transform_of(obj)
+        filled = [channel for place in places_of(transform) for channel in place.filled]
+        if not filled:
+            continue
+        with _turn() as ours:
+            if ours:
+                transform.note_original(filled)
+        if depsgraph is not None:
             with suppress(Refused):
                 evaluated = transform.carrier.evaluated_get(depsgraph)
                 insertion.notice_assignment(transform, evaluated, frame, by_operator=by_operator)
+    return True
+
+
+def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
+    """The objects that wait to be evaluated: all where nothing has been yet. With the graph they were evaluated in."""
+    for layer in scene.view_layers:
+        depsgraph = layer.depsgraph
+        known = depsgraph is not None and depsgraph.as_pointer() in _State.graphs
+        if not known:
+            yield from ((obj, None) for obj in scene.objects)
+            if depsgraph is not None:
+                _State.graphs.add(depsgraph.as_pointer())
+        elif depsgraph.id_type_updated("OBJECT"):
+            yield from (
+                (update.id.original, depsgraph)
+                for update in depsgraph.updates
+                if isinstance(update.id, bpy.types.Object)
+            )
 
 
 def _last_operator() -> int:
@@ -295,6 +329,7 @@ def _last_operator() -> int:
 def _look_through(*_: object) -> None:
     """Refresh all there is in the file."""
     _State.unseen = False
+    _State.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
     refresh()
 
 
@@ -314,9 +349,8 @@ def _careful(handler: Callable) -> Callable:
 
 
 @_careful
-def _before_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if depsgraph.id_type_updated("OBJECT"):
-        _before_evaluation((depsgraph,), scene.frame_current_final)
+def _before_update(scene: bpy.types.Scene, *_: object) -> None:
+    _before_evaluation(scene, scene.frame_current_final)
 
 
 @_careful
@@ -324,19 +358,16 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
     seen = _follow(depsgraph, edited=depsgraph.id_type_updated("ACTION"))
     insertion.forget_poses(seen)
-    if depsgraph.id_type_updated("OBJECT"):
+    if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
         _follow_objects(depsgraph, _State.frame, seen)
 
 
 @_careful
 def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
-    graphs = [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
-    _State.edited = any(graph.id_type_updated("ACTION") for graph in graphs)
+    graphs = (layer.depsgraph for layer in scene.view_layers)
+    _State.edited = any(graph.id_type_updated("ACTION") for graph in graphs if graph is not None)
     # A script that edits an object and goes on to another frame leaves no trace of which object it was.
-    edited = [graph for graph in graphs if graph.id_type_updated("OBJECT")]
-    _State.unseen |= bool(edited)
-    if edited:
-        _before_evaluation(edited, _State.frame)
+    _State.unseen |= _before_evaluation(scene, _State.frame)
 
 
 @_careful
@@ -356,6 +387,7 @@ def _on_file(*_: object) -> None:
 @_careful
 def _on_load(*arguments: object) -> None:
     insertion.forget_file()
+    _State.graphs.clear()
     with _turn() as ours:
         if ours:
             transforms = [transform_of(obj) for obj in bpy.data.objects]
@@ -388,6 +420,7 @@ HANDLERS = {
 
 def register() -> None:
     _State.unseen = True
+    _State.graphs.clear()
     for name, handler in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(handler)
     if not bpy.app.background:

@@ -104,6 +104,11 @@ class ObjectMotion(bpy.types.PropertyGroup):
         options=set(),
         override={"LIBRARY_OVERRIDABLE"},
     )
+    filled_components: IntProperty(
+        description="Which components of them, as bits",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     own_location: FloatVectorProperty(
         name="Delta Location",
         description="The object's own delta location, to which the in-betweens are added",

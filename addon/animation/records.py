@@ -36,25 +36,37 @@ def recorded_mode(place: SlotTransform) -> int:
 
 
 def has_mode(place: SlotTransform) -> bool:
-    """Whether a mode was ever chosen for a transform in this slot."""
+    """Whether a mode other than Blender's was chosen for all segments of a transform in this slot."""
     record = record_of(place)
     return record is not None and record.is_property_set("mode")
 
 
 def record_mode(place: SlotTransform, number: int) -> None:
-    """Keep the mode that a transform has throughout."""
-    record = _ensured(place)
-    if not record.is_property_set("mode") or record.mode != MODE_NAMES[number]:
-        record.mode = MODE_NAMES[number]
+    """Keep the mode that a transform has throughout, and have its users show it."""
+    mode = MODE_NAMES[number]
+    record = record_of(place)
+    if number == 0:
+        if record is not None:
+            record.property_unset("mode")
+            _tidy(place)
+    else:
+        record = record or _new(place)
+        if record.mode != mode:
+            record.mode = mode
+    for user in place.users:
+        if user.motion.mode != mode and user.animated.is_editable:
+            user.motion.mode = mode
 
 
 def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -> None:
     """Keep what in-betweens were made from, and which components they are in."""
+    record = record_of(place)
     if digest:
-        record = _ensured(place)
+        record = record or _new(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
-    elif (record := record_of(place)) is not None and record.digest:
+    elif record is not None and record.digest:
         record.digest = record.rows = ""
+        _tidy(place)
 
 
 def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
@@ -64,9 +76,16 @@ def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
     return None
 
 
-def _ensured(place: SlotTransform) -> bpy.types.PropertyGroup:
-    record = record_of(place)
-    if record is None:
-        record = place.slot.action.rigid_motion.slots.add()
-        record.handle, record.prefix = place.slot.handle, place.prefix
+def _new(place: SlotTransform) -> bpy.types.PropertyGroup:
+    record = place.slot.action.rigid_motion.slots.add()
+    record.handle, record.prefix = place.slot.handle, place.prefix
     return record
+
+
+def _tidy(place: SlotTransform) -> None:
+    """Take out a record that says nothing."""
+    records = place.slot.action.rigid_motion.slots
+    for number, record in reversed(list(enumerate(records))):
+        here = (record.handle, record.prefix) == (place.slot.handle, place.prefix)
+        if here and not record.digest and not record.is_property_set("mode"):
+            records.remove(number)

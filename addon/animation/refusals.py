@@ -80,6 +80,12 @@ def refuse_numbers(name: str, source: Source) -> None:
             f"{name} has keys over {last - first:.0f} frames, at most {MOST_FRAMES} can be filled in: "
             "delete the keys that are far off"
         )
+    first, last = source.seen_range
+    if last - first > MOST_FRAMES and not source.repeats:
+        raise Refused(
+            f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most {MOST_FRAMES} "
+            "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+        )
     try:
         source.key_frames  # noqa: B018 - raises where cycles make too many
     except ValueError as problem:

@@ -141,6 +141,17 @@ Uses = dict[tuple[int, int], tuple[bpy.types.Action, int, set[tuple[int, int] | 
 """The slots that move an object: Action, handle, and the frames that strips show, None outside of the NLA."""
 
 
+def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
+    """The Actions that move something, by themselves and in strips."""
+    data = animated.animation_data
+    if data is not None:
+        if data.action is not None:
+            yield data.action
+        if len(data.nla_tracks):
+            strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
+            yield from (strip.action for strip in strips if strip.action is not None)
+
+
 def _uses(obj: bpy.types.Object) -> Uses:
     data = obj.animation_data
     if data is None:

@@ -92,7 +92,8 @@ class Source:
             summary.update(repr({row: value for row, value in self.rest.items() if row >= 3}).encode())
         summary.update(self.original.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
-        summary.update(LAYOUT + repr((self.order, self.in_nla)).encode())
+        span = self.seen if self.goes_on and not self.repeats else None
+        summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
         return summary.hexdigest()
 
     @property
@@ -140,25 +141,34 @@ class Source:
             max(float(keys.times[-1]) for keys in self.curves),
         )
 
+    @property
+    def goes_on(self) -> bool:
+        """Whether any channel goes on outside of its keys, by cycles or at its slope."""
+        return any(keys.linear or keys.cycles is not None for keys in self.curves)
+
     @cached_property
     def repeats(self) -> bool:
         """Whether the difference to Blender's in-betweens in every round of its cycles is that in the first.
 
-        So it is where all channels go round together, over whole frames, and the body has turned and grown in a round
-        by nothing, or about one and the same axis. Otherwise Blender moves it outside of its keys.
+        So it is where all channels go round together, over whole frames, and in a round turn and grow by nothing, or
+        turn about one and the same axis; and where no mode looks at keys that only some of the rounds have.
         """
         cyclic = self.cyclic
         if cyclic is None:
             return False
-        ends = self.keyed_range
-        if any(keys.cycles != cyclic.cycles or tuple(keys.times[[0, -1]]) != ends for keys in self.curves):
+        cycles, ends = cyclic.cycles, self.keyed_range
+        if any(keys.cycles != cycles or tuple(keys.times[[0, -1]]) != ends for keys in self.curves):
             return False
         if not (ends[0] < ends[1] and all(end.is_integer() for end in ends)):
             return False
-        if "REPEAT_OFFSET" not in (cyclic.cycles.before, cyclic.cycles.after):
+        is_endless = "NONE" not in (cycles.before, cycles.after)
+        if not is_endless and any(keys.linear for keys in self.curves):
+            return False
+        if not (is_endless and cycles.before_count == cycles.after_count == 0) and self.is_smooth:
+            return False
+        if "REPEAT_OFFSET" not in (cycles.before, cycles.after):
             return True
-        change = np.zeros(10)
-        turning = 0
+        change, turning = np.zeros(10), 0
         for rows, keys in self.channels:
             change[rows] = keys.values[:, -1] - keys.values[:, 0]
             turning += sum(np.ptp(values) > 0.0 for row, values in zip(rows, keys.values, strict=True) if 3 <= row < 7)
@@ -166,13 +176,12 @@ class Source:
             change[3:6] -= FULL_TURN * np.rint(change[3:6] / FULL_TURN) if turning > 1 else change[3:6]
         return bool(np.abs(change[3:]).max() < 1e-6)
 
-    def shows_mode(self, frames: np.ndarray) -> np.ndarray:
-        """Whether modes count on these frames, (m,): between keys, and in the rounds of cycles that repeat them."""
-        if self.cyclic is None or not self.repeats:
-            first, last = self.keyed_range
-        else:
-            first, last = self.used_up
-        return (frames >= first) & (frames <= last)
+    @property
+    def is_smooth(self) -> bool:
+        """Whether a mode in it looks at the keys around a segment."""
+        numbers = np.unique(np.rint(self.mode.values)) if isinstance(self.mode, Keys) else (self.mode,)
+        names = [MODE_NAMES.get(int(number), "BLENDER") for number in numbers]
+        return any(name != "BLENDER" and KEYFRAME_MODES[name].is_smooth for name in names)
 
     @cached_property
     def modes(self) -> np.ndarray:
@@ -198,8 +207,10 @@ class Source:
     def frame_range(self) -> tuple[int, int]:
         """The first and last whole frame that in-betweens are for: from the first segment with a mode to the last.
 
-        Cycles repeat all that there is between the keys.
+        Where it goes on outside of its keys, they are for all that is seen, unless what is between the keys repeats.
         """
+        if self.goes_on and not self.repeats:
+            return self.seen_range
         first, last = self.keyed_range
         if self.cyclic is None and self.is_live:
             live = np.flatnonzero(self.modes)
@@ -211,7 +222,7 @@ class Source:
         """The first and last whole frame that there is something to be seen on: where it goes on outside of its keys,
         as far as it is looked at."""
         first, last = self.keyed_range
-        if self.seen is not None and any(keys.linear or keys.cycles is not None for keys in self.curves):
+        if self.seen is not None and self.goes_on:
             first, last = min(first, self.seen[0]), max(last, self.seen[1])
         return math.floor(first), math.ceil(last)
 
@@ -265,10 +276,10 @@ class Source:
 
     @cached_property
     def used_up(self) -> tuple[float, float]:
-        """Before and after which frame cycles are through: Blender goes back to the outermost keys."""
+        """Before and after which frame cycles with a count are through: Blender goes back to the outermost keys."""
         cycles = [keys.cycles for keys in self.curves if keys.cycles is not None]
-        before = any(one.before == "NONE" or one.before_count > 0 for one in cycles)
-        after = any(one.after == "NONE" or one.after_count > 0 for one in cycles)
+        before = any(one.before != "NONE" and one.before_count > 0 for one in cycles)
+        after = any(one.after != "NONE" and one.after_count > 0 for one in cycles)
         return float(self.key_frames[0]) if before else -np.inf, float(self.key_frames[-1]) if after else np.inf
 
     @cached_property

@@ -105,11 +105,8 @@ class Transform(ABC):
         """The same for something that this property turns."""
 
     @abstractmethod
-    def original(self, filled: Iterable[Channel]) -> np.ndarray:
-        """What it has for a difference without in-betweens, as components (10,): rotation as a unit quaternion.
-
-        `filled` are the channels that in-betweens are in.
-        """
+    def original(self) -> np.ndarray:
+        """What it has for a difference without in-betweens, as components (10,): rotation as a unit quaternion."""
 
     @abstractmethod
     def is_noted(self, filled: Iterable[Channel]) -> bool:
@@ -123,12 +120,12 @@ class Transform(ABC):
         """
 
     @abstractmethod
-    def follow_original(self, filled: Iterable[Channel]) -> None:
+    def follow_original(self) -> None:
         """Show an edit of what is written down in all components that in-betweens are not in."""
 
     @abstractmethod
     def restore_original(self, filled: Iterable[Channel]) -> None:
-        """Give the original values back, but for these channels, in which there are in-betweens still."""
+        """Give the original values back, but for these channels, which are animated still."""
 
 
 ORIGINALS = {
@@ -140,6 +137,15 @@ ORIGINALS = {
 """Each delta transform: where an object's original is written down, and its place in `filled`. Files have the names."""
 
 
+_BITS = {
+    channel: 1 << place
+    for place, channel in enumerate(
+        (path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)
+    )
+}
+"""The bit of each component of the delta transforms in `filled_components`."""
+
+
 class ObjectTransform(Transform):
     """An object. The difference goes into its delta transforms."""
 
@@ -149,19 +155,15 @@ class ObjectTransform(Transform):
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return _channels("delta_", rotation)
 
-    def original(self, filled: Iterable[Channel]) -> np.ndarray:
-        motion, noted = self.motion, tuple(self.motion.filled)
-        taken = set(filled)
+    def original(self) -> np.ndarray:
+        noted = self._noted
 
         def values(path: str) -> list[float]:
-            original, place = ORIGINALS[path]
             now = getattr(self.carrier, path)[:]
-            if not noted[place]:
+            if not noted:
                 return now
-            then = getattr(motion, original)[:]
-            # In the NLA another strip's in-betweens may be in any of them.
-            every = self._is_in_nla
-            return [then[i] if every or (path, i) in taken else value for i, value in enumerate(now)]
+            then = getattr(self.motion, ORIGINALS[path][0])[:]
+            return [then[i] if _BITS[path, i] & noted else value for i, value in enumerate(now)]
 
         rotation = REST[ROWS[ROTATION]]
         if self.carrier.rotation_mode in ORDERS:
@@ -174,44 +176,61 @@ class ObjectTransform(Transform):
                 rotation = [component / length for component in quaternion]
         return np.array((*values("delta_location"), *rotation, *values("delta_scale")))
 
-    @property
-    def _is_in_nla(self) -> bool:
-        data = self.animated.animation_data
-        return data is not None and len(data.nla_tracks) > 0
-
     def is_noted(self, filled: Iterable[Channel]) -> bool:
-        noted = tuple(self.motion.filled)
-        return all(noted[ORIGINALS[path][1]] for path in {path for path, _ in filled})
+        noted = self._noted
+        return all(_BITS[channel] & noted for channel in filled if channel in _BITS)
 
     def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
-        motion, noted, filled = self.motion, tuple(self.motion.filled), set(filled)
-        for path in {path for path, _ in filled}:
-            original, place = ORIGINALS[path]
-            if not noted[place]:
-                _set_if_other(motion, original, default_of(path) if overwritten else getattr(self.carrier, path))
-                motion.filled[place] = True
-            elif not self._is_in_nla:
-                # The components that in-betweens are not in are still the animator's to edit.
-                now, then = getattr(self.carrier, path), getattr(motion, original)
-                _set_if_other(
-                    motion, original, [then[i] if (path, i) in filled else value for i, value in enumerate(now)]
-                )
+        noted = self._noted
+        added = [channel for channel in filled if channel in _BITS and not _BITS[channel] & noted]
+        for path in {path for path, _ in added}:
+            now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path][0]))
+            for i, value in enumerate(now):
+                if (path, i) in added and overwritten:
+                    then[i] = default_of(path)[i]
+                elif not _BITS[path, i] & noted:
+                    then[i] = value
+            _set_if_other(self.motion, ORIGINALS[path][0], then)
+        self._keep(noted | sum(_BITS[channel] for channel in set(added)))
 
-    def follow_original(self, filled: Iterable[Channel]) -> None:
-        filled = set(filled)
-        for path, (original, place) in ORIGINALS.items():
-            if self.motion.filled[place]:
-                now, then = getattr(self.carrier, path)[:], getattr(self.motion, original)[:]
-                values = [now[i] if (path, i) in filled else value for i, value in enumerate(then)]
-                _set_if_other(self.carrier, path, values)
+    def follow_original(self) -> None:
+        noted = self._noted
+        for path in _paths_in(noted):
+            now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
+            values = [now[i] if _BITS[path, i] & noted else value for i, value in enumerate(then)]
+            _set_if_other(self.carrier, path, values)
 
     def restore_original(self, filled: Iterable[Channel]) -> None:
+        noted = self._noted
+        gone = noted & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS)
+        for path in _paths_in(gone):
+            now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
+            setattr(self.carrier, path, [then[i] if _BITS[path, i] & gone else value for i, value in enumerate(now)])
+        if gone:
+            self._keep(noted & ~gone)
+
+    @property
+    def _noted(self) -> int:
+        """The bits of the components that are written down."""
         motion = self.motion
-        taken = {path for path, _ in filled}
-        for path, (original, place) in ORIGINALS.items():
-            if motion.filled[place] and path not in taken:
-                setattr(self.carrier, path, getattr(motion, original))
-                motion.filled[place] = False
+        # Files of a version that took all components of a delta transform, or none, have only `filled`.
+        return motion.filled_components or sum(
+            bit for (path, _), bit in _BITS.items() if motion.filled[ORIGINALS[path][1]]
+        )
+
+    def _keep(self, noted: int) -> None:
+        motion = self.motion
+        if motion.filled_components != noted:
+            motion.filled_components = noted
+        paths = _paths_in(noted)
+        summary = [path in paths for path in ORIGINALS]
+        if list(motion.filled) != summary:
+            motion.filled = summary
+
+
+def _paths_in(bits: int) -> set[str]:
+    """The delta transforms that have any of these components."""
+    return {path for (path, _), bit in _BITS.items() if bit & bits}
 
 
 def _set_if_other(owner: bpy.types.bpy_struct, name: str, values: Iterable[float]) -> None:

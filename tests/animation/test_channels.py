@@ -147,7 +147,10 @@ def test_linear_extrapolation_goes_on_with_the_rigid_motion(live_file, order, in
             point.handle_left_type = point.handle_right_type = "FREE"
             point.handle_left.y -= 0.1
             point.handle_right.y += 0.1
-    set_mode_leaving_keys(obj, "dq_sclerp")
+    before = snapshot(obj)
+    set_mode(obj, "dq_sclerp")
+    assert snapshot(obj) == before
+    assert problem_of(obj) == ""
     assert_shown([obj], np.arange(46.0))
     live_file.scene.frame_end = 70
     bpy.context.view_layer.update()

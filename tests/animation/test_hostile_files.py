@@ -202,7 +202,7 @@ def test_what_cannot_move_rigidly_keeps_blenders_motion_and_says_why(tmp_path, w
 
 
 def unknown_mode(obj: bpy.types.Object) -> None:
-    own_properties(obj)["rigid_motion"]["mode"] = 77
+    own_properties(obj.animation_data.action)["rigid_motion"]["slots"][0]["mode"] = 77
 
 
 def own_delta_that_is_no_number(obj: bpy.types.Object) -> None:

@@ -14,10 +14,10 @@ from addon.animation import (
     Refused,
     bake,
     bake_poses,
+    discard_dense_keys,
     is_baked,
     is_reduced,
     key_frames,
-    let_keys_go,
     modes_of,
     radius_of,
     read_poses,
@@ -490,7 +490,7 @@ def test_the_file_keeps_the_dense_keys_until_they_are_let_go(live_file, tmp_path
     obj = bpy.data.objects["Tool"]
     reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
     reduced = snapshot(obj)
-    let_keys_go(obj)
+    discard_dense_keys(obj)
     reopen(tmp_path / "let_go.blend")
     obj = bpy.data.objects["Tool"]
     assert not is_reduced(obj)
@@ -511,7 +511,7 @@ def test_an_action_that_something_else_needs_stays_when_it_is_let_go(live_file):
     action = obj.animation_data.action
     action.use_fake_user = True
     reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
-    let_keys_go(obj)
+    discard_dense_keys(obj)
     assert action in list(bpy.data.actions)
 
 
@@ -542,7 +542,7 @@ def test_letting_go_of_baked_keys_leaves_the_way_back_to_what_was_baked(live_fil
     before = snapshot(obj)
     bake(obj)
     reduce_keys_of(obj, "lerp_slerp", 0.1, RADIUS)
-    let_keys_go(obj)
+    discard_dense_keys(obj)
     assert len(bpy.data.actions) == 2
     unbake(obj)
     assert snapshot(obj) == before
@@ -640,13 +640,13 @@ def test_where_nothing_can_be_reduced_it_says_why_and_the_way_out_and_changes_no
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_tolerance_that_is_none_is_refused(live_file, tolerance):
-    with pytest.raises(Refused, match="Tool: the tolerance has to be a number above zero"):
+    with pytest.raises(Refused, match="the tolerance has to be a number above zero"):
         reduce_keys_of(recorded(), tolerance=tolerance)
 
 
 def test_blenders_own_in_betweens_are_no_mode_to_reduce_for(live_file):
     assert MODE_IDS[0] == "BLENDER"
-    with pytest.raises(Refused, match="Tool: there is no mode 'BLENDER'"):
+    with pytest.raises(Refused, match="there is no mode 'BLENDER'"):
         reduce_keys_of(recorded(), "BLENDER")
 
 
