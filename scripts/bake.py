@@ -25,6 +25,9 @@ if str(ROOT) not in sys.path:
 from scripts.hushing import hushed
 from scripts.system_libraries import way_out
 
+if __name__ == "__main__" and signal.getsignal(signal.SIGINT) == signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # An exception would leave Blender half loaded, and it crashes then.
+
 try:
     with hushed():  # Where OCIO is set, it says so.
         import bpy

@@ -344,6 +344,17 @@ def test_ctrl_c_while_a_file_is_written_leaves_it_as_it_was(tmp_path, monkeypatc
     assert path.read_bytes() == before
 
 
+def test_ctrl_c_while_blender_is_loaded_ends_it_at_once_and_without_a_word(tmp_path):
+    path = one_object_file(tmp_path / "shot.blend")
+    beside = tmp_path / "modules"
+    beside.mkdir()
+    (beside / "bpy.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")  # In the place of Blender.
+    done = subprocess.run(
+        [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
 @pytest.mark.parametrize("stopped_at", [1, 2])
 def test_ctrl_c_leaves_whole_files_only(tmp_path, capsys, monkeypatch, stopped_at):
     paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
