@@ -25,6 +25,9 @@ if str(ROOT) not in sys.path:
 from scripts.hushing import hushed
 from scripts.system_libraries import way_out
 
+if __name__ == "__main__" and signal.getsignal(signal.SIGINT) == signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # An exception would leave Blender half loaded, and it crashes then.
+
 try:
     with hushed():  # Where OCIO is set, it says so.
         import bpy
@@ -40,15 +43,28 @@ from addon.animation.mode_keys import segment_modes
 from addon.animation.reading import read
 from addon.animation.slots import MODE_PATH, Curves, curves_in, slots_of
 from addon.motion import KEYFRAME_MODES
+from scripts.blend_files import (
+    HERE,
+    FileProblem,
+    Missing,
+    Unreadable,
+    missing_data,
+    named,
+    only_overridden,
+    open_file,
+    refuse_read_only,
+    refuse_to_replace,
+    write_file,
+)
 from scripts.command_line import number, own_arguments
-from scripts.files import written_beside
+from scripts.extreme_keys import extreme_key
 from scripts.progress import Progress
+
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+"""What Ctrl-C sends, and what a farm does that takes a job back."""
 
 EXTENSION = "rigid_motion"
 """The id in blender_manifest.toml, which the name of the installed module ends with."""
-
-HERE = bpy.app.version[:2]
-"""The Blender that this runs in."""
 
 SMALLEST_STEP = 0.01
 """Keys closer than that are one key to Blender."""
@@ -63,10 +79,11 @@ examples:
   blender --background --python scripts/bake.py -- shot.blend
 
 what is written:
-  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. It takes its place when it is whole. A file
-  that is there already is left alone without --overwrite. With --in-place the file itself is saved, and Blender keeps
-  the one before as NAME.blend1. A file in which there is nothing to do is not written. What was written is printed on
-  the standard output at the end, a path a line; everything else is on the standard error.
+  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. It takes its place when it is whole, and was
+  opened again to make sure. A file that is there already is left alone without --overwrite, and one that is read-only
+  with it. With --in-place the file itself is replaced in the same way, and the one before kept as NAME.blend1. A file
+  in which there is nothing to do is not written. What was written is printed on the standard output at the end, a path
+  a line; everything else is on the standard error.
   Textures and libraries are found from the new place too. A relative output path of the render, and disk caches of
   simulations (blendcache_NAME), go by the place and the name of the file, as after Save As.
 
@@ -74,17 +91,22 @@ what is run:
   Nothing of the files: scripts and Python expressions in them stay switched off, and stay in them. Where a farm
   is to run them, it renders with `blender --enable-autoexec`. Baking reads keys, and needs none of them.
 
-Exit code: 0 done, 1 some objects or files could not be done, 2 a wrong option, or no file that could be read, 130
-stopped by Ctrl-C; files that were written by then are whole.
+missing libraries:
+  Each is named, with what is missing from it. An object that is missing, that overrides a missing one or moves by a
+  missing Action, cannot be looked at, so it counts as one that could not be done; so does a file that lacks a
+  collection or a scene, which may hold such objects, unless --objects says which are meant. The other objects are
+  done and written, and the file still knows its libraries. Missing meshes, materials, textures and the like are no
+  concern of baking, and do not change the exit code.
+
+exit code:
+  0    all done, or nothing to do, so that one can go on:
+       python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
+  1    some objects or files could not be done, and are named with the reason: a driven channel, an infinite key, a
+       missing library, one damaged file of many, a disk that is full, an --objects NAME that nothing has. The others
+       are done.
+  2    a wrong option, or none of the files could be read: nothing was done
+  130  stopped by Ctrl-C, and 143 by SIGTERM: the files that were written by then are whole, nothing else was touched
 """
-
-
-class FileProblem(Exception):
-    """Why a file cannot be done, and the way out."""
-
-
-class Unreadable(FileProblem):
-    """Why a file cannot be opened, and the way out."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +139,9 @@ class Outcome:
     refused: int = 0
     failed: bool = False
     unreadable: bool = False
+    incomplete: bool = False
+    """Whether there may be objects in it that nobody can look at, for a library is missing."""
+
     written: Path | None = None
     """Where to, or where it would have been."""
 
@@ -179,11 +204,11 @@ def jobs_of(files: Sequence[Path], suffix: str, folder: Path | None, *, in_place
     """
     sources: dict[str, Path] = {}
     for path in files:
-        sources.setdefault(os.path.normcase(path.resolve()), path)
+        sources.setdefault(_place(path), path)
     jobs, places = [], {}
     for path in sources.values():
         output = path if in_place else (folder or path.parent) / f"{path.stem}{suffix}.blend"
-        place = os.path.normcase(output.resolve())
+        place = _place(output)
         if place in places:
             raise ValueError(
                 f"{places[place]} and {path} would both be written to {output}: do them one after the other, with "
@@ -196,12 +221,17 @@ def jobs_of(files: Sequence[Path], suffix: str, folder: Path | None, *, in_place
     return jobs
 
 
+def _place(path: Path) -> str:
+    """Where a path leads to; the same for all paths that lead there."""
+    return os.path.normcase(os.path.realpath(path))  # Path.resolve of Python 3.11 fails where links go in circles.
+
+
 def main(arguments: list[str]) -> int:
     """Do all files, and return the exit code."""
     options = parse(arguments)
     outcomes: list[Outcome] = []
-    interrupted = False
-    with Progress() as progress, _extension(), _ctrl_c_between_steps() as stop_if_asked:
+    stopped = None
+    with Progress() as progress, _extension(), _stopped_between_steps() as stop_if_asked:
         run = _Run(options, progress.note, stop_if_asked)
         try:
             with progress.stage("Un-baking" if options.unbake else "Baking", len(options.jobs)) as stage:
@@ -209,8 +239,8 @@ def main(arguments: list[str]) -> int:
                     stage.say(job.source.name)
                     outcomes.append(run.do(job))
                     stage.advance()
-        except KeyboardInterrupt:
-            interrupted = True
+        except _Stopped as signalled:
+            stopped = signalled.args[0]
         else:
             seen = [one for one in outcomes if not one.failed]
             unmatched = set(options.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
@@ -220,12 +250,12 @@ def main(arguments: list[str]) -> int:
         for one in outcomes:
             if one.written is not None:
                 print(one.written, flush=True)
-    print(_summary(outcomes, len(options.jobs), options, interrupted=interrupted), file=sys.stderr, flush=True)
-    if interrupted:
-        return 130
+    print(_summary(outcomes, len(options.jobs), options, interrupted=stopped is not None), file=sys.stderr, flush=True)
+    if stopped is not None:
+        return 128 + stopped
     if all(one.unreadable for one in outcomes):
         return 2
-    return int(bool(unmatched) or any(one.refused or one.failed for one in outcomes))
+    return int(bool(unmatched) or any(one.refused or one.failed or one.incomplete for one in outcomes))
 
 
 def _summary(outcomes: Sequence[Outcome], count: int, options: argparse.Namespace, *, interrupted: bool) -> str:
@@ -237,6 +267,7 @@ def _summary(outcomes: Sequence[Outcome], count: int, options: argparse.Namespac
     parts = [f"{written} {would}written"]
     parts += [f"{idle} left alone"] if idle else []
     parts += [f"{failed} failed"] if failed else []
+    parts += [f"{incomplete} incomplete"] if (incomplete := sum(one.incomplete for one in outcomes)) else []
     parts += [f"{count - len(outcomes)} not reached"] if interrupted else []
     told = f"{_counted(done, 'object')} {would}{action.done}" + (f", {refused} not" if refused else "")
     return f"{'Stopped. ' if interrupted else ''}{told}; {_counted(count, 'file')}: {', '.join(parts)}."
@@ -260,11 +291,19 @@ class _Run:
         """Open a file, do its objects, and write it."""
         outcome = Outcome()
         try:
-            if job.output != job.source and job.output.exists() and not self.options.overwrite:
-                raise FileProblem(f"{job.output} is there already: add --overwrite, or another --output")
+            if job.output != job.source:
+                refuse_to_replace(job.output, overwrite=self.options.overwrite)
             open_file(job.source)
             self._stop_if_asked()
-            self._do_objects(job, outcome)
+            missing = missing_data()
+            for library in missing.libraries:
+                self._note(f"{job.source}: {library}")
+            if missing.hides_objects and self.options.objects is None:
+                outcome.incomplete = True
+                self._note(
+                    f"{job.source}: incomplete, for there may be objects to be {self.action.done} in what is missing"
+                )
+            self._do_objects(job, outcome, missing)
             self._finish(job, outcome)
         except FileProblem as problem:
             outcome = Outcome(failed=True, unreadable=isinstance(problem, Unreadable), matched=outcome.matched)
@@ -276,14 +315,19 @@ class _Run:
             traceback.print_exc()
         return outcome
 
-    def _do_objects(self, job: Job, outcome: Outcome) -> None:
-        for obj in list(bpy.data.objects):
+    def _do_objects(self, job: Job, outcome: Outcome, missing: Missing) -> None:
+        overridden = only_overridden()
+        for obj in [obj for obj in bpy.data.objects if obj not in overridden]:
             matching = self._matching(obj.name)
-            if not matching or not self.action.concerns(obj):
+            if not matching or not (obj in missing.reasons or self.action.concerns(obj)):
                 continue
+            if not outcome.matched:  # Only a file in which there is something to do is written.
+                refuse_read_only(job.output)
             outcome.matched |= matching
             name = obj.name
             try:
+                if obj in missing.reasons:
+                    raise Refused(missing.reasons[obj])
                 _refuse_linked(obj)
                 told = self.action.act(obj)
             except Refused as refusal:
@@ -307,61 +351,18 @@ class _Run:
             return
         if (before := bpy.data.version[:2]) < HERE:
             self._note(
-                f"{job.source}: was saved by Blender {_version(before)}; what is written is of Blender {_version(HERE)}"
+                f"{job.source}: was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}"
             )
         if not self.options.dry_run:
-            write_file(job, self._stop_if_asked)
+            write_file(job.source, job.output, self._stop_if_asked)
         self._note(f"{job.source}: {self._would}written to {job.output}")
         outcome.written = job.output
-
-
-def open_file(path: Path) -> None:
-    """Open a .blend file, without running anything that is in it. Raises `Unreadable`."""
-    if path.is_dir():
-        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.blend'}")
-    try:
-        with hushed(errors=True):
-            bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=True, use_scripts=False)
-    except RuntimeError as error:
-        said = " ".join(str(error).split()).removeprefix("Error: ")
-        if "not supported" in said:
-            raise Unreadable("this is no .blend file") from None
-        if "Cannot read file" in said:
-            raise Unreadable(said.rpartition(": ")[2]) from None
-        raise Unreadable(f"Blender cannot read this file, which looks damaged ({said.rpartition(': ')[2]})") from None
-    if (newer := bpy.data.version[:2]) > HERE:
-        # Blender opens it all the same, and would leave out on saving what it does not know.
-        raise Unreadable(
-            f"this was saved by Blender {_version(newer)}, and this is {_version(HERE)}: take that one or a later one"
-        )
-
-
-def write_file(job: Job, stop_if_asked: Callable[[], None]) -> None:
-    """Save what is open, whole or not at all. Raises `FileProblem`."""
-    try:
-        with hushed(errors=True):
-            if job.output == job.source:
-                bpy.ops.wm.save_mainfile()
-                return
-            with written_beside(job.output) as beside:
-                whole = str(beside.absolute())  # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
-                bpy.ops.wm.save_as_mainfile(filepath=whole, copy=True, check_existing=False, relative_remap=True)
-                stop_if_asked()
-    except RuntimeError as error:
-        said = " ".join(str(error).split()).removeprefix("Error: ")
-        raise FileProblem(f"{job.output} could not be written ({said})") from None
-    except OSError as error:
-        raise FileProblem(f"{error.filename or job.output}: {error.strerror or error}") from None
-
-
-def _version(version: tuple[int, int]) -> str:
-    return ".".join(map(str, version))
 
 
 def _baking(step: float, first: float | None, last: float | None) -> Action:
     def bake(obj: bpy.types.Object) -> str:
         if problem := animation.problem_of(obj):
-            raise Refused(problem)
+            raise Refused(extreme_key(obj) or problem)
         modes = _labels(obj)
         begin, end = animation.bake(obj, step=step, first=first, last=last)
         return f", frames {begin:g} to {end:g}, {', '.join(modes)}"
@@ -425,25 +426,26 @@ def _extension() -> Iterator[None]:
             addon_utils.enable(name)
 
 
-@contextmanager
-def _ctrl_c_between_steps() -> Iterator[Callable[[], None]]:
-    """A function that raises KeyboardInterrupt after Ctrl-C. Blender swallows what is raised while it works."""
-    pressed = False
+class _Stopped(KeyboardInterrupt):
+    """By Ctrl-C or SIGTERM. `args` are the number of the signal."""
 
-    def press(*_: object) -> None:
-        nonlocal pressed
-        pressed = True
+
+@contextmanager
+def _stopped_between_steps() -> Iterator[Callable[[], None]]:
+    """A function that raises _Stopped after Ctrl-C or SIGTERM. Blender swallows what is raised while it works."""
+    received: list[int] = []
+    before = {one: signal.signal(one, lambda number, _: received.append(number)) for one in STOPPING}
 
     def stop_if_asked() -> None:
-        if pressed:
-            raise KeyboardInterrupt
+        if received:
+            raise _Stopped(received[0])
 
-    before = signal.signal(signal.SIGINT, press)
     try:
         yield stop_if_asked
     finally:
-        # None stands for the Blender program's own, which Python cannot put back.
-        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
+        for one, handler in before.items():
+            # None stands for the Blender program's own, which Python cannot put back.
+            signal.signal(one, signal.SIG_DFL if handler is None else handler)
 
 
 def _names(text: str) -> list[str]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
@@ -21,17 +21,21 @@ def written_beside(path: Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        Where the folder cannot be written, or (on Windows) another program has `path` open.
+        Where the folder cannot be written, or (on Windows) another program has `path` open. It names `path`, and not
+        what is written meanwhile.
     """
     if not path.parent.is_dir():
         path.parent.mkdir(parents=True, exist_ok=True)
-    target = path.resolve() if path.is_symlink() else path
-    beside = target.with_name(f".{os.getpid()}.{path.name}")
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    beside = target.with_name(f".{os.getpid()}.{target.name}")
     try:
         yield beside
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
+        beside.replace(target)
+    except BaseException as error:
+        with suppress(OSError):  # What went wrong before is what counts.
+            beside.unlink()
+        if isinstance(error, OSError) and error.filename == str(beside):
+            error.filename, error.filename2 = str(path), None
         raise
 
 

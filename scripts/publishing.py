@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from scripts.files import write_text
+
 
 def opening(title: str, command: str, about: str, **versions: object) -> list[str]:
     """The first lines of a page: what was run, on what, and how to read it.
@@ -37,4 +39,4 @@ def publish(lines: Sequence[str], output: Path | None) -> None:
     page = "\n".join(lines)
     print(page)
     if output:
-        output.write_text(page, encoding="utf-8", newline="\n")
+        write_text(output, page)

@@ -5,11 +5,8 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -22,10 +19,23 @@ from scripts import bake
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+from tests.scripts.baking import (
+    LAST,
+    baked_name,
+    exit_code,
+    extension,
+    frames_of_keys,
+    new_file,
+    one_object_file,
+    open_again,
+    run,
+    save,
+    with_version,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 
-PLAYED = np.arange(0.0, 104.0)
+PLAYED = np.arange(0.0, LAST + 1.0)
 """All frames of the scenes: from before the first key until after the last strip."""
 
 BAKED = ("Arm", "Camera", "Own", "Strips", "Tool", "Wheel")
@@ -33,63 +43,11 @@ REFUSED = {
     "Axis": "set its rotation mode to Quaternion first",
     "Crane": "Location X is driven: remove the driver",
     "Future": "has no mode that this version knows",
-    "Huge": "has keys too large to compute with",
+    "Huge": "key 2 of Location X has the value 3e+38, which no motion can be computed from: delete it",
     "Noisy": "has a modifier of type Noise",
     "Prop": "it is linked from //library.blend: use --in-place on that file, or make it local",
 }
 """Objects of the shot that cannot be baked, and what is said of them."""
-
-
-def run(*arguments: object) -> int:
-    return bake.main([str(argument) for argument in arguments])
-
-
-def exit_code(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    return ended.value.code
-
-
-@contextmanager
-def extension() -> Iterator[None]:
-    """The extension switched on, as an animator has it; bake.py switches on its own."""
-    animation.register()
-    try:
-        yield
-    finally:
-        animation.unregister()
-
-
-def new_file() -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, int(PLAYED[-1])
-
-
-def save(path: Path, **options: object) -> Path:
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
-    return path
-
-
-def open_again(path: Path) -> None:
-    bpy.ops.wm.open_mainfile(filepath=str(path))
-
-
-def one_object_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda obj: None, **options) -> Path:
-    """A file with one live object, and what is done to it."""
-    with extension():
-        new_file()
-        obj = key(new_object("Tool"))
-        set_mode(obj, "dq_sclerp")
-        edit(obj)
-        return save(path, **options)
-
-
-def baked_name(path: Path) -> Path:
-    return path.with_name(f"{path.stem}-baked.blend")
-
-
-def frames_of_keys(obj: bpy.types.Object) -> list[float]:
-    return [point.co.x for point in curves_of(obj)["location", 0].keyframe_points]
 
 
 def fill_shot() -> None:
@@ -334,52 +292,6 @@ def test_a_file_of_an_older_blender_is_said_to_be_of_this_one_afterwards(tmp_pat
     assert "was saved by Blender 4.5; what is written is of Blender 9.0" in capsys.readouterr().err
 
 
-def with_version(path: Path, old_style: str, new_style: str) -> None:
-    """Let a file say that another Blender saved it: until 5.0 as in v405, and then as in v0500."""
-    content = path.read_bytes()
-    place = content.index(b"v") + 1
-    version = (old_style if content[7:9] == b"-v" else new_style).encode()
-    path.write_bytes(content[:place] + version + content[place + len(version) :])
-
-
-def text(path: Path) -> None:
-    path.write_text("not Blender's")
-
-
-def cut(path: Path) -> None:
-    path.write_bytes(one_object_file(path).read_bytes()[:50_000])
-
-
-def newer(path: Path) -> None:
-    with_version(one_object_file(path, compress=False), "999", "9999")
-
-
-@pytest.mark.parametrize(
-    ("make", "problem"),
-    [
-        (text, "this is no .blend file"),
-        (Path.touch, "this is no .blend file"),
-        (cut, "Blender cannot read this file, which looks damaged"),
-        (newer, "and this is"),
-        (Path.mkdir, "this is a folder: name the files in it"),
-        (lambda path: None, "No such file or directory"),
-    ],
-    ids=["text", "empty", "cut off", "newer", "folder", "missing"],
-)
-def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capfd, make, problem):
-    bad, good = tmp_path / "bad.blend", one_object_file(tmp_path / "good.blend")
-    make(bad)
-    capfd.readouterr()
-    assert run(bad, good) == 1
-    said = capfd.readouterr()
-    (line,) = (line for line in said.err.splitlines() if "bad.blend" in line)
-    assert line.startswith(f"{bad}: ")
-    assert problem in line
-    assert said.out == f"{baked_name(good)}\n"
-    assert run(bad) == 2
-    assert not baked_name(bad).exists()
-
-
 def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, capsys, monkeypatch):
     paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
     real = animation.bake
@@ -429,16 +341,6 @@ def test_in_place_the_file_is_saved_and_the_one_before_kept_by_blender(tmp_path,
     assert (tmp_path / "shot.blend1").read_bytes() == before
     open_again(path)
     assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
-
-
-def test_a_folder_that_cannot_be_written_is_named(tmp_path, capsys):
-    path = one_object_file(tmp_path / "shot.blend")
-    (tmp_path / "file").touch()
-    assert run(path, "--output", tmp_path / "file" / "folder") == 1
-    said = capsys.readouterr().err.splitlines()
-    assert any(line.startswith(f"{path}: {tmp_path / 'file'}") for line in said)
-    assert said[-1] == "0 objects baked; 1 file: 0 written, 1 failed."
-    assert sorted(os.listdir(tmp_path)) == ["file", "shot.blend"]
 
 
 def test_textures_and_libraries_are_found_from_another_folder(tmp_path):
@@ -503,27 +405,6 @@ def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
 
 
 # How it ends
-
-
-@pytest.mark.parametrize("stopped_at", [1, 2])
-def test_ctrl_c_leaves_whole_files_only(tmp_path, capsys, monkeypatch, stopped_at):
-    paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
-    count, real = 0, animation.bake
-
-    def bake_and_press(obj: bpy.types.Object, **options: object) -> tuple[float, float]:
-        nonlocal count
-        count += 1
-        if count == stopped_at:
-            signal.raise_signal(signal.SIGINT)
-        return real(obj, **options)
-
-    monkeypatch.setattr(animation, "bake", bake_and_press)
-    before = signal.getsignal(signal.SIGINT)
-    assert run(*paths) == 130
-    assert signal.getsignal(signal.SIGINT) is before
-    assert sorted(os.listdir(tmp_path)) == ["a-baked.blend", "a.blend", "b.blend"][2 - stopped_at :][: stopped_at + 1]
-    assert capsys.readouterr().err.splitlines()[-1].startswith("Stopped. ")
-    assert not hasattr(bpy.types.Object, "rigid_motion")
 
 
 @pytest.mark.parametrize(

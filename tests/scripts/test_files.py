@@ -33,3 +33,20 @@ def test_a_file_is_seen_under_its_name_only_once_it_is_whole(tmp_path: Path) -> 
         stream.flush()
         assert not path.exists()
     assert path.read_text() == "whole"
+
+
+def test_an_error_names_the_file_that_was_asked_for_and_a_folder_of_its_name_stays(tmp_path: Path) -> None:
+    (tmp_path / "report.html").mkdir()
+    with pytest.raises(OSError, match=r"report\.html") as raised:
+        write_text(tmp_path / "report.html", "new")
+    assert raised.value.filename == str(tmp_path / "report.html")
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "real.html").write_text("old")
+    (tmp_path / "link.html").symlink_to("real.html")
+    write_text(tmp_path / "link.html", "new")
+    assert (tmp_path / "link.html").is_symlink()
+    assert (tmp_path / "real.html").read_text() == "new"
+    assert len(list(tmp_path.iterdir())) == 2

@@ -1,0 +1,79 @@
+"""What the tests of bake.py share: running it, and files to run it on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon import animation
+from addon.animation import set_mode
+from scripts import bake
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import key, new_object
+
+LAST = 103
+"""The last frame of the scenes: after the last key and the last strip."""
+
+
+def run(*arguments: object) -> int:
+    return bake.main([str(argument) for argument in arguments])
+
+
+def exit_code(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        run(*arguments)
+    return ended.value.code
+
+
+@contextmanager
+def extension() -> Iterator[None]:
+    """The extension switched on, as an animator has it; bake.py switches on its own."""
+    animation.register()
+    try:
+        yield
+    finally:
+        animation.unregister()
+
+
+def new_file() -> None:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, LAST
+
+
+def save(path: Path, **options: object) -> Path:
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), **options)
+    return path
+
+
+def open_again(path: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+
+
+def one_object_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda obj: None, **options) -> Path:
+    """A file with one live object, and what is done to it."""
+    with extension():
+        new_file()
+        obj = key(new_object("Tool"))
+        set_mode(obj, "dq_sclerp")
+        edit(obj)
+        return save(path, **options)
+
+
+def baked_name(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-baked.blend")
+
+
+def frames_of_keys(obj: bpy.types.Object) -> list[float]:
+    return [point.co.x for point in curves_of(obj)["location", 0].keyframe_points]
+
+
+def with_version(path: Path, old_style: str, new_style: str) -> None:
+    """Let a file say that another Blender saved it: until 5.0 as in v405, and then as in v0500."""
+    content = path.read_bytes()
+    place = content.index(b"v") + 1
+    version = (old_style if content[7:9] == b"-v" else new_style).encode()
+    path.write_bytes(content[:place] + version + content[place + len(version) :])

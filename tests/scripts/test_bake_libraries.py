@@ -1,0 +1,224 @@
+"""bake.py on files that link to others: what is missing is named and counts, what is there is found again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon.animation import is_baked, set_mode
+from tests.animation.scenes import key, new_object
+from tests.scripts.baking import baked_name, extension, new_file, open_again, run, save
+
+WAY_OUT = "tell the file where it is now (Outliner, Blender File, right-click: Relocate)"
+
+
+def make_library(path: Path) -> Path:
+    """A library with a live object in a collection, and a mesh."""
+    with extension():
+        new_file()
+        prop = set_up(new_object("Prop", data=bpy.data.meshes.new("Box")))
+        bpy.data.collections.new("Props").objects.link(prop)
+        bpy.data.collections["Props"].use_fake_user = True
+        return save(path)
+
+
+def set_up(obj: bpy.types.Object) -> bpy.types.Object:
+    set_mode(key(obj), "dq_sclerp")
+    return obj
+
+
+def linked(library: Path, kind: str) -> bpy.types.ID:
+    with bpy.data.libraries.load(str(library), link=True, relative=False) as (there, here):
+        setattr(here, kind, getattr(there, kind))
+    return getattr(here, kind)[0]
+
+
+def link_object(library: Path) -> bpy.types.Object:
+    obj = linked(library, "objects")
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def link_action(library: Path) -> None:
+    data = new_object("Local").animation_data_create()
+    data.action = linked(library, "actions")
+    data.action_slot = data.action.slots[0]
+
+
+def link_strip(library: Path) -> None:
+    action = linked(library, "actions")
+    strip = new_object("Local").animation_data_create().nla_tracks.new().strips.new("Strip", 1, action)
+    strip.action_slot = action.slots[0]
+
+
+def link_and_override(library: Path) -> bpy.types.Object:
+    obj = link_object(library).override_create(remap_local_usages=True)
+    obj.animation_data.action = obj.animation_data.action.copy()
+    set_mode(obj, "dq_sclerp")
+    return obj
+
+
+def link_collection(library: Path) -> None:
+    new_object("Instance").instance_type = "COLLECTION"
+    bpy.data.objects["Instance"].instance_collection = linked(library, "collections")
+
+
+def link_mesh(library: Path) -> None:
+    set_up(new_object("Local", data=linked(library, "meshes")))
+
+
+def shot_with(path: Path, link: Callable[[Path], object], library: Path) -> Path:
+    """A file with a live object of its own, and what is linked from a library; by a relative path, as Blender saves."""
+    with extension():
+        new_file()
+        set_up(new_object("Tool"))
+        save(path)
+        link(library)
+        bpy.ops.file.make_paths_relative()
+        bpy.ops.wm.save_mainfile()
+    path.with_suffix(".blend1").unlink()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("link", "wanted", "told"),
+    [
+        (link_object, "Object Prop", "Prop: not baked: it is missing from"),
+        (link_action, "Action PropAction", "Local: not baked: its Action PropAction is missing from"),
+        (link_strip, "Action PropAction", "Local: not baked: its Action PropAction is missing from"),
+        (link_and_override, "Object Prop", "Prop: not baked: what it overrides is missing from"),
+        (link_collection, "Collection Props", "incomplete, for there may be objects to be baked in what is missing"),
+    ],
+)
+def test_a_missing_library_that_may_hold_motion_is_named_and_fails_what_needs_it(tmp_path, capsys, link, wanted, told):
+    library = make_library(tmp_path / "library.blend")
+    shot = shot_with(tmp_path / "shot.blend", link, library)
+    library.unlink()
+    capsys.readouterr()
+    assert run(shot) == 1
+    said = capsys.readouterr().err
+    (line,) = (line for line in said.splitlines() if " was not found" in line)
+    assert line.startswith(f"{shot}: library {library} was not found (")
+    assert wanted in line
+    assert line.endswith(WAY_OUT)
+    assert said.count(told) == 1
+    assert f"{shot}: Tool: baked" in said, "what is there is done"
+
+
+def test_a_missing_library_that_holds_meshes_only_is_named_and_does_no_harm(tmp_path, capsys):
+    library = make_library(tmp_path / "library.blend")
+    shot = shot_with(tmp_path / "shot.blend", link_mesh, library)
+    library.unlink()
+    capsys.readouterr()
+    assert run(shot) == 0
+    said = capsys.readouterr().err
+    assert f"{shot}: library {library} was not found (Mesh Box): bring it back" in said
+    assert "2 objects baked; 1 file: 1 written." in said
+
+
+def test_a_library_that_lost_what_is_wanted_of_it_is_told_from_one_that_is_gone(tmp_path, capsys):
+    library = make_library(tmp_path / "library.blend")
+    shot = shot_with(tmp_path / "shot.blend", link_object, library)
+    open_again(library)
+    bpy.data.objects["Prop"].name = "Property"
+    bpy.ops.wm.save_mainfile()
+    assert run(shot) == 1
+    assert f"{shot}: library {library} cannot be read, or lacks something (Object Prop): " in capsys.readouterr().err
+
+
+def test_a_library_of_a_library_that_is_missing_is_named_where_it_should_be(tmp_path, capsys):
+    (tmp_path / "sets" / "deep").mkdir(parents=True)
+    deep = make_library(tmp_path / "sets" / "deep" / "library.blend")
+    middle = shot_with(tmp_path / "sets" / "middle.blend", link_action, deep)
+    with extension():
+        open_again(middle)
+        bpy.data.objects.remove(bpy.data.objects["Tool"])
+        bpy.ops.wm.save_mainfile()
+    shot = shot_with(tmp_path / "shot.blend", link_object, middle)
+    deep.unlink()
+    capsys.readouterr()
+    assert run(shot) == 1
+    said = capsys.readouterr().err
+    assert f"{shot}: library {deep} was not found (Action PropAction)" in said
+    assert f"{shot}: Local: not baked: its Action PropAction is missing from {deep}" in said
+
+
+@pytest.mark.parametrize("link", [link_object, link_action, link_collection])
+def test_a_library_that_is_back_is_found_by_what_was_baked_without_it(tmp_path, link):
+    library = make_library(tmp_path / "library.blend")
+    shot = shot_with(tmp_path / "shot.blend", link, library)
+    aside = library.rename(tmp_path / "aside.blend")
+    assert run(shot, "--output", tmp_path / "farm") == 1
+    aside.rename(library)
+    with extension():
+        open_again(tmp_path / "farm" / "shot-baked.blend")
+        (found,) = bpy.data.libraries
+        assert is_baked(bpy.data.objects["Tool"])
+        assert Path(bpy.path.abspath(found.filepath)).resolve() == library
+        assert found.users_id
+        assert not any(block.is_missing for block in found.users_id)
+
+
+def test_objects_that_were_not_asked_for_may_be_missing(tmp_path, capsys):
+    library = make_library(tmp_path / "library.blend")
+    object_shot = shot_with(tmp_path / "one.blend", link_object, library)
+    collection_shot = shot_with(tmp_path / "two.blend", link_collection, library)
+    library.unlink()
+    capsys.readouterr()
+    assert run(object_shot, collection_shot, "--objects", "Tool") == 0
+    assert capsys.readouterr().err.count(" was not found") == 2
+
+
+def test_un_baking_says_what_is_missing_too(tmp_path, capsys):
+    library = make_library(tmp_path / "library.blend")
+    shot = shot_with(tmp_path / "shot.blend", link_object, library)
+    library.unlink()
+    capsys.readouterr()
+    assert run(shot, "--unbake") == 1
+    assert f"{shot}: Prop: not un-baked: it is missing from {library}" in capsys.readouterr().err
+
+
+def test_a_live_object_that_is_linked_for_its_override_alone_is_no_failure(tmp_path, capsys):
+    shot = shot_with(tmp_path / "shot.blend", link_and_override, make_library(tmp_path / "library.blend"))
+    capsys.readouterr()
+    assert run(shot) == 0
+    assert "2 objects baked; 1 file: 1 written." in capsys.readouterr().err
+
+
+def test_a_live_object_that_is_shown_beside_its_override_is_one(tmp_path, capsys):
+    def link(library: Path) -> None:
+        bpy.context.scene.collection.objects.link(link_and_override(library).override_library.reference)
+
+    shot = shot_with(tmp_path / "shot.blend", link, make_library(tmp_path / "library.blend"))
+    capsys.readouterr()
+    assert run(shot) == 1
+    assert "Prop: not baked: it is linked from //library.blend: use --in-place on that file" in capsys.readouterr().err
+
+
+def test_an_action_that_is_linked_is_refused_with_the_way_out(tmp_path, capsys):
+    def link(library: Path) -> None:
+        link_action(library)
+        bpy.data.objects["Local"].rigid_motion.mode = "dq_sclerp"
+
+    shot = shot_with(tmp_path / "shot.blend", link, make_library(tmp_path / "library.blend"))
+    capsys.readouterr()
+    assert run(shot) == 1
+    assert "Local: not baked: PropAction is linked from another file: make it local first" in capsys.readouterr().err
+
+
+def test_spaces_and_umlauts_in_paths_and_names_are_kept(tmp_path, capsys):
+    folder = tmp_path / "Für die Nacht" / "Größe 1"
+    folder.mkdir(parents=True)
+    library = make_library(folder / "Bücher ß.blend")
+    shot = shot_with(folder / "Schuß 01 'neu'.blend", link_mesh, library)
+    capsys.readouterr()
+    assert run(shot, "--output", tmp_path / "fertig (heute)") == 0
+    written = tmp_path / "fertig (heute)" / "Schuß 01 'neu'-baked.blend"
+    assert capsys.readouterr().out == f"{written}\n"
+    open_again(written)
+    assert Path(bpy.path.abspath(bpy.data.libraries[0].filepath)).resolve() == library
+    assert not bpy.data.meshes["Box"].is_missing
+    assert not baked_name(shot).exists()

@@ -1,0 +1,388 @@
+"""bake.py when something is wrong: broken files, places that cannot be written, keys that are none, an end half-way."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import pytest
+
+from addon import animation
+from scripts import blend_files
+from tests.animation.oracle import curves_of
+from tests.scripts.baking import (
+    baked_name,
+    exit_code,
+    frames_of_keys,
+    one_object_file,
+    open_again,
+    run,
+    with_version,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = [sys.executable, ROOT / "scripts" / "bake.py"]
+
+PR_CAPBSET_DROP, CAPABILITIES = 24, (1, 2)
+"""See prctl(2) and capabilities(7): that permissions of files do not count, as for root on Linux."""
+
+
+def run_without_privileges(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run bake.py as a user whom permissions of files concern, also where the tests are run by root."""
+
+    def give_up() -> None:
+        if os.geteuid() == 0:
+            for capability in CAPABILITIES:
+                ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)
+
+    return subprocess.run([*COMMAND, *arguments], capture_output=True, text=True, timeout=60, preexec_fn=give_up)
+
+
+@contextmanager
+def disk_full_after(size: int) -> Iterator[None]:
+    """Let no file grow larger than so many bytes: Blender's writing ends there, as on a full disk."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+# Files that cannot be read
+
+
+def text(path: Path) -> None:
+    path.write_text("not Blender's")
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(one_object_file(path).read_bytes()[:50_000])
+
+
+def newer(path: Path) -> None:
+    with_version(one_object_file(path, compress=False), "999", "9999")
+
+
+@pytest.mark.parametrize(
+    ("make", "problem"),
+    [
+        (text, "this is no .blend file"),
+        (Path.touch, "this is no .blend file, it is empty"),
+        (cut, "Blender cannot read this file, which looks damaged"),
+        (newer, "and this is"),
+        (Path.mkdir, "this is a folder: name the files in it"),
+        (lambda path: None, "this cannot be opened (No such file or directory)"),
+    ],
+    ids=["text", "empty", "cut off", "newer", "folder", "missing"],
+)
+def test_a_file_that_cannot_be_read_is_named_and_the_others_go_on(tmp_path, capfd, make, problem):
+    bad, good = tmp_path / "bad.blend", one_object_file(tmp_path / "good.blend")
+    make(bad)
+    capfd.readouterr()
+    assert run(bad, good) == 1
+    said = capfd.readouterr()
+    (line,) = (line for line in said.err.splitlines() if "bad.blend" in line)
+    assert line.startswith(f"{bad}: ")
+    assert problem in line
+    assert said.out == f"{baked_name(good)}\n"
+    assert run(bad) == 2
+    assert not baked_name(bad).exists()
+
+
+@pytest.mark.parametrize("size", [7, 30, 1000, 0.5, 0.99])
+def test_a_file_that_is_cut_off_anywhere_is_called_damaged(tmp_path, capsys, size):
+    path = one_object_file(tmp_path / "shot.blend")
+    whole = path.read_bytes()
+    path.write_bytes(whole[: size if size > 1 else int(size * len(whole))])
+    assert run(path) == 2
+    assert f"{path}: Blender cannot read this file, which looks damaged (" in capsys.readouterr().err
+    assert not baked_name(path).exists()
+
+
+def test_a_pipe_is_not_waited_for(tmp_path, capsys):
+    os.mkfifo(tmp_path / "pipe.blend")
+    assert run(tmp_path / "pipe.blend") == 2
+    assert "this is no file on a disk" in capsys.readouterr().err
+
+
+def test_links_that_lead_nowhere_are_named(tmp_path, capsys):
+    (tmp_path / "circle.blend").symlink_to("circle.blend")
+    (tmp_path / "nowhere.blend").symlink_to("gone.blend")
+    assert run(tmp_path / "circle.blend", tmp_path / "nowhere.blend") == 2
+    said = capsys.readouterr().err
+    assert "circle.blend: this cannot be opened (Too many levels of symbolic links)" in said
+    assert "nowhere.blend: this cannot be opened (No such file or directory)" in said
+
+
+def test_a_file_that_one_may_not_read_is_named_and_the_others_go_on(tmp_path):
+    locked, good = one_object_file(tmp_path / "locked.blend"), one_object_file(tmp_path / "good.blend")
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    shutil.copy(good, hidden / "shot.blend")
+    locked.chmod(0)
+    hidden.chmod(0)
+    try:
+        done = run_without_privileges(locked, hidden / "shot.blend", good)
+    finally:
+        hidden.chmod(0o700)
+    assert (done.returncode, done.stdout) == (1, f"{baked_name(good)}\n"), done.stderr
+    for path in (locked, hidden / "shot.blend"):
+        assert f"{path}: this cannot be opened (Permission denied): see to its path, and who may read it" in done.stderr
+    assert "1 object baked; 3 files: 1 written, 2 failed." in done.stderr
+
+
+# Places that cannot be written
+
+
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+@pytest.mark.parametrize("below", ["", "new/folders"])
+def test_a_read_only_folder_is_named_by_its_own_name_and_before_the_work(tmp_path, dry, below):
+    path, folder = one_object_file(tmp_path / "shot.blend"), tmp_path / "read-only"
+    folder.mkdir(mode=0o500)
+    done = run_without_privileges(path, "--output", folder / below, *dry)
+    output = folder / below / "shot-baked.blend"
+    problem = (
+        f"{path}: {output} cannot be written, for {folder} is read-only: allow it, or write elsewhere with --output"
+    )
+    assert problem in done.stderr.splitlines()
+    assert (done.returncode, done.stdout, os.listdir(folder)) == (1, "", [])
+    assert ": baked" not in done.stderr
+
+
+def test_a_read_only_file_is_not_replaced(tmp_path):
+    path = one_object_file(tmp_path / "shot.blend")
+    before = path.read_bytes()
+    baked_name(path).write_text("precious")
+    baked_name(path).chmod(0o400)
+    path.chmod(0o400)
+    for option, place in (("--overwrite", baked_name(path)), ("--in-place", path)):
+        done = run_without_privileges(path, option)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert f"{path}: {place} cannot be written, for {place} is read-only: allow it" in done.stderr
+    assert (baked_name(path).read_text(), path.read_bytes()) == ("precious", before)
+
+
+def test_what_blender_says_of_writing_is_told_of_the_name_that_was_asked_for(tmp_path, capsys):
+    path = one_object_file(
+        tmp_path / f"{'long' * 61}.blend"
+    )  # With -baked it is longer than the name of a file may be.
+    capsys.readouterr()
+    assert run(path) == 1
+    said = capsys.readouterr().err
+    assert f"{baked_name(path)} could not be written (File name too long): write elsewhere with --output" in said
+    assert f".{os.getpid()}." not in said
+    assert os.listdir(tmp_path) == [path.name]
+
+
+def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    (tmp_path / "file").touch()
+    assert run(path, "--output", tmp_path / "file" / "folder") == 1
+    said = capsys.readouterr().err.splitlines()
+    assert any(line.startswith(f"{path}: {tmp_path / 'file'} is a file, and ") for line in said)
+    assert said[-1] == "0 objects baked; 1 file: 0 written, 1 failed."
+    assert sorted(os.listdir(tmp_path)) == ["file", "shot.blend"]
+
+
+def test_a_folder_of_the_name_of_the_output_is_left_alone(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    baked_name(path).mkdir()
+    assert run(path, "--overwrite") == 1
+    assert f"{path}: {baked_name(path)} is a folder: rename it" in capsys.readouterr().err
+    assert baked_name(path).is_dir()
+
+
+@pytest.mark.parametrize("compress", [False, True])
+@pytest.mark.parametrize("options", [(), ("--overwrite",), ("--in-place",)])
+def test_on_a_full_disk_nothing_is_written_and_what_is_there_stays(tmp_path, capsys, options, compress):
+    path = one_object_file(tmp_path / "shot.blend", compress=compress)
+    if options == ("--overwrite",):
+        baked_name(path).write_text("precious")
+    before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
+    capsys.readouterr()
+    with disk_full_after(path.stat().st_size // 2):
+        assert run(path, *options) == 1
+    said = capsys.readouterr()
+    output = path if options == ("--in-place",) else baked_name(path)
+    assert f"{path}: {output} could not be written (it broke off half-way, the disk may be full)" in said.err
+    assert said.out == ""
+    assert {one.name: one.read_bytes() for one in tmp_path.iterdir()} == before
+
+
+def test_a_link_is_saved_through_in_place(tmp_path):
+    (tmp_path / "real").mkdir()
+    real, link = one_object_file(tmp_path / "real" / "shot.blend"), tmp_path / "link.blend"
+    before = real.read_bytes()
+    link.symlink_to(real)
+    assert run(link, "--in-place") == 0
+    assert link.is_symlink()
+    assert os.listdir(tmp_path / "real").count("shot.blend") == 1
+    assert (tmp_path / "real" / "shot.blend1").read_bytes() == before
+    open_again(real)
+    assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
+
+
+def test_an_output_that_leads_to_the_file_itself_is_refused(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    baked_name(path).symlink_to(path)
+    before = path.read_bytes()
+    assert exit_code(path, "--overwrite") == 2
+    assert "which is to be read too" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+# Keys that are none
+
+
+def set_key(channel: tuple[str, int], number: int, **values: float) -> Callable[[bpy.types.Object], None]:
+    def edit(obj: bpy.types.Object) -> None:
+        for name, value in values.items():
+            part, axis = name.rsplit("_", 1)
+            getattr(curves_of(obj)[channel].keyframe_points[number - 1], part)["xy".index(axis)] = value
+
+    return edit
+
+
+@pytest.mark.parametrize(
+    ("edit", "told"),
+    [
+        (set_key(("location", 1), 3, co_y=math.inf), "key 3 of Location Y has the value 3.4"),
+        (set_key(("location", 0), 1, co_y=-math.inf), "key 1 of Location X has the value -3.4"),
+        (set_key(("rotation_quaternion", 0), 2, co_y=math.nan), "key 2 of Rotation W has the value nan"),
+        (set_key(("location", 2), 4, co_x=math.inf), "key 4 of Location Z has the frame 3.4"),
+        (set_key(("location", 2), 3, co_x=math.nan), "key 3 of Location Z has the frame nan"),
+        (set_key(("location", 1), 2, handle_right_y=math.nan), "right handle of key 2 of Location Y has the value nan"),
+    ],
+)
+def test_an_infinite_key_is_named_with_its_object_its_channel_and_the_way_out(tmp_path, capsys, edit, told):
+    animation.set_enabled(False)
+    try:
+        path = one_object_file(tmp_path / "shot.blend", edit)
+    finally:
+        animation.set_enabled(True)
+    capsys.readouterr()
+    assert run(path) == 1
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if "Tool" in line)
+    assert line.startswith(f"{path}: Tool: not baked: {told}")
+    assert line.endswith(", which no motion can be computed from: delete it (Dope Sheet, X)")
+    assert not baked_name(path).exists()
+
+
+def test_other_reasons_are_told_as_they_are(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend", lambda obj: obj.driver_add("location", 0))
+    assert run(path) == 1
+    assert "Tool: not baked: Location X is driven: remove the driver" in capsys.readouterr().err
+
+
+# Nothing to do
+
+
+def test_un_baking_what_is_not_baked_leaves_it_alone(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path, "--unbake") == 0
+    assert f"{path}: nothing to be un-baked; left alone" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == ["shot.blend"]
+
+
+def test_a_baked_file_is_not_baked_again(tmp_path, capsys):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path) == 0
+    assert run(baked_name(path)) == 0
+    assert f"{baked_name(path)}: nothing to be baked; left alone" in capsys.readouterr().err
+    assert sorted(os.listdir(tmp_path)) == ["shot-baked.blend", "shot.blend"]
+
+
+# Stopped half-way
+
+
+@pytest.mark.parametrize(("stopped_by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_run_that_is_stopped_leaves_whole_files_only(tmp_path, stopped_by, code):
+    first = one_object_file(tmp_path / "000.blend")
+    paths = [first, *(tmp_path / f"{number:03}.blend" for number in range(1, 200))]
+    for path in paths[1:]:
+        os.link(first, path)
+    farm = tmp_path / "farm"
+    with subprocess.Popen([*COMMAND, *paths, "--output", farm], stderr=subprocess.PIPE, stdout=subprocess.PIPE) as ran:
+        while b": written to " not in (line := ran.stderr.readline()):
+            assert line, "it ended before the first file"
+        ran.send_signal(stopped_by)
+        printed, said = ran.communicate(timeout=60)
+    assert ran.returncode == code, said
+    written = sorted(farm.iterdir())
+    assert 0 < len(written) < len(paths)
+    assert printed.decode().split() == [str(path) for path in written], "no name but those of files that are whole"
+    assert f"{len(paths) - len(written)} not reached." in said.decode()
+    for path in written:
+        open_again(path)
+        assert len(frames_of_keys(bpy.data.objects["Tool"])) == 40
+
+
+@pytest.mark.parametrize("options", [(), ("--in-place",)])
+def test_ctrl_c_while_a_file_is_written_leaves_it_as_it_was(tmp_path, monkeypatch, options):
+    path = one_object_file(tmp_path / "shot.blend")
+    before, real = path.read_bytes(), blend_files.refuse_cut_off
+
+    def press_and_check(written: Path) -> None:
+        assert written.is_file()
+        signal.raise_signal(signal.SIGINT)
+        real(written)
+
+    monkeypatch.setattr(blend_files, "refuse_cut_off", press_and_check)
+    assert run(path, *options) == 130
+    assert os.listdir(tmp_path) == ["shot.blend"]
+    assert path.read_bytes() == before
+
+
+def test_ctrl_c_while_blender_is_loaded_ends_it_at_once_and_without_a_word(tmp_path):
+    path = one_object_file(tmp_path / "shot.blend")
+    beside = tmp_path / "modules"
+    beside.mkdir()
+    (beside / "bpy.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")  # In the place of Blender.
+    done = subprocess.run(
+        [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+@pytest.mark.parametrize("stopped_at", [1, 2])
+def test_ctrl_c_leaves_whole_files_only(tmp_path, capsys, monkeypatch, stopped_at):
+    paths = [one_object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
+    count, real = 0, animation.bake
+
+    def bake_and_press(obj: bpy.types.Object, **options: object) -> tuple[float, float]:
+        nonlocal count
+        count += 1
+        if count == stopped_at:
+            signal.raise_signal(signal.SIGINT)
+        return real(obj, **options)
+
+    monkeypatch.setattr(animation, "bake", bake_and_press)
+    before = signal.getsignal(signal.SIGINT)
+    assert run(*paths) == 130
+    assert signal.getsignal(signal.SIGINT) is before
+    assert sorted(os.listdir(tmp_path)) == ["a-baked.blend", "a.blend", "b.blend"][2 - stopped_at :][: stopped_at + 1]
+    assert capsys.readouterr().err.splitlines()[-1].startswith("Stopped. ")
+    assert not hasattr(bpy.types.Object, "rigid_motion")
+
+
+# What it says of itself
+
+
+def test_the_help_states_the_exit_codes_and_the_rule_for_missing_libraries(capsys):
+    assert exit_code("--help") == 0
+    said = capsys.readouterr().out
+    for code in (0, 1, 2, 130):
+        assert f"\n  {code} " in said
+    assert "missing libraries:\n" in said
+    assert "python scripts/bake.py shots/*.blend --output farm\n" in said
