@@ -8,6 +8,6 @@ import pytest
 
 
 def complaints(caplog: pytest.LogCaptureFixture) -> list[str]:
-    """The errors of a test so far. pytest keeps a list for each phase, and `caplog.records` is that of the present one."""
+    """The errors of a test so far, in all its phases; `caplog.records` begins anew with each of them."""
     records = [record for phase in ("setup", "call", "teardown") for record in caplog.get_records(phase)]
     return [record.getMessage() for record in records if record.levelno >= logging.ERROR]
