@@ -26,6 +26,7 @@ from addon.animation.fcurves import (
     evaluate,
     read_keys,
 )
+from tests.thoroughness import tried
 
 CODES = {name: code for code, name in INTERPOLATIONS.items()}
 MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")
@@ -171,25 +172,24 @@ def curves(
 all_cycles = st.builds(Cycles, st.sampled_from(MODES), st.sampled_from(MODES), st.integers(0, 3), st.integers(0, 3))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=tried(300))
 @given(curves())
 def test_curves_of_all_kinds_have_blenders_values(keys):
     assert_as_blender(keys, frames_about(keys))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=tried(300))
 @given(curves(kinds=("BEZIER",)))
 def test_handles_of_any_length_have_blenders_values(keys):
     assert_as_blender(keys, frames_about(keys))
 
 
-@settings(deadline=None)
 @given(curves(kinds=("BEZIER",)))
 def test_handles_on_the_wrong_side_of_their_key_have_blenders_values(keys):
     assert_as_blender(dataclasses.replace(keys, left=keys.right, right=keys.left), frames_about(keys), update=False)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=tried(200))
 @given(curves(), all_cycles)
 def test_cycles_have_blenders_values(keys, cycles):
     keys = dataclasses.replace(keys, cycles=cycles)
@@ -198,7 +198,7 @@ def test_cycles_have_blenders_values(keys, cycles):
     assert_as_blender(keys, frames)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=tried(200))
 @given(curves(kinds=("CONSTANT", "LINEAR", "QUAD"), gaps=(0.0, 2.0**-14, 2.0**-13, 2.0**-12, 1.0)), st.data())
 def test_keys_on_the_same_frame_or_close_to_it_have_blenders_values(keys, data):
     keys = dataclasses.replace(keys, points=keys.points - (keys.points[0, 0, 0], 0.0))
@@ -261,7 +261,7 @@ def test_automatic_handles_have_blenders_values_on_a_thousand_frames():
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=3e-6)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=tried(50))
 @given(st.lists(st.tuples(curves(), st.none() | all_cycles), min_size=2, max_size=8), st.booleans())
 def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic):
     together = [dataclasses.replace(keys, cycles=cycles) for keys, cycles in drawn]
@@ -275,7 +275,7 @@ def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic
         np.testing.assert_allclose(own, alone, rtol=0.0, atol=1e-6 * size)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=tried(50))
 @given(st.lists(curves(), min_size=2, max_size=5), st.none() | all_cycles, st.booleans())
 def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles, unit_elastic):
     count = min(len(keys.times) for keys in drawn)
@@ -324,7 +324,7 @@ def test_many_curves_on_many_frames_have_the_values_that_each_has_alone():
         np.testing.assert_allclose(own, evaluate_one(keys, frames), rtol=0.0, atol=1e-9)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=tried(50))
 @given(curves(), st.none() | all_cycles)
 def test_the_order_of_frames_does_not_matter(keys, cycles):
     keys = dataclasses.replace(keys, cycles=cycles)
@@ -356,7 +356,7 @@ def test_the_elastic_timing_of_channels_is_their_own_or_that_of_a_curve_from_0_t
 anything = st.sampled_from((np.nan, np.inf, -np.inf, 3e38, -3e38, 1e-40, 0.0, 1.0, 2.0, 7.0))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=tried(300))
 @given(st.integers(0, 5), st.data(), st.booleans(), st.none() | all_cycles)
 def test_keys_that_are_no_numbers_do_not_break_the_evaluation(count, data, linear, cycles):
     def rows(*shape: int) -> np.ndarray:
@@ -435,7 +435,7 @@ def test_an_edit_of_a_cycles_modifier_shows_in_the_raw_bytes():
         assert read_one(fcurve).raw != before
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=tried(100))
 @given(curves(), all_cycles)
 def test_folded_times_have_the_values_of_the_cycles(keys, cycles):
     repeated = dataclasses.replace(
