@@ -23,6 +23,12 @@ EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 WORKERS = 8
 """The most that are started: each is a Blender of half a gigabyte, which first collects all tests."""
 
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS")
+"""How many NumPy takes, and OpenGL in software."""
+
+BLENDERS_OWN = ("OCIO", "SYCL_UR_USE_LEVEL_ZERO_V2")
+"""What Blender 5.2 puts into the environment of its process, past `os.environ`; another Blender complains of it."""
+
 STATUS = pytest.StashKey[int]()
 """How the session ended."""
 
@@ -50,6 +56,16 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     return min(processors(), WORKERS)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(specs: list) -> None:
+    """Start workers in an environment as if no Blender was here, each with its share of the processors."""
+    for name in BLENDERS_OWN:
+        if name not in os.environ:
+            os.unsetenv(name)
+    for name in THREADS:
+        os.environ.setdefault(name, str(max(1, processors() // len(specs))))
 
 
 @pytest.hookimpl(optionalhook=True)
