@@ -1,4 +1,7 @@
-"""Blender in the test process: `bpy` first, since `mathutils` comes with it; an empty file and the zip for who asks."""
+"""Blender in the test process: `bpy` first, since `mathutils` comes with it; an empty file and the zip for who asks.
+
+More than one file of tests runs side by side, in a Blender for each processor; see `pytest_cmdline_main`.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,70 @@ import bpy
 import pytest
 
 from scripts.build_extension import build
+from scripts.workplan.processes import processors
+from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
 from tests.recordings import RECORDINGS
 
 EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 
+WORKERS = 8
+"""The most that are started: each is a Blender of half a gigabyte, which first collects all tests."""
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS")
+"""How many NumPy takes, and OpenGL in software."""
+
+BLENDERS_OWN = ("OCIO", "SYCL_UR_USE_LEVEL_ZERO_V2")
+"""What Blender 5.2 puts into the environment of its process, past `os.environ`; another Blender complains of it."""
+
 STATUS = pytest.StashKey[int]()
 """How the session ended."""
+
+LOST = pytest.StashKey[bool]()
+"""Whether a worker ended before its time."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Have more than one file of tests run by workers side by side.
+
+    One file runs in this process, where it begins sooner, and so does what is to be seen or stopped while it runs. `-n`
+    says how many workers it shall be in any case, `-n 0` that there shall be none.
+    """
+    option = config.option
+    at_liberty = getattr(option, "numprocesses", 0) is None and not hasattr(config, "workerinput")
+    watched = option.usepdb or option.trace or option.capture == "no"
+    files = {config.invocation_params.dir / argument.split("::")[0] for argument in config.args}
+    if at_liberty and not watched and (len(files) > 1 or any(file.is_dir() for file in files)):
+        option.numprocesses = "auto"
+        # A worker begins with neighbouring tests, which share what a module sets up, and helps others when it is done.
+        option.dist = "worksteal" if option.dist == "no" else option.dist
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    return min(processors(), WORKERS)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(specs: list) -> None:
+    """Start workers in an environment as if no Blender was here, each with its share of the processors."""
+    for name in BLENDERS_OWN:
+        if name not in os.environ:
+            os.unsetenv(name)
+    for name in THREADS:
+        os.environ.setdefault(name, str(max(1, processors() // len(specs))))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: object, error: object | None) -> None:
+    """A worker that crashed between two tests has lost none, and would be missed by nobody."""
+    if error:
+        node.config.stash[LOST] = True
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    if config.stash.get(LOST, False):
+        terminalreporter.write_line("A worker ended before its time, so this run has failed.", red=True)
 
 
 @pytest.hookimpl(trylast=True)
@@ -34,8 +95,11 @@ def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    session.config.stash[STATUS] = int(exitstatus)
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if session.config.stash.get(LOST, False):
+        session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
+    session.config.stash[STATUS] = int(session.exitstatus)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

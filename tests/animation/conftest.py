@@ -8,6 +8,7 @@ import bpy
 import pytest
 
 from addon import animation
+from tests.complaints import complaints
 
 
 @pytest.fixture
@@ -19,4 +20,4 @@ def live_file(empty_file, caplog: pytest.LogCaptureFixture) -> bpy.types.Context
             yield empty_file
     finally:
         animation.unregister()
-    assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == []
+    assert complaints(caplog) == []

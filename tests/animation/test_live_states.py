@@ -34,6 +34,7 @@ from tests.animation.oracle import (
     transform_paths,
 )
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
+from tests.thoroughness import tried
 
 LAST = 40
 ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
@@ -547,7 +548,7 @@ class Editing(RuleBasedStateMachine):
 
 
 Editing.TestCase.settings = settings(
-    max_examples=40,
+    max_examples=tried(40),
     stateful_step_count=25,
     deadline=None,
     derandomize=True,

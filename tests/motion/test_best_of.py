@@ -21,6 +21,7 @@ from addon.motion.best_of import least_errors
 from addon.motion.quaternions import multiply
 from tests.motion.cases import assert_same, random_quaternions
 from tests.motion.test_reduction import shell_errors, wandering
+from tests.thoroughness import tried
 
 RADIUS = 0.1
 
@@ -35,7 +36,7 @@ def errors_by_segments(times, poses, keys, modes) -> np.ndarray:
     )
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=tried(60))
 @given(
     st.integers(3, 200),
     st.integers(0, 2**16),
@@ -55,7 +56,7 @@ def test_it_is_never_further_off_than_any_of_its_modes(count, seed, noise, modes
         assert np.sqrt(squares) <= np.sqrt(np.sum(shell_errors(times, poses, keys, mode) ** 2)) * (1.0 + 2e-6) + 1e-9
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=tried(40))
 @given(st.integers(3, 120), st.integers(0, 2**16), st.booleans(), st.data())
 def test_what_is_shown_is_in_each_segment_what_its_mode_shows(count, seed, scaled, data):
     random = np.random.default_rng(seed)
@@ -130,7 +131,7 @@ def test_of_equally_good_modes_the_one_that_changes_least_is_taken(errors, chose
     assert least_errors(shown, np.arange(0, 9, 2)).tolist() == chosen
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=tried(100))
 @given(st.integers(1, 5), st.integers(1, 9), st.integers(0, 2**16))
 def test_no_choice_of_equally_good_modes_has_fewer_changes(modes, segments, seed):
     random = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 from addon.motion import MODES, Poses, fit_keys, interpolate, reduce_keys, rms, shell_error
 from addon.motion.quaternions import angle_between, normalise
 from tests.motion.test_reduction import wandering
+from tests.thoroughness import tried
 
 
 def squares(times: np.ndarray, poses: Poses, keys: np.ndarray, at_keys: Poses, mode: str, radius: float) -> float:
@@ -36,7 +37,7 @@ def placed(poses: Poses, point: np.ndarray) -> np.ndarray:
     return poses.positions + scales * np.einsum("ijn,j->ni", matrices, point)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=tried(30))
 @given(st.integers(3, 200), st.integers(0, 2**16), st.sampled_from(tuple(MODES)), st.sampled_from((0.02, 0.1, 2.0)))
 def test_fitted_keys_are_never_worse_than_recorded_ones(count, seed, mode, radius):
     times, poses = wandering(count, seed)

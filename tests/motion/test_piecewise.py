@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from addon.motion import MODES, Poses, in_betweens, prepare
@@ -12,7 +12,6 @@ from addon.motion.piecewise import blocks, combine, is_dense, multiply
 from tests.motion.cases import random_quaternions
 
 
-@settings(deadline=None)
 @given(st.lists(st.sampled_from((0, 1, 7, 8, 130, 400)), min_size=1, max_size=8), st.integers(1, 5), st.integers(1, 4))
 def test_products_are_what_each_sample_gives(counts, rows, functions):
     random = np.random.default_rng(len(counts))
@@ -29,7 +28,6 @@ def test_products_are_what_each_sample_gives(counts, rows, functions):
 few = st.lists(st.sampled_from((0, 1, 3, 5)), max_size=4)
 
 
-@settings(deadline=None)
 @given(few, few.filter(any), st.integers(2, 6), few)
 def test_counts_that_come_round_again_and_again_make_the_same_products(head, pattern, rounds, tail):
     counts = np.array(head + rounds * pattern + tail)

@@ -10,6 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from addon.motion import KEYFRAME_MODES, MODES, Poses, interpolate
 from addon.motion.quaternions import angle_between, multiply, normalise, rotate
+from tests.thoroughness import tried
 
 SCREWS = ["dq_sclerp", "pga_slerp", "cga_slerp", "pga_lerp", "cga_lerp"]
 
@@ -268,7 +269,7 @@ def test_an_unknown_mode_is_refused_with_the_names_of_the_known():
 
 
 @given(motion=motions())
-@settings(max_examples=30)
+@settings(max_examples=tried(30))
 def test_the_caller_s_arrays_stay_as_they_are(motion):
     key_times, keys = motion
     before = key_times.copy(), keys.positions.copy(), keys.quaternions.copy()

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm, logm
@@ -75,7 +75,6 @@ def test_a_key_has_a_say_in_no_more_segments_than_the_table_tells(mode):
     assert changed.min() < first + 0.05 * (times[6] - first)
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**16), st.integers(2, 8))
 def test_what_streams_are_shown_needs_no_key_after_the_next(seed, known):
     times, keys = motion(10, seed)
@@ -86,7 +85,6 @@ def test_what_streams_are_shown_needs_no_key_after_the_next(seed, known):
 
 
 @every_spline
-@settings(deadline=None)
 @given(st.integers(0, 2**16))
 def test_neither_the_axes_of_the_world_nor_those_of_the_body_matter(mode, seed):
     times, keys = motion(6, seed)
@@ -99,7 +97,6 @@ def test_neither_the_axes_of_the_world_nor_those_of_the_body_matter(mode, seed):
 
 
 @every_spline_with_foresight
-@settings(deadline=None)
 @given(motions())
 def test_backwards_it_is_the_same_motion(mode, drawn):
     times, keys = drawn

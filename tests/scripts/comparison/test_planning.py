@@ -20,6 +20,7 @@ from scripts.comparison.storage import ClipReference, file_names, write_recordin
 from scripts.comparison.study import folder_names, reconstruct
 from scripts.workplan import Plan, Task
 from tests.scripts.comparison.recordings import swinging_clip
+from tests.thoroughness import tried
 
 WANTED = Wanted(
     choices=(Uniform("5"), Tolerance("5mm")),
@@ -115,7 +116,7 @@ def test_a_choice_that_a_clip_is_too_short_for_is_left_out_and_said(tmp_path: Pa
 CHOICES = (Uniform("0.3"), Uniform("2"), Uniform("7.5"), Uniform("400"), Budget("2"), Budget("0.4"), Tolerance("1cm"))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=tried(40))
 @given(
     gaps=st.lists(st.sampled_from((0.001, 0.01, 0.011, 0.3, 2.0)), min_size=1, max_size=40),
     choice=st.sampled_from(CHOICES),

@@ -12,6 +12,7 @@ from addon.motion.quaternions import angle_between
 from scripts.comparison.clips import Clip
 from scripts.streaming import PACKINGS, Link, Packets, Playback, PlayOut, What, receive, send
 from tests.scripts.streaming.motions import FRAME, SOURCES, clips, swinging
+from tests.thoroughness import sample, tried
 
 RATE = 20.0
 INTERVAL = 1.0 / RATE
@@ -119,13 +120,13 @@ def test_the_same_seed_shows_the_same_frames(mode):
 def test_no_frame_knows_what_is_yet_to_come(mode, wait):
     packets, arrivals = stream(7, latency=0.05, jitter=0.1, loss=0.2)
     whole = receive(packets, arrivals, DISPLAY, mode, PlayOut(wait=wait))
-    for count in range(10, len(DISPLAY), 2):
+    for count in sample(range(10, len(DISPLAY), 2)):
         come = arrivals <= DISPLAY[count - 1]
         begun = receive(packets[come], arrivals[come], DISPLAY[:count], mode, PlayOut(wait=wait))
         assert_same(begun.poses, whole.poses[: len(begun.times)])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=tried(40))
 @given(mode=st.sampled_from(list(MODES)), seed=st.integers(0, 1000))
 def test_the_order_in_which_packets_are_listed_does_not_matter(mode, seed):
     packets, arrivals = stream(seed, latency=0.05, jitter=0.1, loss=0.2)
@@ -138,7 +139,7 @@ def test_the_order_in_which_packets_are_listed_does_not_matter(mode, seed):
     assert other.events == listed.events
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=tried(40))
 @given(mode=st.sampled_from(list(MODES)), seed=st.integers(0, 1000))
 def test_duplicates_are_dropped_and_said(mode, seed):
     packets, arrivals = stream(seed, latency=0.05, jitter=0.1)
@@ -366,7 +367,7 @@ def test_packets_of_nothing_but_damage_show_nothing():
     assert happened(playback) == {"damaged": 1}
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=tried(100))
 @given(seed=st.integers(0, 10_000), mode=st.sampled_from(list(MODES)), packing=st.sampled_from(list(PACKINGS)))
 def test_bytes_that_nobody_packed_do_no_harm(seed, mode, packing):
     random = np.random.default_rng(seed)

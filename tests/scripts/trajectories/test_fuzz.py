@@ -27,8 +27,9 @@ from scripts.trajectories import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.mutations import in_place, mutated
 from tests.scripts.trajectories.seeds import SEEDS
+from tests.thoroughness import tried
 
-CASES = int(os.environ.get("RIGID_MOTION_FUZZ", "400"))
+CASES = int(os.environ.get("RIGID_MOTION_FUZZ", tried(400)))
 BLENDS = int(os.environ.get("RIGID_MOTION_FUZZ", "40"))
 FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scripts.trajectories import read_trajectories
+from tests.thoroughness import tried
 
 HEADER = "t,x,y,z,qx,qy,qz,qw"
 ROWS = "0.0,1,2,3,0.1,0.2,0.3,0.9\n0.1,4,5,6,0.4,0.5,0.6,0.4\n"
@@ -152,7 +153,7 @@ numbers = st.floats(allow_nan=False, allow_infinity=False)
 samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=20).map(np.array)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=tried(60))
 @given(samples, st.permutations(range(9)), st.sampled_from([",", ";", "\t"]))
 def test_what_is_written_in_full_precision_comes_back_exactly(
     tmp_path_factory: pytest.TempPathFactory, table: np.ndarray, order: list[int], separator: str

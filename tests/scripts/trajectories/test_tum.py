@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scripts.trajectories import read_trajectories
+from tests.thoroughness import tried
 
 COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
 ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
@@ -45,7 +46,7 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str, line: int
     assert told_line == line
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=tried(60))
 @given(st.lists(st.tuples(*[st.floats(allow_nan=False)] * 8), min_size=2, max_size=20).map(np.array))
 def test_what_is_written_in_full_precision_comes_back_exactly(
     tmp_path_factory: pytest.TempPathFactory, table: np.ndarray

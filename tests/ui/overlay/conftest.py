@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import logging
-
 import bpy
 import pytest
 
 import addon
+from addon.ui.overlay import drawing
+from tests.complaints import complaints
 
 
 @pytest.fixture
-def scene(empty_file: bpy.types.Context, caplog: pytest.LogCaptureFixture) -> bpy.types.Scene:
+def scene(
+    empty_file: bpy.types.Context, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> bpy.types.Scene:
     """The scene of a new file without objects."""
+    # What was complained of before is complained of again.
+    monkeypatch.setattr(drawing, "_complaint", "")
     addon.register()
     try:
         yield empty_file.scene
     finally:
         addon.unregister()
-    assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == []
+    assert complaints(caplog) == []

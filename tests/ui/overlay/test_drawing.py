@@ -8,17 +8,24 @@ import bpy
 
 from addon.ui.overlay import drawing
 from tests.animation.scenes import key, new_object
+from tests.complaints import complaints
 
 
 def test_nothing_is_drawn_until_someone_asks_for_it(scene, monkeypatch):
-    monkeypatch.setattr(drawing, "_draw", None)
+    drawn = []
+    monkeypatch.setattr(drawing, "_draw", drawn.append)
     drawing.draw_paths()
+    assert drawn == []
+    scene.rigid_motion_overlay.show_paths = True
+    drawing.draw_paths()
+    assert drawn == [bpy.context]
 
 
-def test_without_a_path_no_graphics_card_is_needed(scene):
+def test_without_a_path_no_graphics_card_is_needed(scene, caplog):
     scene.rigid_motion_overlay.show_paths = True
     new_object().select_set(True)
     drawing.draw_paths()
+    assert complaints(caplog) == []
 
 
 def test_what_is_wrong_is_told_once_and_never_raised(scene, caplog):
@@ -28,5 +35,5 @@ def test_what_is_wrong_is_told_once_and_never_raised(scene, caplog):
     with caplog.at_level(logging.ERROR):
         drawing.draw_paths()
         drawing.draw_paths()
-    assert [record.getMessage() for record in caplog.records] == ["The paths could not be drawn"]
+    assert complaints(caplog) == ["The paths could not be drawn"]
     caplog.clear()

@@ -1,0 +1,50 @@
+"""Tests in workers: what goes wrong in one of them makes the whole run red, and nothing else does."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import EVERY_TEST
+
+ROOT = Path(__file__).resolve().parents[1]
+
+SOUND = "def test_sound(): pass"
+SKIPPED = "import pytest\ndef test_skipped(): pytest.skip()"
+CRASHED = "import ctypes\ndef test_crashed(): ctypes.string_at(0)"
+LOST_AT_THE_END = """
+import os
+def pytest_sessionfinish(session):
+    if hasattr(session.config, "workerinput"):
+        os._exit(0)
+"""
+
+
+def run(folder: Path, files: dict[str, str], *options: str) -> subprocess.CompletedProcess:
+    """These files of tests, run from a folder of their own as those of this checkout are."""
+    for name, content in {"conftest.py": "from tests.conftest import *", **files}.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(content, encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", folder, *options, folder]
+    environment = os.environ | {EVERY_TEST: "1", "PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
+
+
+@pytest.mark.parametrize(
+    ("files", "status", "said"),
+    [
+        ({"test_a.py": SOUND, "test_b.py": SOUND}, 0, "2 passed"),
+        ({"test_a.py": SOUND, "test_b.py": SKIPPED}, 1, "1 failed, 1 passed"),
+        ({"test_a.py": SOUND, "test_b.py": CRASHED}, 1, "1 failed, 1 passed"),
+        ({"end/test_a.py": SOUND, "end/conftest.py": LOST_AT_THE_END}, 1, "A worker ended before its time"),
+    ],
+    ids=["sound", "skipped", "crashed", "lost at the end"],
+)
+def test_a_run_is_red_if_a_test_of_it_failed_or_was_skipped_or_a_worker_was_lost(tmp_path, files, status, said):
+    done = run(tmp_path, files, "-n", "1", "--max-worker-restart", "0")
+    assert said in done.stdout, done.stdout + done.stderr
+    assert done.returncode == status
