@@ -307,11 +307,12 @@ def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy
     for layer in scene.view_layers:
         depsgraph = layer.depsgraph
         known = depsgraph is not None and depsgraph.as_pointer() in _State.graphs
-        if not known:
+        if depsgraph is not None:
+            _State.graphs.add(depsgraph.as_pointer())
+        # What is new in a scene is in no graph yet.
+        if not known or depsgraph.id_type_updated("SCENE") or depsgraph.id_type_updated("COLLECTION"):
             yield from ((obj, None) for obj in scene.objects)
-            if depsgraph is not None:
-                _State.graphs.add(depsgraph.as_pointer())
-        elif depsgraph.id_type_updated("OBJECT"):
+        if known and depsgraph.id_type_updated("OBJECT"):
             yield from (
                 (update.id.original, depsgraph)
                 for update in depsgraph.updates

@@ -12,7 +12,7 @@ from addon.animation.curves import Cycles, cycled, cyclic_times
 from tests.animation.curves.examples import MODES, all_cycles, curves, evaluate_one, frames_about, keys_of
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=tried(100))
 @given(curves(), all_cycles)
 def test_folded_times_have_the_values_of_the_cycles(keys, cycles):
     repeated = dataclasses.replace(

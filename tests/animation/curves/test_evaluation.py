@@ -24,25 +24,24 @@ from tests.animation.curves.examples import (
 )
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=tried(300))
 @given(curves())
 def test_curves_of_all_kinds_have_blenders_values(keys):
     assert_as_blender(keys, frames_about(keys))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=tried(300))
 @given(curves(kinds=("BEZIER",)))
 def test_handles_of_any_length_have_blenders_values(keys):
     assert_as_blender(keys, frames_about(keys))
 
 
-@settings(deadline=None)
 @given(curves(kinds=("BEZIER",)))
 def test_handles_on_the_wrong_side_of_their_key_have_blenders_values(keys):
     assert_as_blender(dataclasses.replace(keys, left=keys.right, right=keys.left), frames_about(keys), update=False)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=tried(200))
 @given(curves(), all_cycles)
 def test_cycles_have_blenders_values(keys, cycles):
     keys = dataclasses.replace(keys, cycles=cycles)
@@ -51,7 +50,7 @@ def test_cycles_have_blenders_values(keys, cycles):
     assert_as_blender(keys, frames)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=tried(200))
 @given(curves(kinds=("CONSTANT", "LINEAR", "QUAD"), gaps=(0.0, 2.0**-14, 2.0**-13, 2.0**-12, 1.0)), st.data())
 def test_keys_on_the_same_frame_or_close_to_it_have_blenders_values(keys, data):
     keys = dataclasses.replace(keys, points=keys.points - (keys.points[0, 0, 0], 0.0))
@@ -122,7 +121,7 @@ def test_nothing_to_evaluate_gives_nothing():
 anything = st.sampled_from((np.nan, np.inf, -np.inf, 3e38, -3e38, 1e-40, 0.0, 1.0, 2.0, 7.0))
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=tried(300))
 @given(st.integers(0, 5), st.data(), st.booleans(), st.none() | all_cycles)
 def test_keys_that_are_no_numbers_do_not_break_the_evaluation(count, data, linear, cycles):
     def rows(*shape: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from addon.animation.curves.spans import Spans
 from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=tried(50))
 @given(st.lists(st.tuples(curves(), st.none() | all_cycles), min_size=2, max_size=8), st.booleans())
 def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic):
     together = [dataclasses.replace(keys, cycles=cycles) for keys, cycles in drawn]
@@ -30,7 +30,7 @@ def test_curves_together_have_the_values_that_each_has_alone(drawn, unit_elastic
         np.testing.assert_allclose(own, alone, rtol=0.0, atol=1e-6 * size)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=tried(50))
 @given(st.lists(curves(), min_size=2, max_size=5), st.none() | all_cycles, st.booleans())
 def test_curves_keyed_together_have_the_values_that_each_has_alone(drawn, cycles, unit_elastic):
     count = min(len(keys.times) for keys in drawn)
@@ -70,7 +70,7 @@ def test_many_curves_on_many_frames_have_the_values_that_each_has_alone():
         np.testing.assert_allclose(own, evaluate_one(keys, frames), rtol=0.0, atol=1e-9)
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=tried(50))
 @given(curves(), st.none() | all_cycles)
 def test_the_order_of_frames_does_not_matter(keys, cycles):
     keys = dataclasses.replace(keys, cycles=cycles)

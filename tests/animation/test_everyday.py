@@ -1,0 +1,339 @@
+"""What animators do with Actions all day: unlink, swap, share, reuse, delete. Nothing stale stays on any object."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import modes_of, problem_of, refresh, set_mode
+from tests.animation.oracle import Own, assert_shown, curves_of, expected_bases, shown_worlds, snapshot
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+
+PLAYED = np.arange(-2.0, 44.0)
+BETWEEN = 17
+"""A frame between keys."""
+
+ORDERS = ("QUATERNION", "ZXY")
+
+
+@pytest.fixture(params=[False, True], ids=["plain", "own deltas"])
+def with_own(request) -> bool:
+    return request.param
+
+
+def tool(order: str = "QUATERNION", own: bool = False, name: str = "Tool", seed: int = 0) -> bpy.types.Object:
+    """An object that moves by screws, shown on a frame between keys."""
+    obj = new_object(name, order)
+    if own:
+        give_own_deltas(obj, seed)
+    key(obj, seed=seed)
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(BETWEEN)
+    return obj
+
+
+def link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None = None) -> None:
+    """Choose an Action, as in the Action Editor's header."""
+    data = obj.animation_data_create()
+    data.action = action
+    if slot is not None:
+        data.action_slot = slot
+    bpy.context.view_layer.update()
+
+
+def assert_has_its_own(obj: bpy.types.Object, own: Own) -> None:
+    """Nothing of any in-between is left in its delta transforms."""
+    assert own_deltas(obj) == own
+    assert not any(obj.rigid_motion.filled)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_an_action_that_is_unlinked_and_chosen_again_moves_as_before(live_file, order, with_own):
+    obj = new_object("Tool", order)
+    own = give_own_deltas(obj) if with_own else own_deltas(obj)
+    key(obj)
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    for _ in range(2):
+        link(obj, None)
+        assert_has_its_own(obj, own)
+        assert obj.rigid_motion.mode == "BLENDER"
+        link(obj, action, slot)
+        assert obj.rigid_motion.mode == "dq_sclerp"
+        assert_shown([obj], PLAYED, {"Tool": own})
+    assert problem_of(obj) == ""
+
+
+def test_an_action_that_is_exchanged_in_one_go_leaves_nothing_of_it(live_file, with_own):
+    obj = tool(own=with_own)
+    own = Own(*_original(obj))
+    first = obj.animation_data.action, obj.animation_data.action_slot
+    link(obj, None)
+    key(obj, seed=4)
+    second = obj.animation_data.action, obj.animation_data.action_slot
+    assert modes_of(obj, np.array(FRAMES[:1])) == ["BLENDER"], "a new Action has no mode"
+    for action, mode in ((first, "dq_sclerp"), (second, "BLENDER"), (first, "dq_sclerp")):
+        link(obj, *action)
+        assert modes_of(obj, np.array(FRAMES[:1])) == [mode]
+        assert_shown([obj], PLAYED, {"Tool": own})
+
+
+def _original(obj: bpy.types.Object) -> tuple:
+    motion = obj.rigid_motion
+    return (
+        tuple(motion.own_location if motion.filled[0] else obj.delta_location),
+        tuple(motion.own_quaternion if motion.filled[1] else obj.delta_rotation_quaternion.normalized()),
+        tuple(motion.own_scale if motion.filled[3] else obj.delta_scale),
+    )
+
+
+@pytest.mark.parametrize(
+    "goes",
+    [
+        lambda obj: obj.animation_data_clear(),
+        lambda obj: bpy.data.actions.remove(obj.animation_data.action),
+        lambda obj: setattr(obj.animation_data, "action", None),
+        lambda obj: setattr(obj.animation_data, "action_slot", None),
+        lambda obj: obj.animation_data.action.slots.remove(obj.animation_data.action_slot),
+        lambda obj: animation.channelbag_of(obj).fcurves.clear(),
+    ],
+    ids=["animation data cleared", "Action deleted", "Action unlinked", "slot unlinked", "slot deleted", "F-curves gone"],
+)
+@pytest.mark.parametrize("order", ORDERS)
+def test_however_an_action_goes_the_own_delta_transforms_come_back(live_file, goes, order):
+    obj = new_object("Tool", order)
+    own = give_own_deltas(obj)
+    key(obj, scale="even")
+    set_mode(obj, "cga_slerp")
+    live_file.scene.frame_set(BETWEEN)
+    assert own_deltas(obj) != own
+    goes(obj)
+    bpy.context.view_layer.update()
+    assert_has_its_own(obj, own)
+
+
+def test_a_strip_that_is_deleted_gives_the_own_delta_transforms_back(live_file):
+    obj = new_object()
+    own = give_own_deltas(obj)
+    key(obj)
+    set_mode(obj, "dq_sclerp")
+    data = obj.animation_data
+    action, slot = data.action, data.action_slot
+    data.action = None
+    track = data.nla_tracks.new()
+    strip = track.strips.new("Strip", 1, action)
+    strip.action_slot = slot
+    bpy.context.view_layer.update()
+    live_file.scene.frame_set(BETWEEN)
+    track.strips.remove(strip)
+    bpy.context.view_layer.update()
+    assert_has_its_own(obj, own)
+    link(obj, action, slot)
+    assert_shown([obj], PLAYED, {"Tool": own})
+
+
+def test_while_the_extension_is_off_an_action_may_go_and_come(live_file, with_own):
+    obj = new_object()
+    own = give_own_deltas(obj) if with_own else own_deltas(obj)
+    key(obj)
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    animation.unregister()
+    link(obj, None)
+    animation.register()
+    bpy.context.view_layer.update()
+    live_file.scene.frame_set(BETWEEN)
+    assert_has_its_own(obj, own)
+    link(obj, action, slot)
+    assert_shown([obj], PLAYED, {"Tool": own})
+
+
+@pytest.mark.parametrize("by_name", [False, True], ids=["slot chosen", "slot found by Blender"])
+def test_an_action_on_a_fresh_object_brings_its_mode_along(live_file, by_name):
+    obj = tool()
+    fresh = new_object("Tool" if by_name else "Fresh")
+    own = give_own_deltas(fresh) if not by_name else own_deltas(fresh)
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    if by_name:
+        bpy.data.objects.remove(obj)
+    link(fresh, action, slot)
+    assert fresh.rigid_motion.mode == "dq_sclerp"
+    if by_name:
+        assert_shown([fresh], PLAYED)
+    link(fresh, None)
+    assert_has_its_own(fresh, own)
+
+
+def test_an_action_that_a_second_object_gets_moves_both_by_its_mode(live_file):
+    obj, second = tool(), new_object("Second")
+    link(second, obj.animation_data.action, obj.animation_data.action_slot)
+    assert_shown([obj, second], PLAYED)
+    assert problem_of(obj) == problem_of(second) == ""
+    set_mode(second, "lerp_slerp")
+    assert obj.rigid_motion.mode == second.rigid_motion.mode == "lerp_slerp"
+    assert_shown([obj, second], PLAYED)
+    link(obj, None)
+    assert_has_its_own(obj, Own())
+    assert_shown([second], PLAYED)
+
+
+def test_a_linked_copy_that_gets_another_rotation_mode_leaves_the_original_its_mode(live_file):
+    obj = tool()
+    copy = obj.copy()
+    live_file.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    copy.rotation_mode = "XYZ"
+    bpy.context.view_layer.update()
+    assert_shown([obj], PLAYED)
+    assert "another rotation mode" in problem_of(copy)
+    assert problem_of(obj) == ""
+    bpy.data.objects.remove(obj)
+    refresh()
+    assert problem_of(copy) == ""
+
+
+@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
+def test_an_action_that_goes_on_outside_of_its_keys_is_no_longer_for_it(live_file, interpolation):
+    live_file.scene.frame_end = 250
+    obj = key(new_object(), (1.0, 50.0, 100.0), interpolation=interpolation)
+    for fcurve in curves_of(obj).values():
+        fcurve.extrapolation = "LINEAR"
+    set_mode(obj, "dq_sclerp")
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    assert tuple(action.frame_range) == (1.0, 100.0)
+    assert_shown([obj], np.arange(1.0, 251.0))
+    obj.animation_data.action = None
+    strip = obj.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
+    strip.action_slot = slot
+    assert (strip.frame_start, strip.frame_end) == (1.0, 100.0)
+    set_mode(obj, "BLENDER")
+    assert not action.use_frame_range
+
+
+def test_keys_before_frame_zero_make_an_action_no_longer(live_file):
+    obj = key(new_object(), (-60.0, -31.0, -12.0))
+    set_mode(obj, "dq_sclerp")
+    assert tuple(obj.animation_data.action.frame_range) == (-60.0, -12.0)
+    for fcurve in curves_of(obj).values():
+        for point in fcurve.keyframe_points:
+            point.co_ui.x += 100.0
+    bpy.context.view_layer.update()
+    action = obj.animation_data.action
+    assert tuple(action.frame_range) == (40.0, 88.0)
+    assert not action.use_frame_range
+    assert_shown([obj], np.arange(38.0, 91.0))
+
+
+def test_a_frame_range_that_the_animator_has_set_stays(live_file):
+    obj = key(new_object(), (-10.0, 5.0, 20.0))
+    action = obj.animation_data.action
+    action.use_frame_range, action.frame_start, action.frame_end = True, -3.0, 9.0
+    set_mode(obj, "dq_sclerp")
+    assert_shown([obj], np.arange(-12.0, 23.0))
+    set_mode(obj, "BLENDER")
+    assert (action.use_frame_range, action.frame_start, action.frame_end) == (True, -3.0, 9.0)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("shift", [-20.0, -100.0, -1000.0], ids=["about zero", "below zero", "far below zero"])
+def test_between_whole_frames_below_zero_it_is_as_exact_as_above(live_file, order, shift):
+    keys, quarters = np.array((2.0, 15.0, 31.0)), np.arange(0.0, 34.0, 0.25)
+    errors = []
+    for offset in (0.0, shift):
+        obj = key(new_object("Tool", order), keys + offset, seed=2, interpolation="LINEAR")
+        set_mode(obj, "dq_sclerp")
+        frames = quarters + offset
+        errors.append(np.abs(shown_worlds([obj], frames)[0] - expected_bases(obj, frames)).max(axis=(1, 2)))
+        bpy.data.objects.remove(obj)
+    above, below = errors
+    assert above.max() > 1e-3, "or it says nothing"
+    assert np.abs(above - below).max() < 0.02 * above.max() + 2e-5
+    assert below[::4].max() < 1e-5
+
+
+def test_a_mode_that_was_chosen_before_there_were_keys_waits_for_them(live_file):
+    obj = new_object()
+    obj.rigid_motion.mode = "pga_lerp"
+    set_mode(other := new_object("Other"), "cga_lerp")
+    for waiting, mode in ((obj, "pga_lerp"), (other, "cga_lerp")):
+        key(waiting)
+        bpy.context.view_layer.update()
+        assert modes_of(waiting, np.array(FRAMES[:1])) == [mode]
+        assert_shown([waiting], PLAYED)
+        link(waiting, None)
+        key(waiting, seed=3)
+        bpy.context.view_layer.update()
+        assert modes_of(waiting, np.array(FRAMES[:1])) == ["BLENDER"], "it was for the first Action"
+
+
+def test_an_action_keeps_its_mode_where_the_object_is_deleted(live_file):
+    obj = tool()
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    bpy.data.objects.remove(obj)
+    fresh = new_object("Another")
+    link(fresh, action, slot)
+    assert_shown([fresh], PLAYED)
+
+
+def test_a_copy_of_an_action_has_its_mode_and_in_betweens(live_file):
+    obj = tool()
+    keys = snapshot(obj)
+    obj.animation_data.action = obj.animation_data.action.copy()
+    bpy.context.view_layer.update()
+    assert snapshot(obj) == keys
+    assert obj.rigid_motion.mode == "dq_sclerp"
+    assert_shown([obj], PLAYED)
+
+
+def test_a_slot_that_moves_to_another_action_takes_its_mode_along(live_file):
+    obj = tool()
+    obj.select_set(True)
+    live_file.view_layer.objects.active = obj
+    before = obj.animation_data.action
+    other = key(new_object("Other"), seed=5)
+    other.select_set(True)
+    live_file.view_layer.objects.active = other
+    bpy.ops.anim.merge_animation()
+    bpy.context.view_layer.update()
+    assert obj.animation_data.action == other.animation_data.action != before
+    assert obj.rigid_motion.mode == "dq_sclerp"
+    assert other.rigid_motion.mode == "BLENDER"
+    assert_shown([obj, other], PLAYED)
+
+
+def test_many_objects_get_a_mode_at_once_and_what_refuses_is_named(live_file):
+    objects = [key(new_object(f"Tool {number}"), seed=number) for number in range(4)]
+    objects[2].rotation_mode = "AXIS_ANGLE"
+    with pytest.raises(animation.Refused, match="Tool 2 turns by axis and angle"):
+        set_mode(objects, "dq_sclerp")
+    assert {obj.rigid_motion.mode for obj in objects} == {"BLENDER"}
+    refused: list = []
+    set_mode(objects, "dq_sclerp", refused=refused)
+    assert [str(refusal)[:6] for refusal in refused] == ["Tool 2"]
+    assert [obj.rigid_motion.mode for obj in objects] == ["dq_sclerp", "dq_sclerp", "BLENDER", "dq_sclerp"]
+    assert_shown([obj for obj in objects if obj.rotation_mode == "QUATERNION"], PLAYED)
+    animation.bake([obj for obj in objects if obj.rotation_mode == "QUATERNION"])
+    animation.unbake(objects, refused=refused)
+    assert [str(refusal)[:6] for refusal in refused] == ["Tool 2", "Tool 2"]
+    assert len(bpy.data.actions) == 4
+
+
+def test_there_are_samples_only_where_something_differs(live_file):
+    obj = new_object("Tool", "XYZ")
+    animation.write_channel(obj, "location", np.array(FRAMES), np.array([(i, 2.0 * i, 5.0) for i in range(4)]))
+    animation.write_channel(obj, "rotation_euler", np.array(FRAMES), np.array([(0.0, 0.0, 0.8 * i) for i in range(4)]))
+    set_mode(obj, "dq_sclerp", [11.0])
+    filled = {channel: c for channel, c in curves_of(obj).items() if channel[0].startswith("delta_")}
+    assert set(filled) == {("delta_location", 0), ("delta_location", 1)}
+    assert {tuple(fcurve.range()) for fcurve in filled.values()} == {(11.0, 24.0)}
+    assert_shown([obj], PLAYED)
+    obj.delta_location.z = 0.75
+    bpy.context.view_layer.update()
+    assert_shown([obj], PLAYED, {"Tool": Own((0.0, 0.0, 0.75))})
+    live_file.scene.frame_set(BETWEEN)
+    link(obj, None)
+    assert tuple(obj.delta_location) == (0.0, 0.0, 0.75)
