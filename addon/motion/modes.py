@@ -19,6 +19,9 @@ from .segments import Curves, Segments, interpolate_along, prepare_within
 class Mode:
     """One way of filling in between two keys."""
 
+    number: int
+    """What files store for the mode. Never changed, never used again for another; 0 is Blender's own."""
+
     label: str
     """As menus and reports show it."""
 
@@ -48,42 +51,49 @@ class Mode:
 
 MODES: dict[str, Mode] = {
     "lerp_slerp": Mode(
+        1,
         "Vector + Quaternion",
         "The origin runs along a straight line while the object turns at an even speed",
         curves.lerp_slerp,
         vector_quaternion.lerp_slerp,
     ),
     "dq_sclerp": Mode(
+        2,
         "Screw (Dual Quaternion)",
         "Turns about and slides along one fixed axis in space, both at an even speed",
         curves.screw,
         dual_quaternions.dq_sclerp,
     ),
     "pga_lerp": Mode(
+        3,
         "Motor Blend (PGA)",
         "Nearly the screw motion, slower at the keys and faster half-way",
         curves.motor_lerp,
         pga.pga_lerp,
     ),
     "pga_slerp": Mode(
+        4,
         "Motor Screw (PGA)",
         "The screw motion, by the exponential of the motor's logarithm",
         curves.screw,
         pga.pga_slerp,
     ),
     "cga_lerp": Mode(
+        5,
         "Versor Blend (CGA)",
         "The motor blend, with uniform scale blended in the same breath",
         curves.similarity_lerp,
         cga.cga_lerp,
     ),
     "cga_slerp": Mode(
+        6,
         "Versor Spiral (CGA)",
         "Turns, slides and grows at even rates: a screw that widens as the object grows",
         curves.similarity_slerp,
         cga.cga_slerp,
     ),
     "motor_spline": Mode(
+        7,
         "Smooth Screw (PGA)",
         "Screws that flow into one another: no corner at a key, neither in the path nor in the turning",
         curves.motor_spline,
@@ -92,6 +102,7 @@ MODES: dict[str, Mode] = {
         ahead=1,
     ),
     "motor_spline_causal": Mode(
+        8,
         "Smooth Screw for Streams",
         "Screws that flow into one another as far as that can be without knowing what comes after the next key",
         curves.motor_spline_causal,
