@@ -14,6 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .trigonometry import fill_sine_and_cosine
+
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 LOCKED = 1e-7
@@ -63,10 +65,9 @@ def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     """The rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
-    # Of half the angle sine and cosine both come from the tangent of its own half: one function of the library for two.
-    tangent = np.tan(0.25 * angles.T[[i, j, k]])
-    scale = 2.0 / (1.0 + tangent * tangent)
-    (ci, cj, ck), (si, sj, sk) = scale - 1.0, scale * tangent
+    sines, cosines = np.empty((2, 3, len(angles)))
+    fill_sine_and_cosine(0.5 * angles.T[[i, j, k]], sines, cosines, narrow=False)
+    (si, sj, sk), (ci, cj, ck) = sines, cosines
     quaternions = np.empty((4, len(angles)))
     quaternions[0] = ci * cj * ck + sign * si * sj * sk
     quaternions[1 + i] = si * cj * ck - sign * ci * sj * sk

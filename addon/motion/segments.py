@@ -38,7 +38,7 @@ ROWS = 8
 """Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
 
 NARROW = 4.0 / 3.0
-"""The largest |s| at which psi, 45 degrees at the keys, is no more than 60: a root gives the cosine from the sine."""
+"""The largest |s| at which psi, 45 degrees at the keys, is no more than the 60 of `trigonometry.NARROW`."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
