@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..motion.eulers import ORDERS, quaternions_from_eulers
+from ..motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from .fcurves import Keys, read_keys
 from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
 from .slots import MODE_PATH, Curves, Refused, Slot, Transformable
@@ -154,7 +154,7 @@ def own_deltas(obj: bpy.types.Object) -> np.ndarray:
     if obj.rotation_mode in ORDERS:
         angles = (motion.own_euler if euler else obj.delta_rotation_euler)[:]
         if any(angles):
-            rotation = quaternions_from_eulers(np.array((angles,)), obj.rotation_mode)[0]
+            rotation = quaternions_from_extrinsic_eulers(np.array((angles,)), obj.rotation_mode)[0]
     else:
         components = (motion.own_quaternion if quaternion else obj.delta_rotation_quaternion)[:]
         if length := math.hypot(*components):

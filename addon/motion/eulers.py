@@ -1,4 +1,4 @@
-"""Euler angles of a motion, continuous from moment to moment.
+"""Extrinsic Euler angles of a motion, continuous from moment to moment.
 
 Orders are Blender's: "XYZ" turns about the x axis first, then about y, then about z, all of them fixed. Angles are
 radians about x, y and z, in this order whatever the order of turning, as Blender has its channels.
@@ -22,7 +22,7 @@ LOCKED = 1e-7
 """Below this length a half sum or half difference of angles has no direction: the gimbal is locked."""
 
 
-def eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
+def extrinsic_eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
     """The angles of a motion's rotations, each set of angles the one nearest to the set before it.
 
     Parameters
@@ -61,7 +61,7 @@ def eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequenc
     return angles.T
 
 
-def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
+def quaternions_from_extrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     """The rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2

@@ -32,12 +32,12 @@ def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice
 
 
 def is_dense(counts: np.ndarray) -> bool:
-    """Whether `multiply` is the quicker way for these counts (S,) of samples."""
+    """Whether `multiply_matrices` is the quicker way for these counts (S,) of samples."""
     runs = 1 + np.count_nonzero(counts[1:] != counts[:-1])
     return bool(counts.sum() >= max(DENSE * runs, ENOUGH * len(counts)))
 
 
-def multiply(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+def multiply_matrices(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
     """Fill out (k, n) with the matrix (k, b) of each of S pieces times the functions (b, n) at its samples.
 
     Parameters
@@ -86,14 +86,14 @@ def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
 
 
 def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """The same as `multiply`, from coefficients (k, b, S), the quicker way for these counts."""
+    """The same as `multiply_matrices`, from coefficients (k, b, S), the quicker way for these counts."""
     some = np.flatnonzero(counts)
     if len(some) < len(counts):
         coefficients, counts = coefficients[..., some], counts[some]
     if not len(counts):
         return
     if is_dense(counts):
-        multiply(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), functions, counts, out)
+        multiply_matrices(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), functions, counts, out)
         return
     # Few rows at a time, for repeating multiplies what there is.
     at_once = max(1, BLOCK // max(1, functions.shape[1]))

@@ -23,10 +23,9 @@ from functools import cached_property
 import numpy as np
 
 from . import series, twists
-from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply
+from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrices
 from .poses import Poses
-from .quaternions import align_signs, cross, rotate
-from .quaternions import multiply as product
+from .quaternions import align_signs, cross, multiply, rotate
 
 STILL = 1e-12
 """Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
@@ -227,7 +226,7 @@ def _fill(
         numbers = np.stack((start, pieces * segments.rate.repeat(pieces)))
 
         def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-            multiply(coefficients[piece], series.powers(s), counts, out)
+            multiply_matrices(coefficients[piece], series.powers(s), counts, out)
 
     _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), position, out.reshape(ROWS, -1))
 
@@ -348,7 +347,7 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
         np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
         np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:7])
         return
-    multiply(mode.matrices[segment], basis, counts, out)
+    multiply_matrices(mode.matrices[segment], basis, counts, out)
 
 
 def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
@@ -365,7 +364,7 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
     combine(bends[: len(added)], functions, counts, added)
     turns, advances = twists.exponential(added[:6])
     out[:3] += rotate(out[3:7].T, advances.T).T
-    out[3:7] = product(out[3:7].T, turns.T).T
+    out[3:7] = multiply(out[3:7].T, turns.T).T
     if grows:
         out[7] *= np.exp(np.clip(added[6], -MOST_GROWTH, MOST_GROWTH, out=added[6]))
 
