@@ -180,11 +180,11 @@ def interpolate_along(
     )
     key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
     result = np.empty((ROWS, len(keys), times.shape[-1]))
-    at_once = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
-    for first in range(0, len(keys), at_once):
-        few = slice(first, first + at_once)
-        own_key_times, own_times = (rows if len(rows) == 1 else rows[few] for rows in (key_times, times))
-        _fill(curves, own_key_times, keys[few], own_times, extrapolate, result[:, few])
+    batch_size = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
+    for first in range(0, len(keys), batch_size):
+        batch = slice(first, first + batch_size)
+        batch_key_times, batch_times = (rows if len(rows) == 1 else rows[batch] for rows in (key_times, times))
+        _fill(curves, batch_key_times, keys[batch], batch_times, extrapolate, result[:, batch])
     return Poses(
         np.moveaxis(result[:3], 0, -1).reshape(*shape, 3),
         np.moveaxis(result[3:7], 0, -1).reshape(*shape, 4),
@@ -208,7 +208,7 @@ def _fill(
     samples = np.broadcast_to(times, out.shape[1:]).ravel()
     outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
 
-    def position(sample: slice, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def local_time(sample: slice, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         s = samples[sample] - start
         s *= rate
         s -= 1.0
@@ -228,7 +228,7 @@ def _fill(
         def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
             multiply_matrices(coefficients[piece], series.powers(s), counts, out)
 
-    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), position, out.reshape(ROWS, -1))
+    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), local_time, out.reshape(ROWS, -1))
 
 
 Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
@@ -244,16 +244,16 @@ def prepare_within(curves: Callable[[Segments], Curves], key_times: np.ndarray, 
     segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
-    def within(counts: np.ndarray, progress: np.ndarray, some: slice) -> Poses:
+    def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
         out = np.empty((ROWS, progress.size))
         reach = float(max(2.0 * progress.max() - 1.0, 1.0 - 2.0 * progress.min())) if progress.size else 0.0
-        fill, first = _filler(mode, reach), some.start or 0
+        fill, first = _filler(mode, reach), selected.start or 0
 
-        def shifted(segment: slice, *others: np.ndarray) -> None:
+        def fill_selected(segment: slice, *others: np.ndarray) -> None:
             fill(slice(first + segment.start, first + segment.stop), *others)
 
         bounds = np.concatenate(((0,), np.cumsum(counts)))
-        _evaluate(shifted, no_numbers[:, some], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
+        _evaluate(fill_selected, no_numbers[:, selected], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
         return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
 
     return within
@@ -267,17 +267,17 @@ def _evaluate(
     fill: Fill,
     numbers: np.ndarray,
     bounds: np.ndarray,
-    position: Callable[..., np.ndarray],
+    local_time: Callable[..., np.ndarray],
     out: np.ndarray,
 ) -> None:
     """Fill out (ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
 
-    `position` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
+    `local_time` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
     """
     all_counts = np.diff(bounds)
     for segment, sample in blocks(bounds, BLOCK if is_dense(all_counts) else BLOCK // 2):
         counts = all_counts[segment]
-        fill(segment, position(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
+        fill(segment, local_time(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
 
 
 def _filler(mode: Curves, reach: float) -> Fill:
@@ -327,12 +327,12 @@ def _divided(key_times: np.ndarray, pieces: int) -> np.ndarray:
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
     """Where each segment's samples begin among the samples of all objects, shape (S + 1,)."""
     starts = np.zeros((objects, key_times.shape[-1] - 1), dtype=np.int64)
-    inner = key_times[:, 1:-1]
-    if inner.size:
+    inner_keys = key_times[:, 1:-1]
+    if inner_keys.size:
         # One search where all objects share their times, else one for each.
-        for row in range(max(len(inner), len(times))):
-            found = np.searchsorted(times[row % len(times)], inner[row % len(inner)], side="right")
-            starts[row if len(inner) > 1 or len(times) > 1 else slice(None), 1:] = found
+        for row in range(max(len(inner_keys), len(times))):
+            found = np.searchsorted(times[row % len(times)], inner_keys[row % len(inner_keys)], side="right")
+            starts[row if len(inner_keys) > 1 or len(times) > 1 else slice(None), 1:] = found
     starts += times.shape[-1] * np.arange(objects)[:, None]
     return np.append(starts.ravel(), objects * times.shape[-1])
 
