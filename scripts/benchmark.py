@@ -41,6 +41,7 @@ except ImportError:
 
 from addon.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from addon.motion.quaternions import align_signs, multiply
+from addon.motion.trigonometry import VECTOR_TANGENT
 from scripts.publishing import opening, publish
 
 ENOUGH = 4.0
@@ -242,10 +243,24 @@ def report(case: Case, seconds: dict[tuple[str, str], list[float]]) -> Iterator[
     for (mode, who), best in fastest.items():
         ratio = "" if who == "Rigid Motion" else f"{best / fastest[mode, 'Rigid Motion']:.1f} times"
         yield f"| `{mode}` | {who} | {case.in_betweens / best / 1e6:.2f} | {ratio} |"
-    saved = 1.0 - fastest["pga_lerp", "Rigid Motion"] / fastest["lerp_slerp", "Rigid Motion"]
+    blend = fastest["pga_lerp", "Rigid Motion"]
+    beside = [f"{changed(blend / fastest[mode, 'Rigid Motion'])} than `{mode}`" for mode in ("lerp_slerp", "dq_sclerp")]
     yield ""
-    yield f"`pga_lerp` takes {saved:.1%} less time a pose than `lerp_slerp`, both in their fast form."
+    yield f"`pga_lerp` takes {' and '.join(beside)}, all in their fast form."
     yield ""
+
+
+def changed(ratio: float) -> str:
+    """How much less or more time it is, in words."""
+    share = f"{abs(1.0 - ratio):.0%}"
+    return "as much time a pose" if share == "0%" else f"{share} {'less' if ratio < 1.0 else 'more'} time a pose"
+
+
+def sines() -> str:
+    """Where sines come from in this run, for the figures depend on it."""
+    if VECTOR_TANGENT:
+        return "NumPy's tangent has vector code on this processor, and sines are made of it."
+    return "NumPy's tangent has no vector code on this processor, and sines come from a polynomial."
 
 
 def recording(count: int) -> tuple[np.ndarray, Poses]:
@@ -316,6 +331,7 @@ def main(arguments: list[str] | None = None) -> int:
         SciPy=scipy.__version__,
         pytransform3d=pytransform3d.__version__,
     )
+    lines += [sines(), ""]
     for case in cases(options.count):
         print(f"{case.title} ...", file=sys.stderr, flush=True)
         lines += report(case, race(ways(case), options.rounds))

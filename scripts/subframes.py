@@ -29,7 +29,7 @@ from addon import animation
 from addon.animation.inbetweens import in_betweens
 from addon.animation.mode_keys import source_of
 from addon.motion import KEYFRAME_MODES, Poses, shell_error
-from addon.motion.eulers import eulers_from_quaternions
+from addon.motion.eulers import extrinsic_eulers_from_quaternions
 from addon.motion.measures import rms
 from addon.motion.quaternions import align_signs, angle_between, multiply
 from scripts.publishing import opening, publish
@@ -103,7 +103,7 @@ def keyed_object(motion: Motion, rotation_mode: str) -> bpy.types.Object:
     if rotation_mode == "QUATERNION":
         animation.write_channel(obj, "rotation_quaternion", frames, poses.quaternions, interpolation="BEZIER")
     else:
-        angles = eulers_from_quaternions(poses.quaternions, rotation_mode)
+        angles = extrinsic_eulers_from_quaternions(poses.quaternions, rotation_mode)
         animation.write_channel(obj, "rotation_euler", frames, angles, interpolation="BEZIER")
     return obj
 

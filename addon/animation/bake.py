@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..motion import Poses
-from ..motion.eulers import ORDERS, eulers_from_quaternions
+from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ..motion.quaternions import align_signs, conjugate, multiply
 from .acting import Readings, Targets, act_on
 from .channels import add_cycles, code_of, write_channel
@@ -67,7 +67,7 @@ def _rotation(obj: bpy.types.Object, quaternions: np.ndarray) -> tuple[str, np.n
     if obj.rotation_mode == "QUATERNION":
         return "rotation_quaternion", align_signs(quaternions)
     if obj.rotation_mode in ORDERS:
-        return "rotation_euler", eulers_from_quaternions(quaternions, obj.rotation_mode)
+        return "rotation_euler", extrinsic_eulers_from_quaternions(quaternions, obj.rotation_mode)
     raise ValueError(
         f"{obj.name}: rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first"
     )
@@ -229,7 +229,7 @@ def channel_values(transform: Transform, source: Source, motion: InBetweens) -> 
         if source.order is None:
             channels[transform.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
         else:
-            angles = eulers_from_quaternions(quaternions, source.order)
+            angles = extrinsic_eulers_from_quaternions(quaternions, source.order)
             channels[transform.rotation] = _beginning_near(first[3:6], angles, source.order)
     if poses.scales is not None and own[7:].mean() != 0.0:
         # Where Blender's own in-betweens stay, each axis may go its own way from key to key.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..motion.eulers import quaternions_from_eulers
+from ..motion.eulers import quaternions_from_extrinsic_eulers
 from .curves import cycled
 from .mode_keys import active_place
 from .records import recorded_digest
@@ -75,7 +75,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
     place = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
     ends = keys[place : place + 2]
     location, rotation, scale = np.split(_components(source, ends), (3, 7))
-    quaternions = quaternions_from_eulers(rotation[:3].T, source.order) if source.order else rotation.T
+    quaternions = quaternions_from_extrinsic_eulers(rotation[:3].T, source.order) if source.order else rotation.T
     alike = float(quaternions[0] @ quaternions[1]) / float(np.prod(np.linalg.norm(quaternions, axis=1)) or 1.0)
     swept = np.abs(np.diff(rotation))
     return SegmentFacts(

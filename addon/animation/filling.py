@@ -1,8 +1,8 @@
 """Writing in-betweens: differences as sampled F-curves, in the slot that has the keys.
 
 A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
-nothing of it. There are samples only where a mode counts, and only of components that it changes. Where some have to lie
-outside of the keys, a manual frame range keeps the Action, its strips and exports from being longer for it.
+nothing of it. There are samples only where a mode counts, and only of components that it changes. Where some have to
+lie outside of the keys, a manual frame range keeps the Action, its strips and exports from being longer for it.
 
 Blender reads a sampled curve between two whole frames below zero one frame late. The samples of a range that begins
 there go round in a ring behind frame 0 instead, see `_Layout`.

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..motion import KEYFRAME_MODES, Poses, prepare
-from ..motion.eulers import eulers_from_quaternions, quaternions_from_eulers
+from ..motion.eulers import extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
 from ..motion.piecewise import blocks, combine
 from ..motion.poses import beyond
 from ..motion.quaternions import conjugate, multiply
@@ -106,7 +106,7 @@ def differences(sources: Sequence[Source]) -> list[Samples]:
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
-                delta[3:6, place] = eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
+                delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
         starts = [place.start for _, place in samples]
         first, differs = delta[:, starts], _range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
@@ -438,7 +438,7 @@ def _weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.
 def _turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
     """Put unit quaternions in place of what the channels (10, m) turn by."""
     if order is not None:
-        rows[ROWS[ROTATION]] = quaternions_from_eulers(rows[3:6].T, order).T
+        rows[ROWS[ROTATION]] = quaternions_from_extrinsic_eulers(rows[3:6].T, order).T
         return
     quaternions = rows[ROWS[ROTATION]]
     lengths = np.sqrt(np.einsum("rm,rm->m", quaternions, quaternions))

@@ -16,7 +16,7 @@ from functools import cache
 import bpy
 import numpy as np
 
-from ..motion.eulers import ORDERS, quaternions_from_eulers
+from ..motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from .sources import LOCATION, REST, ROTATION, ROWS, SCALE
 
 MODE_PROPERTY = "rigid_motion.mode"
@@ -169,7 +169,7 @@ class ObjectTransform(Transform):
         if self.carrier.rotation_mode in ORDERS:
             angles = values("delta_rotation_euler")
             if any(angles):
-                rotation = quaternions_from_eulers(np.array((angles,)), self.carrier.rotation_mode)[0]
+                rotation = quaternions_from_extrinsic_eulers(np.array((angles,)), self.carrier.rotation_mode)[0]
         else:
             quaternion = values("delta_rotation_quaternion")
             if length := math.hypot(*quaternion):

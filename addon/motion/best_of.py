@@ -96,19 +96,19 @@ def least_errors(
     rms = np.sqrt(np.add.reduceat(inside**2, starts, axis=1) / np.diff(keys))
     if tolerance is not None:
         peaks = np.maximum.reduceat(inside, starts, axis=1)
-        off = peaks > tolerance
-        rms[off & ~off.all(axis=0)] = np.inf
+        excluded = peaks > tolerance
+        rms[excluded & ~excluded.all(axis=0)] = np.inf
     best = rms.min(axis=0)
     return _fewest_changes(rms <= best * (1.0 + ALIKE) + rounding)
 
 
-def _fewest_changes(good: np.ndarray) -> np.ndarray:
-    """One of the good choices (m, s) for each of s places, with as few changes as can be; of equals the first."""
-    sets = np.left_shift(1, np.arange(len(good))) @ good
-    # What all places since the last change have in common, for as long as that is anything.
-    shared = np.array(list(accumulate(sets.tolist(), lambda common, own: common & own or own)))
+def _fewest_changes(acceptable: np.ndarray) -> np.ndarray:
+    """One of the acceptable choices (m, s) for each of s segments, with the fewest changes; of equals the first."""
+    sets = np.left_shift(1, np.arange(len(acceptable))) @ acceptable
+    # What all segments since the last change have in common, for as long as that is anything.
+    shared = np.array(list(accumulate(sets.tolist(), lambda common, current: common & current or current)))
     ends = np.flatnonzero(np.append(shared[:-1] & sets[1:], 0) == 0)
-    first = np.argmax(shared[ends, None] >> np.arange(len(good)) & 1, axis=1)
+    first = np.argmax(shared[ends, None] >> np.arange(len(acceptable)) & 1, axis=1)
     return np.repeat(first, np.diff(ends, prepend=-1))
 
 
@@ -137,13 +137,13 @@ def interpolate_by_segments(key_times: np.ndarray, keys: Poses, times: np.ndarra
     if len(modes) != len(key_times) - 1:
         raise ValueError(f"{len(modes)} modes do not fit {len(key_times)} keys")
     key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
-    own = np.array(modes)[np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(modes) - 1)]
+    modes_at_times = np.array(modes)[np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(modes) - 1)]
     positions, quaternions = np.empty((len(times), 3)), np.empty((len(times), 4))
     scales = None if keys.scales is None else np.empty(len(times))
     for mode in dict.fromkeys(modes):
-        here = own == mode
-        filled = interpolate(key_times, keys, times[here], mode)
-        positions[here], quaternions[here] = filled.positions, filled.quaternions
+        selected = modes_at_times == mode
+        filled = interpolate(key_times, keys, times[selected], mode)
+        positions[selected], quaternions[selected] = filled.positions, filled.quaternions
         if scales is not None:
-            scales[here] = filled.scales
+            scales[selected] = filled.scales
     return Poses(positions, quaternions, scales)

@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from .segments import SMALLEST_ANGLE, Curves, Segments
+from .trigonometry import fill_sine_and_cosine
 
 
 def lerp_slerp(segments: Segments) -> Curves:
@@ -129,18 +130,34 @@ def similarity_slerp(segments: Segments) -> Curves:
         return screw(segments)
 
     def basis(s, parameters, narrow):
-        quarter_angle, growth, _ = parameters
+        quarter_angle, half_growth, mean = parameters
         rows = np.empty((6, s.size))
         _slerp(s, quarter_angle, narrow, rows[:2])
         rows[2] = 1.0
-        # (exp(z u) - exp(z / 2)) / (exp(z) - 1), with z = l and z = l + i angle; u = (1 + s) / 2. See `algebras.cga`.
-        rows[3] = _half_sinh_share(s, growth, 0.0 * growth).real
-        across = _half_sinh_share(s, growth, 4.0 * quarter_angle)
-        rows[4], rows[5] = across.real, across.imag
-        return rows, _geometric_scales(s, parameters)
+        growth = s * half_growth
+        np.expm1(growth, out=rows[3])
+        grown = np.exp(growth, out=growth)
+        np.multiply(rows[1], rows[:2], out=rows[4:])
+        rows[4:] *= grown
+        return rows, mean * grown
 
+    # Of the way along the axis, with z the growth of log scale, and of that across, with z + 4 i h, there is done
+    #     (exp(z u) - exp(z / 2)) / (exp(z) - 1) = (exp(z s / 2) - 1) / (2 sinh(z / 2)) - tanh(z / 4) / 2.
+    # Across, exp(z s / 2) - 1 = e + 2 (1 + e) (i sin(psi) cos(psi) - sin(psi)^2), where e is that of the growth alone.
+    # See `algebras.cga`.
+    h, half_growth = segments.quarter_angle, 0.5 * np.log(segments.scales[1] / segments.scales[0])
+    half_growth = np.where(half_growth == 0.0, SMALLEST_ANGLE, half_growth)
     along, across, around = segments.decompose()
-    return _curves(segments, (segments.centre, along, across, around), (segments.quarter_angle,), basis)
+    (rate, middle), (turned_rate, turned_middle) = _growing_share(half_growth), _growing_share(half_growth + 2.0j * h)
+    outward = turned_rate.real * across + turned_rate.imag * around
+    sideward = turned_rate.real * around - turned_rate.imag * across
+    centre = segments.centre - middle.real * along - turned_middle.real * across - turned_middle.imag * around
+    return Curves(
+        quaternions=np.stack((segments.middle, segments.difference), axis=1),
+        positions=np.stack((centre, rate.real * along + outward, 2.0 * sideward, -2.0 * outward), axis=1),
+        parameters=np.stack((h, half_growth, np.sqrt(segments.scales[0]) * np.sqrt(segments.scales[1]))),
+        basis=basis,
+    )
 
 
 def similarity_lerp(segments: Segments) -> Curves:
@@ -193,15 +210,7 @@ def _curves(segments: Segments, positions: tuple, parameters: tuple, basis) -> C
 
 def _slerp(s: np.ndarray, quarter_angle: np.ndarray, narrow: bool, turn: np.ndarray) -> None:
     """cos(psi) and sin(psi) of psi = s h, which is `narrow` where it is at most 60 degrees."""
-    cosine, sine = turn
-    np.multiply(s, quarter_angle, out=cosine)
-    np.sin(cosine, out=sine)
-    if narrow:
-        np.multiply(sine, sine, out=cosine)
-        np.subtract(1.0, cosine, out=cosine)
-        np.sqrt(cosine, out=cosine)
-    else:
-        np.cos(cosine, out=cosine)
+    fill_sine_and_cosine(s * quarter_angle, turn[1], turn[0], narrow=narrow)
 
 
 def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
@@ -223,12 +232,9 @@ def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray
     return np.exp(middle + 0.5 * s * growth)
 
 
-def _half_sinh_share(s: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> np.ndarray:
-    """(sinh(s w) + 2 sinh(s w / 2)^2) / (2 sinh(w)) - tanh(w / 2) / 2, where w = (real + i imaginary) / 2."""
-    w = 0.5 * real + 0.5j * imaginary
-    w = np.where(w == 0.0, SMALLEST_ANGLE, w)
-    half = _sinh(0.5 * s * w)
-    return (_sinh(s * w) + 2.0 * half * half) / (2.0 * _sinh(w)) - 0.5 * _sinh(0.5 * w) / np.cosh(0.5 * w)
+def _growing_share(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """1 / (2 sinh(w)) and tanh(w / 2) / 2."""
+    return 0.5 / _sinh(w), 0.5 * _sinh(0.5 * w) / np.cosh(0.5 * w)
 
 
 def _sinh(z: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Euler angles of a motion, continuous from moment to moment.
+"""Extrinsic Euler angles of a motion, continuous from moment to moment.
 
 Orders are Blender's: "XYZ" turns about the x axis first, then about y, then about z, all of them fixed. Angles are
 radians about x, y and z, in this order whatever the order of turning, as Blender has its channels.
@@ -14,13 +14,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .trigonometry import fill_sine_and_cosine
+
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 LOCKED = 1e-7
 """Below this length a half sum or half difference of angles has no direction: the gimbal is locked."""
 
 
-def eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
+def extrinsic_eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequence[int] = (0,)) -> np.ndarray:
     """The angles of a motion's rotations, each set of angles the one nearest to the set before it.
 
     Parameters
@@ -59,14 +61,13 @@ def eulers_from_quaternions(quaternions: np.ndarray, order: str, starts: Sequenc
     return angles.T
 
 
-def quaternions_from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
+def quaternions_from_extrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     """The rotations (n, 4) of angles (n, 3) in radians about x, y and z, turned about in this order."""
     i, j, k = ("XYZ".index(axis) for axis in order)
     sign = (i - j) * (j - k) * (k - i) // 2
-    # Of half the angle sine and cosine both come from the tangent of its own half: one function of the library for two.
-    tangent = np.tan(0.25 * angles.T[[i, j, k]])
-    scale = 2.0 / (1.0 + tangent * tangent)
-    (ci, cj, ck), (si, sj, sk) = scale - 1.0, scale * tangent
+    sines, cosines = np.empty((2, 3, len(angles)))
+    fill_sine_and_cosine(0.5 * angles.T[[i, j, k]], sines, cosines, narrow=False)
+    (si, sj, sk), (ci, cj, ck) = sines, cosines
     quaternions = np.empty((4, len(angles)))
     quaternions[0] = ci * cj * ck + sign * si * sj * sk
     quaternions[1 + i] = si * cj * ck - sign * ci * sj * sk

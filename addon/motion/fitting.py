@@ -1,7 +1,7 @@
 """Keys that are no samples of a recording: moved by least squares to where the motion between them follows it best.
 
 A key that is a recorded pose has that sample's noise, and the in-betweens on either side of it pass through it whatever
-that costs. Let go, it takes the place that serves the samples around it. Its time stays.
+that costs. Fitted, it is where the error of the samples around it is smallest. Its time stays.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def fit_keys(
     mode : str
         One of `MODES`.
     radius : float
-        Of the shell, in the unit of the positions: how much turns count beside ways. Above zero.
+        Of the shell, in the unit of the positions: how much turns count beside displacements. Above zero.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def fit_keys(
 
     Notes
     -----
-    Gauss and Newton's method, a few keys at a time: those that are so far from one another that no segment knows of
+    Gauss and Newton's method, a few keys at a time: those that are so far from one another that no segment depends on
     two, and then their neighbours. Each is moved only if that is better.
     """
     if mode not in MODES:
@@ -79,7 +79,7 @@ class _Fitting:
         """Of each segment."""
         self.truth = _shell_points(poses, radius)
         self.fitted = poses[keys]
-        self.off = self.displacements(self.fitted)
+        self.residuals = self.displacements(self.fitted)
 
     def displacements(self, keys: Poses) -> np.ndarray:
         """Of the shell's points at all samples, shape (9, n)."""
@@ -87,27 +87,29 @@ class _Fitting:
         return _shell_points(shown, self.radius) - self.truth
 
     def improve(self, chosen: np.ndarray) -> None:
-        """Move some keys (c,), of which no segment knows two."""
-        slopes = np.empty((6, *self.off.shape))
+        """Move some keys (c,), of which no segment depends on two."""
+        slopes = np.empty((6, *self.residuals.shape))
         units = np.repeat((1.0, self.radius), 3)
-        for way in range(6):
+        for component in range(6):
             step = np.zeros((6, len(chosen)))
-            step[way] = STEP * units[way]
-            slopes[way] = (self.displacements(_moved(self.fitted, chosen, step)) - self.off) / STEP
-        normal = self.sums(np.einsum("apn,bpn->abn", slopes, slopes), chosen).transpose(2, 0, 1)
-        right = self.sums(np.einsum("apn,pn->an", slopes, self.off), chosen).T
-        normal += np.eye(6) * (DAMPING * np.trace(normal, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None]
-        steps = -np.linalg.solve(normal, right[..., None])[..., 0].T * units[:, None]
+            step[component] = STEP * units[component]
+            slopes[component] = (self.displacements(_moved(self.fitted, chosen, step)) - self.residuals) / STEP
+        normal_matrix = self.sums(np.einsum("apn,bpn->abn", slopes, slopes), chosen).transpose(2, 0, 1)
+        gradient = self.sums(np.einsum("apn,pn->an", slopes, self.residuals), chosen).T
+        normal_matrix += (
+            np.eye(6) * (DAMPING * np.trace(normal_matrix, axis1=1, axis2=2) + np.finfo(float).tiny)[:, None, None]
+        )
+        steps = -np.linalg.solve(normal_matrix, gradient[..., None])[..., 0].T * units[:, None]
         moved = _moved(self.fitted, chosen, steps)
-        off = self.displacements(moved)
-        worse = self.sums((off**2).sum(axis=0) - (self.off**2).sum(axis=0), chosen) >= 0.0
+        residuals = self.displacements(moved)
+        worse = self.sums((residuals**2).sum(axis=0) - (self.residuals**2).sum(axis=0), chosen) >= 0.0
         if worse.any():
             moved = _moved(self.fitted, chosen, np.where(worse, 0.0, steps))
-            off = self.displacements(moved)
-        self.fitted, self.off = moved, off
+            residuals = self.displacements(moved)
+        self.fitted, self.residuals = moved, residuals
 
     def sums(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Of values (..., n), over the segments that each of the chosen keys has a say in, shape (..., c)."""
+        """Of values (..., n), over the segments that each of the chosen keys influences, shape (..., c)."""
         of_segments = np.add.reduceat(values, self.first_samples, axis=-1)
         mode, last = MODES[self.mode], of_segments.shape[-1]
         begins = np.maximum(chosen - 1 - mode.ahead, 0)

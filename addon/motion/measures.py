@@ -42,7 +42,7 @@ def measure(times: np.ndarray, poses: Poses, truth: Poses, radius: float = 0.1) 
     The velocity error is that of the origin, by differences between successive samples: an in-between that runs
     unevenly, or turns a corner at a key, shows there first. A motion that is merely displaced has none.
     """
-    # Poses that are not finite have errors that are not, and that is no news.
+    # Poses that are not finite have errors that are not finite, without a warning.
     with np.errstate(over="ignore", invalid="ignore"):
         offset = poses.positions - truth.positions
         return Errors(

@@ -1,4 +1,4 @@
-"""The table of interpolation modes, and the one way from keys to the poses between them."""
+"""The table of interpolation modes, and interpolation between keys by any of them."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class Mode:
     """The same motion in the algebra it is named after, for single pairs of poses."""
 
     behind: int = 0
-    """How many keys before a segment have a say in it."""
+    """How many keys before a segment influence it."""
 
     ahead: int = 0
-    """How many keys after a segment have a say in it: a stream has to wait for them."""
+    """How many keys after a segment influence it: a stream has to wait for them."""
 
     for_streams: bool = False
-    """Whether it does without what better modes know of the keys to come. Among keyframes it has no place."""
+    """Whether it uses no key after the segment's own. It is for streams alone: keyframes have better modes."""
 
     @property
     def is_smooth(self) -> bool:
@@ -81,7 +81,7 @@ MODES: dict[str, Mode] = {
     "cga_lerp": Mode(
         5,
         "Versor Blend (CGA)",
-        "The motor blend, with uniform scale blended in the same breath",
+        "The motor blend, with uniform scale blended along with it",
         curves.similarity_lerp,
         cga.cga_lerp,
     ),
@@ -175,11 +175,11 @@ def interpolate(
     order = np.argsort(times, axis=-1, kind="stable")
     rising = np.take_along_axis(times, order, axis=-1)
     poses = interpolate_along(MODES[mode].curves, key_times, keys, rising, extrapolate)
-    back = np.broadcast_to(np.argsort(order, axis=-1, kind="stable"), poses.shape)
+    inverse = np.broadcast_to(np.argsort(order, axis=-1, kind="stable"), poses.shape)
     return Poses(
-        np.take_along_axis(poses.positions, back[..., None], axis=-2),
-        np.take_along_axis(poses.quaternions, back[..., None], axis=-2),
-        None if poses.scales is None else np.take_along_axis(poses.scales, back, axis=-1),
+        np.take_along_axis(poses.positions, inverse[..., None], axis=-2),
+        np.take_along_axis(poses.quaternions, inverse[..., None], axis=-2),
+        None if poses.scales is None else np.take_along_axis(poses.scales, inverse, axis=-1),
     )
 
 
@@ -221,9 +221,9 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     Returns
     -------
     callable
-        (counts, progress, some=slice(None)) to Poses of shape (m,), with counts and progress as `in_betweens` takes
-        them. `some` are the segments that they are for, counted through all objects, one after the other; its step is
-        1 and its ends are none from the end.
+        (counts, progress, selected=slice(None)) to Poses of shape (m,), with counts and progress as `in_betweens` takes
+        them. `selected` are the segments that they are for, counted through all objects, one after the other; its step
+        is 1 and its ends are not counted from the end.
 
     Raises
     ------
@@ -237,16 +237,16 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     shape = (*keys.shape[:-1], keys.shape[-1] - 1)
     within = prepare_within(MODES[mode].curves, key_times, keys)
 
-    def poses(counts: ArrayLike, progress: ArrayLike, some: slice = slice(None)) -> Poses:
+    def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
         counts, progress = np.asarray(counts), np.asarray(progress, dtype=np.float64)
-        asked = shape if some == slice(None) else (len(range(*some.indices(math.prod(shape)))),)
-        if counts.shape != asked or progress.shape != (int(counts.sum()),):
+        expected = shape if selected == slice(None) else (len(range(*selected.indices(math.prod(shape)))),)
+        if counts.shape != expected or progress.shape != (int(counts.sum()),):
             raise ValueError(
                 f"counts of shape {counts.shape} and {progress.size} progresses do not fit keys of {keys.shape}"
             )
         if not np.isfinite(progress).all():
             raise ValueError("progress needs to be made of finite numbers")
-        return within(counts.ravel(), progress, some)
+        return within(counts.ravel(), progress, selected)
 
     return poses
 
@@ -264,14 +264,14 @@ def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
     _require(np.isfinite(lengths), "has a quaternion that is not finite")
     _require(lengths > 0.0, "has a quaternion of length zero")
     if keys.scales is not None:
-        sound = (keys.scales > 1.0 / LIMIT) & (keys.scales < LIMIT)
-        _require(sound, f"has a scale that is not a positive number, or beyond {LIMIT:g}")
+        valid = (keys.scales > 1.0 / LIMIT) & (keys.scales < LIMIT)
+        _require(valid, f"has a scale that is not a positive number, or beyond {LIMIT:g}")
     return Poses(keys.positions, keys.quaternions / lengths[..., None], keys.scales)
 
 
-def _require(good: np.ndarray, complaint: str, axes_of_a_key: int = 0) -> None:
-    """Raise a ValueError that names the first key that is not good; a key's own axes come last."""
-    if not good.all():
-        where = np.argwhere(~good)[0].tolist()
-        *objects, key = where[: len(where) - axes_of_a_key]
+def _require(valid: np.ndarray, complaint: str, axes_of_a_key: int = 0) -> None:
+    """Raise a ValueError that names the first key that is not valid; a key's own axes come last."""
+    if not valid.all():
+        index = np.argwhere(~valid)[0].tolist()
+        *objects, key = index[: len(index) - axes_of_a_key]
         raise ValueError(f"key {key}{f' of object {objects}' if objects else ''} {complaint}")

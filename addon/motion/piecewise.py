@@ -12,12 +12,12 @@ from collections.abc import Iterator
 import numpy as np
 
 BLOCK = 32768
-"""Samples worked on at once: few enough for the processor's caches, enough to make light of the calls to NumPy."""
+"""Samples worked on at once: few enough for the processor's caches, enough that NumPy's calls cost little."""
 
 DENSE = 128
 """Samples in a row of pieces with equally many each, from which on matrix products beat repeating coefficients."""
 
-ENOUGH = 8
+DENSE_PIECE = 8
 """Samples of a piece from which on they do."""
 
 
@@ -32,12 +32,12 @@ def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice
 
 
 def is_dense(counts: np.ndarray) -> bool:
-    """Whether `multiply` is the quicker way for these counts (S,) of samples."""
+    """Whether `multiply_matrices` is the quicker way for these counts (S,) of samples."""
     runs = 1 + np.count_nonzero(counts[1:] != counts[:-1])
-    return bool(counts.sum() >= max(DENSE * runs, ENOUGH * len(counts)))
+    return bool(counts.sum() >= max(DENSE * runs, DENSE_PIECE * len(counts)))
 
 
-def multiply(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+def multiply_matrices(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
     """Fill out (k, n) with the matrix (k, b) of each of S pieces times the functions (b, n) at its samples.
 
     Parameters
@@ -57,10 +57,10 @@ def multiply(matrices: np.ndarray, functions: np.ndarray, counts: np.ndarray, ou
         at_piece = at_sample = 0
         for length, count in runs:
             if count:
-                own = slice(at_sample, at_sample + length * count)
+                run = slice(at_sample, at_sample + length * count)
                 shape = (-1, rounds, length, count)
-                given, product = (rows[..., own].reshape(shape).transpose(1, 2, 0, 3) for rows in of_samples)
-                np.matmul(of_pieces[:, at_piece : at_piece + length], given, out=product)
+                inputs, products = (rows[..., run].reshape(shape).transpose(1, 2, 0, 3) for rows in of_samples)
+                np.matmul(of_pieces[:, at_piece : at_piece + length], inputs, out=products)
             at_piece += length
             at_sample += length * count
         piece, sample = last_piece, last_sample
@@ -86,17 +86,17 @@ def _rounds(counts: np.ndarray) -> Iterator[tuple[int, list[tuple[int, int]]]]:
 
 
 def combine(coefficients: np.ndarray, functions: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-    """The same as `multiply`, from coefficients (k, b, S), the quicker way for these counts."""
-    some = np.flatnonzero(counts)
-    if len(some) < len(counts):
-        coefficients, counts = coefficients[..., some], counts[some]
+    """The same as `multiply_matrices`, from coefficients (k, b, S), the quicker way for these counts."""
+    nonempty = np.flatnonzero(counts)
+    if len(nonempty) < len(counts):
+        coefficients, counts = coefficients[..., nonempty], counts[nonempty]
     if not len(counts):
         return
     if is_dense(counts):
-        multiply(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), functions, counts, out)
+        multiply_matrices(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), functions, counts, out)
         return
     # Few rows at a time, for repeating multiplies what there is.
-    at_once = max(1, BLOCK // max(1, functions.shape[1]))
-    for row in range(0, len(out), at_once):
-        rows = slice(row, row + at_once)
+    batch_size = max(1, BLOCK // max(1, functions.shape[1]))
+    for row in range(0, len(out), batch_size):
+        rows = slice(row, row + batch_size)
         np.einsum("kbn,bn->kn", coefficients[rows].repeat(counts, axis=2), functions, out=out[rows])

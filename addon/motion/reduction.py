@@ -1,8 +1,8 @@
-"""Key reduction: the few samples of a recording that, as keys of a mode, still tell its motion.
+"""Key reduction: the few samples of a recording that, as keys of a mode, reproduce its motion.
 
 A key is a pose: all channels together. Keys are taken out as long as the motion stays near enough to the recording,
-those first that matter least, many at a time where they do not touch one another; then the rest are moved along the
-recording to where they serve best, which lets more of them go, and so on. What one key does is seen in the segments
+those first that matter least, many at a time where they do not influence the same segments; then the rest are moved
+along the recording to where the error is smallest, which lets more of them go, and so on. A key changes the segments
 around it alone, so that all keys can be tried at once, and the work grows with the length of the recording and not
 with its square.
 
@@ -33,10 +33,10 @@ ROUNDS = 12
 """Of moving keys and taking out more of them, at most."""
 
 LOOSER = (1.3, 1.6, 1.15)
-"""How many times the tolerance a search begins with: far-sighted keys, which are worth mending."""
+"""How many times the tolerance a search begins with, before keys are put back where the motion is off."""
 
 WORST = 1e30
-"""Errors beyond this are all as bad: their powers are to stay floats."""
+"""Errors are clipped to this, so that their powers stay finite."""
 
 BATCH = 2**14
 """Samples looked at in one go: few enough for the processor's caches."""
@@ -73,8 +73,8 @@ def reduce_keys(
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
-        How many times the search begins anew with a looser tolerance, and mends what comes of it: up to three, each of
-        which takes about twice as long as the first search. Under `rms` it gains nothing, and is left out.
+        How many times the search begins anew with a looser tolerance, and puts keys back where the motion is off: up to
+        three, each of which takes about twice as long as the first search. Under `rms` it gains nothing, so it is off.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def reduce_keys(
 class _Keys:
     """Keys among the samples, and what lies between them."""
 
-    places: np.ndarray
+    indices: np.ndarray
     """Samples, shape (k,)."""
 
     cost: np.ndarray
@@ -135,83 +135,83 @@ class _Reduction:
     def __init__(self, times: np.ndarray, poses: Poses, mode: str, radius: float, power: int) -> None:
         self.times, self.poses, self.mode, self.radius, self.power = times, poses, mode, radius, power
         self.reach = max(MODES[mode].behind, MODES[mode].ahead)
-        """How many segments beyond its own two a key has a say in, on either side."""
-        self.apart = 2 + 2 * self.reach
+        """How many segments beyond the two next to it a key influences, on either side."""
+        self.spacing = 2 + 2 * self.reach
         """Keys this far from one another, or further, can be tried without regard to each other."""
 
     def within(self, tolerance: float, tries: int) -> np.ndarray:
-        """The places of few keys that keep to a tolerance."""
-        every = np.arange(len(self.times))
-        best = self._settled(self._thinned(self._measured(every), tolerance, 2), tolerance)
-        for looser in LOOSER[:tries] if self.power != 2 else ():
-            loose = looser * tolerance
-            keys = self._settled(self._thinned(self._measured(every), loose, 2), loose)
-            keys = self._settled(self._mended(keys, tolerance), tolerance)
-            if len(keys.places) < len(best.places) and keys.peak.max() <= tolerance:
+        """Few samples that, as keys, keep to a tolerance."""
+        all_samples = np.arange(len(self.times))
+        best = self._refined(self._thinned(self._measured(all_samples), tolerance, 2), tolerance)
+        for factor in LOOSER[:tries] if self.power != 2 else ():
+            loose = factor * tolerance
+            keys = self._refined(self._thinned(self._measured(all_samples), loose, 2), loose)
+            keys = self._refined(self._densified(keys, tolerance), tolerance)
+            if len(keys.indices) < len(best.indices) and keys.peak.max() <= tolerance:
                 best = keys
-        return best.places
+        return best.indices
 
-    def _mended(self, keys: _Keys, tolerance: float) -> _Keys:
+    def _densified(self, keys: _Keys, tolerance: float) -> _Keys:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
         while keys.peak.max() > tolerance:
-            shown = interpolate(self.times[keys.places], self.poses[keys.places], self.times, self.mode)
+            shown = interpolate(self.times[keys.indices], self.poses[keys.indices], self.times, self.mode)
             errors = shell_error(shown, self.poses, self.radius)
-            errors[keys.places] = -1.0
-            of_segments = np.maximum.reduceat(errors, keys.places[:-1])
-            counts = np.diff(keys.places, append=len(errors))
+            errors[keys.indices] = -1.0
+            of_segments = np.maximum.reduceat(errors, keys.indices[:-1])
+            counts = np.diff(keys.indices, append=len(errors))
             worst = errors == np.append(of_segments, 0.0).repeat(counts)
             off = np.append(of_segments > tolerance, False).repeat(counts)
             if not np.any(worst & off):
                 break  # It is off by no more than rounding.
-            keys = self._measured(np.union1d(keys.places, np.flatnonzero(worst & off)))
+            keys = self._measured(np.union1d(keys.indices, np.flatnonzero(worst & off)))
         return keys
 
-    def _settled(self, keys: _Keys, tolerance: float) -> _Keys:
-        """Keys moved and thinned until none can be spared."""
+    def _refined(self, keys: _Keys, tolerance: float) -> _Keys:
+        """Keys moved and thinned until none can be removed."""
         for _ in range(ROUNDS):
-            before = len(keys.places)
+            before = len(keys.indices)
             keys = self._thinned(self._moved(keys, tolerance), tolerance, 2)
-            if len(keys.places) == before:
+            if len(keys.indices) == before:
                 break
         return keys
 
     def within_budget(self, budget: int) -> np.ndarray:
-        """The places of so many keys, with as small an error as can be found."""
+        """So many samples that are keys with as small an error as can be found."""
         keys = self._thinned(self._measured(np.arange(len(self.times))), math.inf, budget)
         for _ in range(ROUNDS):
             before = keys.cost.sum()
             keys = self._moved(keys, math.inf)
             if not keys.cost.sum() < 0.99 * before:
                 break
-        return keys.places
+        return keys.indices
 
-    def _measured(self, places: np.ndarray) -> _Keys:
-        """Keys in these places, everything between them measured."""
+    def _measured(self, indices: np.ndarray) -> _Keys:
+        """Keys at these samples, everything between them measured."""
         reach = self.reach
         columns = np.arange(-reach, 2 + reach)
-        segments = np.arange(len(places) - 1)
-        windows = self._windows(places, segments, columns)
-        cost, peak = self._look(windows, slice(reach, reach + 1))
-        return _Keys(places, cost[:, 0], peak[:, 0])
+        segments = np.arange(len(indices) - 1)
+        windows = self._windows(indices, segments, columns)
+        cost, peak = self._evaluate(windows, slice(reach, reach + 1))
+        return _Keys(indices, cost[:, 0], peak[:, 0])
 
     def _thinned(self, keys: _Keys, tolerance: float, fewest: int) -> _Keys:
-        """Keys without all those that can be spared, down to the fewest that are wanted."""
+        """Keys without all those that can be removed, down to the fewest that are wanted."""
         reach = self.reach
         columns = np.concatenate((np.arange(-1 - 2 * reach, 0), np.arange(1, 2 + 2 * reach)))
-        seen = np.zeros(len(keys.places), dtype=bool)
-        cost, peak = np.zeros((2, len(keys.places), 1 + 2 * reach))
-        while len(keys.places) > fewest:
+        seen = np.zeros(len(keys.indices), dtype=bool)
+        cost, peak = np.zeros((2, len(keys.indices), 1 + 2 * reach))
+        while len(keys.indices) > fewest:
             unseen = np.flatnonzero(~seen[1:-1]) + 1
             if len(unseen):
-                found = self._look(self._windows(keys.places, unseen, columns), slice(reach, 1 + 3 * reach))
+                found = self._evaluate(self._windows(keys.indices, unseen, columns), slice(reach, 1 + 3 * reach))
                 cost[unseen], peak[unseen] = found
                 seen[unseen] = True
-            inner = np.arange(1, len(keys.places) - 1)
+            inner = np.arange(1, len(keys.indices) - 1)
             rise = cost[inner].sum(axis=1) - self._around(keys.cost, inner)
-            picked = inner[self._sparable(rise, peak[inner].max(axis=1), keys, tolerance, len(inner) + 2 - fewest)]
+            picked = inner[self._removable(rise, peak[inner].max(axis=1), keys, tolerance, len(inner) + 2 - fewest)]
             if not len(picked):
                 break
-            self._settle(keys, picked, cost, peak)
+            self._remove(keys, picked, cost, peak)
             left = np.ones(len(seen), dtype=bool)
             left[picked] = False
             near = (picked[:, None] + np.arange(-2 - 3 * reach, 3 + 3 * reach)).ravel()
@@ -219,25 +219,25 @@ class _Reduction:
             seen, cost, peak = seen[left], cost[left], peak[left]
         return keys
 
-    def _sparable(self, rise: np.ndarray, peak: np.ndarray, keys: _Keys, tolerance: float, most: int) -> np.ndarray:
-        """Which of the inner keys go next: those whose loss raises the cost least, far enough from one another."""
+    def _removable(self, rise: np.ndarray, peak: np.ndarray, keys: _Keys, tolerance: float, most: int) -> np.ndarray:
+        """Which of the inner keys go next: those whose removal raises the cost least, far enough from one another."""
         order = np.argsort(rise, kind="stable")
         order = order[: max(1, len(order) // 4)] if self.power == 2 or not math.isfinite(tolerance) else order
         if self.power != 2:
             order = order[peak[order] <= tolerance]
             order = order[: max(1, len(rise) // 4)]
-        picked = _apart(order, self.apart, len(rise))[:most]
+        picked = _spaced(order, self.spacing, len(rise))[:most]
         if self.power == 2 and math.isfinite(tolerance):
             picked = picked[keys.cost.sum() + np.cumsum(rise[picked]) <= tolerance**2 * len(self.times)]
         return picked
 
-    def _settle(self, keys: _Keys, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
-        """Take these keys out, and put what was found for the segments around them in place of what was there."""
+    def _remove(self, keys: _Keys, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
+        """Remove these keys, and set the costs and peaks of the segments that take their place."""
         reach = self.reach
-        places = picked[:, None] + np.concatenate((np.arange(-1 - reach, 0), np.arange(1, 1 + reach)))
-        there = (places >= 0) & (places < len(keys.cost))
-        keys.cost[places[there]], keys.peak[places[there]] = cost[picked][there], peak[picked][there]
-        keys.places = np.delete(keys.places, picked)
+        segments = picked[:, None] + np.concatenate((np.arange(-1 - reach, 0), np.arange(1, 1 + reach)))
+        valid = (segments >= 0) & (segments < len(keys.cost))
+        keys.cost[segments[valid]], keys.peak[segments[valid]] = cost[picked][valid], peak[picked][valid]
+        keys.indices = np.delete(keys.indices, picked)
         keys.cost, keys.peak = np.delete(keys.cost, picked), np.delete(keys.peak, picked)
 
     def _moved(self, keys: _Keys, tolerance: float) -> _Keys:
@@ -246,41 +246,41 @@ class _Reduction:
         columns = np.arange(-1 - 2 * reach, 2 + 2 * reach)
         offsets = np.arange(-1 - reach, 1 + reach)
         for step in STEPS:
-            places = keys.places
-            inner = np.arange(1, len(places) - 1)
-            moved = places[inner] + step
-            inner = inner[(moved > places[inner - 1]) & (moved < places[inner + 1])]
+            indices = keys.indices
+            inner = np.arange(1, len(indices) - 1)
+            moved = indices[inner] + step
+            inner = inner[(moved > indices[inner - 1]) & (moved < indices[inner + 1])]
             if not len(inner):
                 continue
-            windows = self._windows(places, inner, columns)
+            windows = self._windows(indices, inner, columns)
             windows[:, 1 + 2 * reach] += step
-            cost, peak = self._look(windows, slice(reach, 2 + 3 * reach))
+            cost, peak = self._evaluate(windows, slice(reach, 2 + 3 * reach))
             rise = cost.sum(axis=1) - self._around(keys.cost, inner)
             allowed = (self.power == 2) | (peak.max(axis=1) <= tolerance)
             good = np.flatnonzero((rise < -1e-4 * keys.cost.mean()) & allowed)
             chosen = good[np.argsort(rise[good], kind="stable")]
-            picked = _apart(inner[chosen], self.apart, len(places))
+            picked = _spaced(inner[chosen], self.spacing, len(indices))
             rows = np.searchsorted(inner, picked)
             segments = picked[:, None] + offsets
-            there = (segments >= 0) & (segments < len(keys.cost))
-            keys.cost[segments[there]], keys.peak[segments[there]] = cost[rows][there], peak[rows][there]
-            keys.places = places.copy()
-            keys.places[picked] += step
+            valid = (segments >= 0) & (segments < len(keys.cost))
+            keys.cost[segments[valid]], keys.peak[segments[valid]] = cost[rows][valid], peak[rows][valid]
+            keys.indices = indices.copy()
+            keys.indices[picked] += step
         return keys
 
     def _around(self, of_segments: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """The sum over the segments that each key has a say in."""
+        """The sum over the segments that each key influences."""
         sums = np.concatenate(((0.0,), np.cumsum(of_segments)))
         last = len(of_segments)
         return sums[np.minimum(inner + 1 + self.reach, last)] - sums[np.maximum(inner - 1 - self.reach, 0)]
 
-    def _windows(self, places: np.ndarray, centres: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    def _windows(self, indices: np.ndarray, centres: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """The samples of the keys in these columns from each centre, -1 where there are none, shape (c, m)."""
         numbers = centres[:, None] + columns
-        inside = (numbers >= 0) & (numbers < len(places))
-        return np.where(inside, places[np.clip(numbers, 0, len(places) - 1)], -1)
+        inside = (numbers >= 0) & (numbers < len(indices))
+        return np.where(inside, indices[np.clip(numbers, 0, len(indices) - 1)], -1)
 
-    def _look(self, windows: np.ndarray, segments: slice) -> tuple[np.ndarray, np.ndarray]:
+    def _evaluate(self, windows: np.ndarray, segments: slice) -> tuple[np.ndarray, np.ndarray]:
         """Costs and peaks, each (c, s), of some of the segments between the keys of windows (c, m)."""
         wanted = windows[:, segments], windows[:, segments.start + 1 : segments.stop + 1]
         counts = np.where((wanted[0] >= 0) & (wanted[1] >= 0), wanted[1] - wanted[0] - 1, 0)
@@ -288,37 +288,37 @@ class _Reduction:
         ends = np.cumsum(counts.sum(axis=1))
         cuts = np.unique(np.append(np.searchsorted(ends, np.arange(0, ends[-1], BATCH)), len(windows)))
         for first, last in itertools.pairwise(cuts.tolist()):
-            few = slice(first, last)
-            self._look_at_once(windows[few], segments.start, counts[few], cost[few], peak[few])
+            batch = slice(first, last)
+            self._evaluate_batch(windows[batch], segments.start, counts[batch], cost[batch], peak[batch])
         return cost, peak
 
-    def _look_at_once(
+    def _evaluate_batch(
         self, windows: np.ndarray, start: int, counts: np.ndarray, cost: np.ndarray, peak: np.ndarray
     ) -> None:
-        some = np.flatnonzero(counts.sum(axis=1))
-        if not len(some):
+        nonempty = np.flatnonzero(counts.sum(axis=1))
+        if not len(nonempty):
             return
-        every = np.zeros((len(some), windows.shape[1] - 1), dtype=np.int64)
-        every[:, start : start + counts.shape[1]] = counts[some]
-        segment = np.repeat(np.arange(every.size), every.ravel())
-        begins = windows[some, :-1].ravel()
-        first = np.cumsum(every.ravel()) - every.ravel()
+        all_counts = np.zeros((len(nonempty), windows.shape[1] - 1), dtype=np.int64)
+        all_counts[:, start : start + counts.shape[1]] = counts[nonempty]
+        segment = np.repeat(np.arange(all_counts.size), all_counts.ravel())
+        begins = windows[nonempty, :-1].ravel()
+        first = np.cumsum(all_counts.ravel()) - all_counts.ravel()
         samples = begins[segment] + 1 + np.arange(len(segment)) - first[segment]
-        key_times, keys = _with_ends(self.times, self.poses, windows[some])
+        key_times, keys = _with_ends(self.times, self.poses, windows[nonempty])
         start_times, durations = key_times[:, :-1].ravel(), np.diff(key_times).ravel()
         progress = (self.times[samples] - start_times[segment]) / durations[segment]
-        shown = in_betweens(key_times, keys, every, progress, self.mode)
+        shown = in_betweens(key_times, keys, all_counts, progress, self.mode)
         error = np.minimum(shell_error(shown, self.poses[samples], self.radius), WORST)
-        filled = np.flatnonzero(every.ravel())
-        sums, largest = np.zeros((2, every.size))
+        filled = np.flatnonzero(all_counts.ravel())
+        sums, largest = np.zeros((2, all_counts.size))
         sums[filled] = np.add.reduceat(error**self.power, first[filled])
         largest[filled] = np.maximum.reduceat(error, first[filled])
         wanted = slice(start, start + counts.shape[1])
-        cost[some] = sums.reshape(every.shape)[:, wanted]
-        peak[some] = largest.reshape(every.shape)[:, wanted]
+        cost[nonempty] = sums.reshape(all_counts.shape)[:, wanted]
+        peak[nonempty] = largest.reshape(all_counts.shape)[:, wanted]
 
 
-def _apart(order: np.ndarray, distance: int, count: int) -> np.ndarray:
+def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     """Of the numbers below `count`, in the order of their worth, those that are `distance` from any better one."""
     rank = np.full(count + 2 * distance, len(order))
     rank[order + distance] = np.arange(len(order))
@@ -327,8 +327,8 @@ def _apart(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     while True:
         windows = np.lib.stride_tricks.sliding_window_view(rank, 2 * distance - 1)
         best = windows.min(axis=1)
-        own = rank[distance - 1 : distance - 1 + len(best)]
-        chosen = np.flatnonzero((own == best) & (own < len(order)))
+        centre = rank[distance - 1 : distance - 1 + len(best)]
+        chosen = np.flatnonzero((centre == best) & (centre < len(order)))
         if not len(chosen):
             break
         picked.append(chosen - 1)
@@ -343,8 +343,8 @@ def _apart(order: np.ndarray, distance: int, count: int) -> np.ndarray:
 def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray) -> tuple[np.ndarray, Poses]:
     """Times and poses (c, m) of these samples; where there are none, the motion goes on as in the outermost segment."""
     outside = windows < 0
-    places = np.maximum(windows, 0)
-    key_times, keys = times[places], poses[places]
+    indices = np.maximum(windows, 0)
+    key_times, keys = times[indices], poses[indices]
     last = windows.shape[1] - 1
     columns = [(column, 1) for column in range(last - 2, -1, -1)] + [(column, -1) for column in range(2, last + 1)]
     for column, inwards in columns:

@@ -23,7 +23,7 @@ LARGEST_SCALE = 1e6
 """A scale beyond this, or below its inverse, is damage: growth goes by powers, and would leave the range of floats."""
 
 UNIT_TOLERANCE = 1e-3
-"""How far a quaternion's length may be from 1 before normalising it is worth a word: three decimals are often kept."""
+"""How far a quaternion's length may be from 1 before normalising it is reported: three decimals are often kept."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     finite = _usable(times) & _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)
     if poses.scales is not None:
         finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
-    keep(finite, "dropped rows with numbers that are missing, not finite or beyond all measure")
+    keep(finite, "dropped rows with numbers that are missing, not finite or too large")
     keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
     keep(_rising(times), "dropped rows whose time runs backwards")
     keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")

@@ -23,10 +23,9 @@ from functools import cached_property
 import numpy as np
 
 from . import series, twists
-from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply
+from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrices
 from .poses import Poses
-from .quaternions import align_signs, cross, rotate
-from .quaternions import multiply as product
+from .quaternions import align_signs, cross, multiply, rotate
 
 STILL = 1e-12
 """Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
@@ -38,7 +37,7 @@ ROWS = 8
 """Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
 
 NARROW = 4.0 / 3.0
-"""The largest |s| at which psi, 45 degrees at the keys, is no more than 60: a root gives the cosine from the sine."""
+"""The largest |s| at which psi, 45 degrees at the keys, is no more than the 60 of `trigonometry.NARROW`."""
 
 SMALLEST_ANGLE = 1e-150
 """Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
@@ -181,11 +180,11 @@ def interpolate_along(
     )
     key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
     result = np.empty((ROWS, len(keys), times.shape[-1]))
-    at_once = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
-    for first in range(0, len(keys), at_once):
-        few = slice(first, first + at_once)
-        own_key_times, own_times = (rows if len(rows) == 1 else rows[few] for rows in (key_times, times))
-        _fill(curves, own_key_times, keys[few], own_times, extrapolate, result[:, few])
+    batch_size = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
+    for first in range(0, len(keys), batch_size):
+        batch = slice(first, first + batch_size)
+        batch_key_times, batch_times = (rows if len(rows) == 1 else rows[batch] for rows in (key_times, times))
+        _fill(curves, batch_key_times, keys[batch], batch_times, extrapolate, result[:, batch])
     return Poses(
         np.moveaxis(result[:3], 0, -1).reshape(*shape, 3),
         np.moveaxis(result[3:7], 0, -1).reshape(*shape, 4),
@@ -209,7 +208,7 @@ def _fill(
     samples = np.broadcast_to(times, out.shape[1:]).ravel()
     outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
 
-    def position(sample: slice, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    def local_time(sample: slice, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
         s = samples[sample] - start
         s *= rate
         s -= 1.0
@@ -227,9 +226,9 @@ def _fill(
         numbers = np.stack((start, pieces * segments.rate.repeat(pieces)))
 
         def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
-            multiply(coefficients[piece], series.powers(s), counts, out)
+            multiply_matrices(coefficients[piece], series.powers(s), counts, out)
 
-    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), position, out.reshape(ROWS, -1))
+    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), local_time, out.reshape(ROWS, -1))
 
 
 Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
@@ -245,16 +244,16 @@ def prepare_within(curves: Callable[[Segments], Curves], key_times: np.ndarray, 
     segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
-    def within(counts: np.ndarray, progress: np.ndarray, some: slice) -> Poses:
+    def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
         out = np.empty((ROWS, progress.size))
         reach = float(max(2.0 * progress.max() - 1.0, 1.0 - 2.0 * progress.min())) if progress.size else 0.0
-        fill, first = _filler(mode, reach), some.start or 0
+        fill, first = _filler(mode, reach), selected.start or 0
 
-        def shifted(segment: slice, *others: np.ndarray) -> None:
+        def fill_selected(segment: slice, *others: np.ndarray) -> None:
             fill(slice(first + segment.start, first + segment.stop), *others)
 
         bounds = np.concatenate(((0,), np.cumsum(counts)))
-        _evaluate(shifted, no_numbers[:, some], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
+        _evaluate(fill_selected, no_numbers[:, selected], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
         return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
 
     return within
@@ -268,17 +267,17 @@ def _evaluate(
     fill: Fill,
     numbers: np.ndarray,
     bounds: np.ndarray,
-    position: Callable[..., np.ndarray],
+    local_time: Callable[..., np.ndarray],
     out: np.ndarray,
 ) -> None:
     """Fill out (ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
 
-    `position` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
+    `local_time` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
     """
     all_counts = np.diff(bounds)
     for segment, sample in blocks(bounds, BLOCK if is_dense(all_counts) else BLOCK // 2):
         counts = all_counts[segment]
-        fill(segment, position(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
+        fill(segment, local_time(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
 
 
 def _filler(mode: Curves, reach: float) -> Fill:
@@ -328,12 +327,12 @@ def _divided(key_times: np.ndarray, pieces: int) -> np.ndarray:
 def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
     """Where each segment's samples begin among the samples of all objects, shape (S + 1,)."""
     starts = np.zeros((objects, key_times.shape[-1] - 1), dtype=np.int64)
-    inner = key_times[:, 1:-1]
-    if inner.size:
+    inner_keys = key_times[:, 1:-1]
+    if inner_keys.size:
         # One search where all objects share their times, else one for each.
-        for row in range(max(len(inner), len(times))):
-            found = np.searchsorted(times[row % len(times)], inner[row % len(inner)], side="right")
-            starts[row if len(inner) > 1 or len(times) > 1 else slice(None), 1:] = found
+        for row in range(max(len(inner_keys), len(times))):
+            found = np.searchsorted(times[row % len(times)], inner_keys[row % len(inner_keys)], side="right")
+            starts[row if len(inner_keys) > 1 or len(times) > 1 else slice(None), 1:] = found
     starts += times.shape[-1] * np.arange(objects)[:, None]
     return np.append(starts.ravel(), objects * times.shape[-1])
 
@@ -348,7 +347,7 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
         np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
         np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:7])
         return
-    multiply(mode.matrices[segment], basis, counts, out)
+    multiply_matrices(mode.matrices[segment], basis, counts, out)
 
 
 def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
@@ -365,7 +364,7 @@ def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, ou
     combine(bends[: len(added)], functions, counts, added)
     turns, advances = twists.exponential(added[:6])
     out[:3] += rotate(out[3:7].T, advances.T).T
-    out[3:7] = product(out[3:7].T, turns.T).T
+    out[3:7] = multiply(out[3:7].T, turns.T).T
     if grows:
         out[7] *= np.exp(np.clip(added[6], -MOST_GROWTH, MOST_GROWTH, out=added[6]))
 

@@ -34,8 +34,10 @@ def fit(values: np.ndarray) -> np.ndarray:
     """The coefficients (pieces, k, TERMS) of k functions with these values (k, pieces * TERMS) at the nodes."""
     # In two steps, not by one matrix: large powers have large coefficients of nearly opposite size, and only between
     # the two steps are those of the high polynomials small.
-    series = values.reshape(-1, TERMS) @ _CHEBYSHEV.T @ _POWERS
-    return np.ascontiguousarray(series.reshape(len(values), -1, TERMS).transpose(1, 0, 2))
+    # A product for each function, so that BLAS does not share it among threads: on a busy machine it waits for them far
+    # longer than all of this takes.
+    series = values.reshape(len(values), -1, TERMS) @ _CHEBYSHEV.T @ _POWERS
+    return np.ascontiguousarray(series.transpose(1, 0, 2))
 
 
 def powers(s: np.ndarray) -> np.ndarray:

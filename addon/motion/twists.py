@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from .quaternions import conjugate, cross, multiply, rotate
+from .trigonometry import fill_sine_and_cosine
 
 SMALLEST = 1e-200
 """Stands for the square of an angle of zero, where only ratios count."""
@@ -23,10 +24,8 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     squared = np.einsum("kn,kn->n", turn, turn)
     np.maximum(squared, SMALLEST, out=squared)
     angle = np.sqrt(squared)
-    half = 0.5 * angle
-    sine = np.sin(half)
-    quaternions = np.empty((4, twists.shape[1]))
-    np.cos(half, out=quaternions[0])
+    sine, quaternions = np.empty_like(angle), np.empty((4, twists.shape[1]))
+    fill_sine_and_cosine(0.5 * angle, sine, quaternions[0], narrow=False)
     np.multiply(sine / angle, turn, out=quaternions[1:])
     # Of the angle a: sin(a) / a, (1 - cos(a)) / a^2 and (1 - sin(a) / a) / a^2. For small angles the last has few
     # digits, of a product that is next to nothing.

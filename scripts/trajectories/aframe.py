@@ -18,7 +18,7 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .euler import quaternions_from_euler
+from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, shown
 from .tables import read_text
 
@@ -66,7 +66,7 @@ def _trajectory(path: Path, name: str, samples: list) -> Trajectory:
         quaternions = _numbers(path, name, samples, [("rotation", index) for index in (3, 0, 1, 2)])
     else:
         degrees = _numbers(path, name, samples, [("rotation", axis) for axis in "yxz"])
-        quaternions = quaternions_from_euler(np.radians(degrees), "YXZ")
+        quaternions = quaternions_from_intrinsic_eulers(np.radians(degrees), "YXZ")
     return Trajectory(name, times, Poses(positions, quaternions))
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from addon.motion import Poses
 from addon.motion.quaternions import multiply, rotate
 
-from .euler import quaternions_from_euler
+from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .tables import lines_of, parse_rows
 
@@ -118,7 +118,7 @@ def _placed(joint: Joint, own: np.ndarray, parent: Poses | None) -> Poses:
         else:
             turns.append(column)
     order = "".join(joint.channels[column][0] for column in turns)
-    quaternions = quaternions_from_euler(np.radians(own[:, turns]), order)
+    quaternions = quaternions_from_intrinsic_eulers(np.radians(own[:, turns]), order)
     if parent is not None:
         positions = parent.positions + rotate(parent.quaternions, positions)
         quaternions = multiply(parent.quaternions, quaternions)

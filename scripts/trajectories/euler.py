@@ -1,4 +1,4 @@
-"""Euler angles as quaternions, for the formats that record rotations as turns about one axis after another."""
+"""Intrinsic Euler angles as quaternions, for formats that record rotations as turns about one axis after another."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from addon.motion.quaternions import multiply
 
 
-def quaternions_from_euler(angles: np.ndarray, order: str) -> np.ndarray:
+def quaternions_from_intrinsic_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     """The rotations R1 R2 ... of turns about the axes in `order`, each about the axis as the earlier ones left it.
 
     Parameters

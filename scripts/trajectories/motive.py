@@ -20,7 +20,7 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .euler import quaternions_from_euler
+from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, listed, shown, unique
 from .tables import cells_of, lines_of, parse_rows
 
@@ -68,7 +68,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     for name, part in zip(taken, np.split(numbers[:, 1:], len(taken), axis=1), strict=True):
         positions, turns = part[:, :3], part[:, 3:]
         euler = rotation != ROTATION_TYPES["quaternion"]
-        quaternions = quaternions_from_euler(np.radians(turns), rotation.upper()) if euler else turns
+        quaternions = quaternions_from_intrinsic_eulers(np.radians(turns), rotation.upper()) if euler else turns
         trajectories.append(Trajectory(name, numbers[:, 0], Poses(positions, quaternions), metres))
     return trajectories
 

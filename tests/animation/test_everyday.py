@@ -100,7 +100,7 @@ def _original(obj: bpy.types.Object) -> tuple:
         lambda obj: obj.animation_data.action.slots.remove(obj.animation_data.action_slot),
         lambda obj: animation.channelbag_of(obj).fcurves.clear(),
     ],
-    ids=["animation data cleared", "Action deleted", "Action unlinked", "slot unlinked", "slot deleted", "F-curves gone"],
+    ids=["data cleared", "Action deleted", "Action unlinked", "slot unlinked", "slot deleted", "F-curves gone"],
 )
 @pytest.mark.parametrize("order", ORDERS)
 def test_however_an_action_goes_the_own_delta_transforms_come_back(live_file, goes, order):

@@ -10,7 +10,7 @@ from mathutils import Euler
 from scipy.spatial.transform import Rotation
 
 from addon.motion import Poses, interpolate
-from addon.motion.eulers import ORDERS, eulers_from_quaternions, quaternions_from_eulers
+from addon.motion.eulers import ORDERS, extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
 from tests.motion.cases import random_quaternions
 
 in_every_order = pytest.mark.parametrize("order", ORDERS)
@@ -29,7 +29,7 @@ def assert_same_rotations(angles: np.ndarray, order: str, quaternions: np.ndarra
 @in_every_order
 def test_angles_give_the_rotations_back(order):
     quaternions = random_quaternions(np.random.default_rng(0), 2000)
-    assert_same_rotations(eulers_from_quaternions(quaternions, order), order, quaternions)
+    assert_same_rotations(extrinsic_eulers_from_quaternions(quaternions, order), order, quaternions)
 
 
 @in_every_order
@@ -37,7 +37,7 @@ def test_angles_of_any_size_give_scipys_rotations(order):
     right_angles = np.array(list(itertools.product(0.5 * np.pi * np.arange(-8.0, 9.0), repeat=3)))
     angles = np.concatenate((right_angles, np.random.default_rng(3).normal(scale=20.0, size=(2000, 3))))
     expected = rotations(angles, order).as_quat(scalar_first=True)
-    quaternions = quaternions_from_eulers(angles, order)
+    quaternions = quaternions_from_extrinsic_eulers(angles, order)
     assert np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max() < 1e-15
     assert np.abs(quaternions - expected * np.sign(np.sum(quaternions * expected, axis=1))[:, None]).max() < 1e-13
 
@@ -45,7 +45,7 @@ def test_angles_of_any_size_give_scipys_rotations(order):
 @in_every_order
 def test_mathutils_has_the_same_order_and_axes(order):
     quaternions = random_quaternions(np.random.default_rng(1), 50)
-    for angles, quaternion in zip(eulers_from_quaternions(quaternions, order), quaternions, strict=True):
+    for angles, quaternion in zip(extrinsic_eulers_from_quaternions(quaternions, order), quaternions, strict=True):
         assert abs(Euler(angles, order).to_quaternion().dot(quaternion)) == pytest.approx(1.0, abs=1e-6)
 
 
@@ -58,7 +58,7 @@ def test_turning_on_and_on_about_one_axis_is_one_rising_angle(order, axis):
     quaternions[::3] *= -1.0
     expected = np.zeros((400, 3))
     expected[:, axis] = turns
-    assert eulers_from_quaternions(quaternions, order) == pytest.approx(expected, abs=1e-7)
+    assert extrinsic_eulers_from_quaternions(quaternions, order) == pytest.approx(expected, abs=1e-7)
 
 
 @in_every_order
@@ -66,7 +66,7 @@ def test_motions_have_no_jumps(order):
     keys = Poses(np.zeros((20, 3)), random_quaternions(np.random.default_rng(2), 20))
     frames = np.linspace(0.0, 19.0, 20_000)
     quaternions = interpolate(np.arange(20.0), keys, frames, "dq_sclerp").quaternions
-    angles = eulers_from_quaternions(quaternions, order)
+    angles = extrinsic_eulers_from_quaternions(quaternions, order)
     assert np.abs(np.diff(angles, axis=0)).max() < 0.3
     assert_same_rotations(angles, order, quaternions)
 
@@ -77,13 +77,13 @@ def test_straight_through_gimbal_lock(order):
     angles = np.full((201, 3), 0.3)
     angles[:, middle] = np.linspace(1.0, np.pi - 1.0, 201)  # The middle one of these is a right angle exactly.
     quaternions = rotations(angles, order).as_quat(scalar_first=True)
-    found = eulers_from_quaternions(quaternions, order)
+    found = extrinsic_eulers_from_quaternions(quaternions, order)
     assert_same_rotations(found, order, quaternions, 1e-7)
     assert np.abs(np.diff(found, axis=0)).max() < 0.02
 
 
 def test_resting_in_gimbal_lock_is_a_rest():
     quaternion = Rotation.from_euler("xyz", [0.4, np.pi / 2.0, 0.1]).as_quat(scalar_first=True)
-    angles = eulers_from_quaternions(np.tile(quaternion, (5, 1)), "XYZ")
+    angles = extrinsic_eulers_from_quaternions(np.tile(quaternion, (5, 1)), "XYZ")
     assert np.ptp(angles, axis=0) == pytest.approx(0.0, abs=1e-12)
     assert_same_rotations(angles, "XYZ", np.tile(quaternion, (5, 1)), 1e-7)

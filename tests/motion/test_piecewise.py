@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from addon.motion import MODES, Poses, in_betweens, prepare
-from addon.motion.piecewise import blocks, combine, is_dense, multiply
+from addon.motion.piecewise import blocks, combine, is_dense, multiply_matrices
 from tests.motion.cases import random_quaternions
 
 
@@ -21,7 +21,7 @@ def test_products_are_what_each_sample_gives(counts, rows, functions):
     expected = np.einsum("kbn,bn->kn", coefficients.repeat(counts, axis=2), values)
     found = np.full((2, rows, counts.sum()), np.nan)
     combine(coefficients, values, counts, found[0])
-    multiply(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), values, counts, found[1])
+    multiply_matrices(np.ascontiguousarray(coefficients.transpose(2, 0, 1)), values, counts, found[1])
     np.testing.assert_allclose(found, np.stack((expected, expected)), rtol=0, atol=1e-12)
 
 
@@ -34,7 +34,7 @@ def test_counts_that_come_round_again_and_again_make_the_same_products(head, pat
     random = np.random.default_rng(counts)
     matrices, functions = random.normal(size=(len(counts), 3, 2)), random.normal(size=(2, counts.sum()))
     found = np.full((3, counts.sum()), np.nan)
-    multiply(matrices, functions, counts, found)
+    multiply_matrices(matrices, functions, counts, found)
     expected = np.einsum("nkb,bn->kn", matrices.repeat(counts, axis=0), functions)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 
 from addon.animation.curves import Cycles, cycled, cyclic_times
 from tests.animation.curves.examples import MODES, all_cycles, curves, evaluate_one, frames_about, keys_of
+from tests.thoroughness import tried
 
 
 @settings(max_examples=tried(100))

@@ -22,6 +22,7 @@ from tests.animation.curves.examples import (
     keys_of,
     read_one,
 )
+from tests.thoroughness import tried
 
 
 @settings(max_examples=tried(300))

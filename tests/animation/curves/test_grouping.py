@@ -14,6 +14,7 @@ from addon.animation.curves import EASINGS, Cycles, Keys, evaluate
 from addon.animation.curves.grouping import BLOCK, Group, blocks, group_by_timing
 from addon.animation.curves.spans import Spans
 from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
+from tests.thoroughness import tried
 
 
 @settings(max_examples=tried(50))

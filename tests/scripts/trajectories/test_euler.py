@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from addon.motion.quaternions import angle_between
-from scripts.trajectories.euler import quaternions_from_euler
+from scripts.trajectories.euler import quaternions_from_intrinsic_eulers
 
 ORDERS = ["".join(order) for count in (1, 2, 3) for order in permutations("XYZ", count)]
 
@@ -16,8 +16,8 @@ ORDERS = ["".join(order) for count in (1, 2, 3) for order in permutations("XYZ",
 def test_turns_follow_one_another_about_the_turned_axes(order: str) -> None:
     angles = np.random.default_rng(2).uniform(-np.pi, np.pi, size=(100, len(order)))
     expected = Rotation.from_euler(order, angles).as_quat()[:, [3, 0, 1, 2]]
-    assert angle_between(quaternions_from_euler(angles, order), expected).max() < 1e-14
+    assert angle_between(quaternions_from_intrinsic_eulers(angles, order), expected).max() < 1e-14
 
 
 def test_no_turn_is_no_rotation() -> None:
-    np.testing.assert_array_equal(quaternions_from_euler(np.empty((2, 0)), ""), [[1, 0, 0, 0], [1, 0, 0, 0]])
+    np.testing.assert_array_equal(quaternions_from_intrinsic_eulers(np.empty((2, 0)), ""), [[1, 0, 0, 0], [1, 0, 0, 0]])

@@ -1,0 +1,65 @@
+"""Sines and cosines of many angles at once.
+
+In double precision NumPy takes 8 to 9 ns for a sine, and as much for a cosine, on every processor. Its tangent takes
+1 ns where it has vector code for it (AVX-512), and gives both by the half-angle formulas. Elsewhere a polynomial gives
+the sine of a small angle, and a root its cosine. All are correct to a few units in the last place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+NARROW = np.pi / 3.0
+"""Radians up to which the polynomial is the sine, and the root loses nothing of the cosine."""
+
+_SERIES = (
+    -0.16666666666666666,
+    0.008333333333332985,
+    -0.00019841269840999382,
+    2.7557319124112555e-06,
+    -2.5052088620602564e-08,
+    1.605689019222814e-10,
+    -7.525258784607096e-13,
+)
+"""Of sin(x) / x - 1 in powers of x^2: the smallest relative error of the sine up to `NARROW`, 2.1e-19 (Remez)."""
+
+
+def _has_vector_tangent() -> bool:
+    """Whether NumPy's tangent is not the C library's, one number at a time. NumPy before 2.1 does not tell."""
+    introspect = getattr(np.lib, "introspect", None)
+    if introspect is None:
+        return False
+    found = introspect.opt_func_info(func_name="^tan$", signature="float64")
+    return not all(loop["current"].startswith("baseline") for loops in found.values() for loop in loops.values())
+
+
+VECTOR_TANGENT = _has_vector_tangent()
+
+
+def fill_sine_and_cosine(angles: np.ndarray, sine: np.ndarray, cosine: np.ndarray, *, narrow: bool) -> None:
+    """Fill in the sines and the cosines of angles in radians, three arrays that share no memory.
+
+    `narrow` promises that no angle is beyond `NARROW` but for rounding. That is for the caller to know: looked up here,
+    it would depend on all angles what one of them has for a sine, in its last bit.
+    """
+    if narrow and not VECTOR_TANGENT:
+        np.multiply(angles, angles, out=cosine)
+        np.multiply(cosine, _SERIES[-1], out=sine)
+        for coefficient in _SERIES[-2::-1]:
+            sine += coefficient
+            sine *= cosine
+        sine += 1.0
+        sine *= angles
+        np.multiply(sine, sine, out=cosine)
+        np.subtract(1.0, cosine, out=cosine)
+        np.sqrt(cosine, out=cosine)
+        return
+    # Of t, the tangent of half the angle: 2 t / (1 + t^2) and 2 / (1 + t^2) - 1. No double is at its pole, and next to
+    # it t is 1.6e16.
+    np.multiply(angles, 0.5, out=sine)
+    np.tan(sine, out=sine)
+    np.multiply(sine, sine, out=cosine)
+    cosine += 1.0
+    np.divide(2.0, cosine, out=cosine)
+    sine *= cosine
+    cosine -= 1.0

@@ -1,0 +1,114 @@
+"""Sines and cosines, by the tangent of half the angle and by the polynomial: whichever the processor has."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from addon.motion import MODES, Poses, interpolate, trigonometry
+from addon.motion.trigonometry import NARROW, fill_sine_and_cosine
+from tests.motion.cases import random_quaternions
+
+both_ways = pytest.mark.parametrize("vector_tangent", [False, True], ids=["polynomial", "tangent"])
+
+
+def _sine_and_cosine(angles: np.ndarray, narrow: bool) -> tuple[np.ndarray, np.ndarray]:
+    sine, cosine = np.full((2, len(angles)), np.nan)
+    fill_sine_and_cosine(angles, sine, cosine, narrow=narrow)
+    return sine, cosine
+
+
+def _is_exact(angles: np.ndarray, narrow: bool) -> bool:
+    """Whether sines are the C library's to three units in the last place, and cosines to two of those of 1."""
+    sine, cosine = _sine_and_cosine(angles, narrow)
+    expected = np.array([math.sin(angle) for angle in angles])
+    return bool(
+        np.all(np.abs(sine - expected) <= 3.0 * np.spacing(np.abs(expected)))
+        and np.all(np.abs(cosine - [math.cos(angle) for angle in angles]) <= 2.0 * np.spacing(1.0))
+    )
+
+
+@both_ways
+def test_narrow_angles_have_their_sines_and_cosines_to_a_few_units_in_the_last_place(monkeypatch, vector_tangent):
+    monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
+    random = np.random.default_rng(4)
+    assert _is_exact(random.uniform(-NARROW, NARROW, size=20000), narrow=True)
+    assert _is_exact(10.0 ** random.uniform(-300.0, 0.0, size=2000), narrow=True)
+    assert _is_exact(np.array([0.0, -NARROW, NARROW, np.pi / 4.0, 5e-324]), narrow=True)
+
+
+@both_ways
+def test_wide_angles_have_them_too(monkeypatch, vector_tangent):
+    monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
+    random = np.random.default_rng(5)
+    assert _is_exact(random.uniform(-4.0 * np.pi, 4.0 * np.pi, size=20000), narrow=False)
+    assert _is_exact(random.uniform(-1e6, 1e6, size=2000), narrow=False)
+
+
+@pytest.mark.parametrize("turns", [1, -1, 3, 1001])
+def test_half_a_turn_is_no_pole(turns):
+    """There the tangent of half the angle has its own, which no double hits."""
+    angle = turns * np.pi
+    around = np.array([np.nextafter(angle, -np.inf), angle, np.nextafter(angle, np.inf)])
+    assert _is_exact(around, narrow=False)
+    sine, cosine = _sine_and_cosine(around, narrow=False)
+    assert np.all(cosine == -1.0)
+    assert np.all(sine != 0.0)
+
+
+@pytest.mark.parametrize(
+    ("current", "is_vector"),
+    [("AVX512_SKX", True), ("X86_V4", True), ("baseline(X86_V2)", False), ("baseline(NEON NEON_FP16)", False)],
+)
+def test_the_tangent_is_taken_where_numpy_has_vector_code_for_it(monkeypatch, current, is_vector):
+    def told(func_name, signature):
+        assert (func_name, signature) == ("^tan$", "float64")
+        return {"tan": {"dd": {"current": current, "available": f"{current} baseline(X86_V2)"}}}
+
+    monkeypatch.setattr(np.lib, "introspect", SimpleNamespace(opt_func_info=told), raising=False)
+    assert trigonometry._has_vector_tangent() is is_vector
+
+
+def test_without_a_word_from_numpy_the_polynomial_is_taken(monkeypatch):
+    monkeypatch.setattr(np.lib, "introspect", SimpleNamespace(opt_func_info=lambda **_: {}), raising=False)
+    assert not trigonometry._has_vector_tangent()
+    monkeypatch.delattr(np.lib, "introspect")
+    assert not trigonometry._has_vector_tangent()
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("scaled", [False, True], ids=["rigid", "scaled"])
+def test_all_processors_show_the_same_motion(monkeypatch, mode, scaled):
+    random = np.random.default_rng(6)
+    scales = np.exp(random.normal(size=30)) if scaled else None
+    keys = Poses(random.normal(size=(30, 3)), random_quaternions(random, 30), scales)
+    times = random.uniform(0.0, 29.0, size=5000)
+    shown = []
+    for vector_tangent in (False, True):
+        monkeypatch.setattr(trigonometry, "VECTOR_TANGENT", vector_tangent)
+        shown.append(interpolate(np.arange(30.0), keys, times, mode))
+    polynomial, tangent = shown
+    np.testing.assert_allclose(polynomial.positions, tangent.positions, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(polynomial.quaternions, tangent.quaternions, rtol=0.0, atol=1e-14)
+    if scaled:
+        np.testing.assert_allclose(polynomial.scales, tangent.scales, rtol=1e-13)
+
+
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "pga_slerp", "cga_slerp"])
+def test_far_outside_of_the_keys_the_turn_goes_on(mode):
+    """Three whole turns and more: psi passes pi / 2 and pi, where half of it has a tangent that jumps."""
+    half = np.radians(50.0)
+    keys = Poses(
+        [[1.0, 0.0, 0.0], [np.cos(2 * half), np.sin(2 * half), 0.5]], [[1, 0, 0, 0], [np.cos(half), 0, 0, np.sin(half)]]
+    )
+    times = np.concatenate((np.linspace(-12.0, 12.0, 4801), (np.pi / half) * np.arange(-6, 7) + 0.5))
+    shown = interpolate([0.0, 1.0], keys, times, mode, extrapolate=True)
+    zero = np.zeros_like(times)
+    turned = np.stack((np.cos(times * half), zero, zero, np.sin(times * half)), axis=1)
+    np.testing.assert_allclose(shown.quaternions, turned, rtol=0.0, atol=1e-14)
+    if mode != "lerp_slerp":
+        path = np.stack((np.cos(2.0 * times * half), np.sin(2.0 * times * half), 0.5 * times), axis=1)
+        np.testing.assert_allclose(shown.positions, path, rtol=0.0, atol=1e-13)
