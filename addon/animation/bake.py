@@ -176,9 +176,11 @@ def live_sources(transform: Transform, readings: Readings) -> list[tuple[SlotTra
 def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
     """The range from key to key that has the frames from first to last in it."""
     keys = source.key_frames
-    if source.cyclic is not None:
-        # Cycles go on from the outermost keys. Where these are no round for all channels, what is seen is baked.
-        return source.keyed_range if source.repeats else tuple(map(float, source.seen_range))
+    if source.repeats:
+        # Cycles go on from the outermost keys: what lies in between is baked as a whole.
+        return source.keyed_range
+    if source.goes_on:
+        return tuple(map(float, source.seen_range))
     if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
         raise Refused(
             f"{transform.name} has its keys from frame {keys[0]:g} to {keys[-1]:g}: none of them is in that range"
@@ -267,7 +269,6 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     for name, numbers in old.items():
         keys.foreach_get(name, numbers.ravel())
     at = old["co"][:, 0]
-    slopes = _slopes_outside(fcurve)
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
     new = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in FIELDS.items()}
     own = np.flatnonzero(~(before | behind))
@@ -289,8 +290,6 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     new["co"] = points
     for name in ("handle_left_type", "handle_right_type"):
         new[name][[0, -1]] = code_of(name, "FREE")
-    if slopes is not None:
-        _keep_slopes(new, slopes, first=not before.any(), last=not behind.any())
     keys.clear()
     keys.add(int(before.sum() + len(frames) + behind.sum()))
     for name, numbers in new.items():
@@ -299,28 +298,3 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
         fcurve.modifiers.remove(modifier)
     fcurve.update()
 
-
-def _slopes_outside(fcurve: bpy.types.FCurve) -> tuple[float, float] | None:
-    """What a channel that goes on at its slope changes by in a frame, before its keys and behind them."""
-    if fcurve.extrapolation != "LINEAR" or not fcurve.keyframe_points or fcurve.modifiers:
-        return None
-    first, last = fcurve.range()
-    return (
-        fcurve.evaluate(first) - fcurve.evaluate(first - 1.0),
-        fcurve.evaluate(last + 1.0) - fcurve.evaluate(last),
-    )
-
-
-def _keep_slopes(keys: dict[str, np.ndarray], slopes: tuple[float, float], *, first: bool, last: bool) -> None:
-    """Let the outermost keys go on at these slopes outside, by their handles; the segments inside stay straight."""
-    points, bezier, free = keys["co"], code_of("interpolation", "BEZIER"), code_of("handle_left_type", "FREE")
-    if first:
-        keys["interpolation"][0] = bezier
-        keys["handle_left"][0] = points[0] - (1.0, slopes[0])
-        keys["handle_right"][0] = points[0] + (points[1] - points[0]) / 3.0
-        keys["handle_left"][1] = points[1] - (points[1] - points[0]) / 3.0
-        for name in ("handle_left_type", "handle_right_type"):
-            keys[name][:2] = free
-    if last:
-        keys["interpolation"][-1] = bezier
-        keys["handle_right"][-1] = points[-1] + (1.0, slopes[1])

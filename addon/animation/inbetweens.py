@@ -107,6 +107,8 @@ def differences(sources: Sequence[Source]) -> list[Samples]:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
+        else:
+            _align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]
         first, differs = delta[:, starts], _range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
@@ -117,6 +119,21 @@ def differences(sources: Sequence[Source]) -> list[Samples]:
             held = _held_rows(source, changing, first[:, number])
             found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
     return [found[id(source)] for source in sources]
+
+
+def _align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
+    """Take quaternions (4, m) with that sign in which they are nearer to the one before, from each of the starts on.
+
+    On a key the difference is the same rotation as between keys, but where the channels have gone the long way round
+    not the same quaternion: straight from one to the other it would pass zero.
+    """
+    turned = np.einsum("km,km->m", quaternions[:, 1:], quaternions[:, :-1]) < 0.0
+    turned[[start - 1 for start in starts if start]] = False
+    if turned.any():
+        flips = np.concatenate(((0,), np.cumsum(turned)))
+        lengths = np.diff((*starts, quaternions.shape[1]))
+        odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
+        np.negative(quaternions, out=quaternions, where=odd)
 
 
 def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:

@@ -101,6 +101,35 @@ def expected_bases(
 
     Segments run between `keys`, by default the object's own: cycles have more.
     """
+    return matrices(*_components(obj, frames, own, keys))
+
+
+def expected_off_whole_frames(obj: bpy.types.Object, frames: Sequence[float], own: Own | None = None) -> np.ndarray:
+    """The same between whole frames, where Blender goes straight from one difference to the next.
+
+    For objects that turn by quaternions.
+    """
+    own = own or Own()
+    frames = np.asarray(frames, dtype=np.float64)
+    share = (frames - np.floor(frames))[:, None]
+    moved, turned, grown = [], [], []
+    for at in (np.floor(frames), np.ceil(frames)):
+        (location, quaternion, scale), native = _components(obj, at, own), _native(obj, at)
+        moved.append(location - native[0])
+        turned.append(multiply(quaternion, native[1] * (1.0, -1.0, -1.0, -1.0)))
+        grown.append(scale / native[2])
+    turned[1] *= np.where(np.einsum("mi,mi->m", *turned) < 0.0, -1.0, 1.0)[:, None]
+
+    def between(ends: list[np.ndarray]) -> np.ndarray:
+        return ends[0] + share * (ends[1] - ends[0])
+
+    location, quaternion, scale = _native(obj, frames)
+    return matrices(location + between(moved), multiply(between(turned), quaternion), scale * between(grown))
+
+
+def _components(
+    obj: bpy.types.Object, frames: Sequence[float], own: Own | None, keys: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     own = own or Own()
     frames = np.asarray(frames, dtype=np.float64)
     location, quaternion, scale = _native(obj, frames)
@@ -127,7 +156,7 @@ def expected_bases(
         location[inside], quaternion[inside] = poses.positions, poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
-    return matrices(location, quaternion, scale)
+    return location, quaternion, scale
 
 
 def _key_poses(obj: bpy.types.Object, frames: np.ndarray, own: Own, scaled: bool) -> Poses:
@@ -232,7 +261,7 @@ def assert_shown(
     for obj, shown in zip(objects, shown_worlds(objects, frames), strict=True):
         expected = expected_worlds(obj, frames, owns)
         size = max(1.0, np.abs(expected).max(initial=0.0), _reach(obj, frames))
-        error = np.abs(shown - expected).max(axis=(1, 2), initial=0.0) / size * _shortest_quaternion(obj, frames)
+        error = np.abs(shown - expected).max(axis=(1, 2), initial=0.0) / size * shortest_quaternion(obj, frames)
         worst = int(np.argmax(error))
         assert error[worst] < 1e-5, (
             f"{obj.name} is off by {error[worst]:.3g} of its size on frame {frames[worst]} "
@@ -247,10 +276,11 @@ def _reach(obj: bpy.types.Object, frames: Sequence[float]) -> float:
     return own if obj.parent is None else own * max(1.0, _reach(obj.parent, frames))
 
 
-def _shortest_quaternion(obj: bpy.types.Object, frames: Sequence[float]) -> np.ndarray:
+def shortest_quaternion(obj: bpy.types.Object, frames: Sequence[float]) -> np.ndarray:
+    """How long Blender's own quaternion is on each frame, the shortest of the object and its parents, at most 1."""
     values = _channels(obj, rotation_path(obj), np.asarray(frames))
     own = np.minimum(np.linalg.norm(values, axis=1), 1.0) if obj.rotation_mode == "QUATERNION" else 1.0
-    return own if obj.parent is None else own * _shortest_quaternion(obj.parent, frames)
+    return own if obj.parent is None else own * shortest_quaternion(obj.parent, frames)
 
 
 def _native(obj: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -17,21 +17,26 @@ import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from mathutils import Euler, Matrix
 
 from addon import animation
 from tests.animation.oracle import (
     MODE_IDS,
     WIDTHS,
     Own,
+    as_quaternion,
     assert_shown,
     curves_of,
     expected_bases,
+    expected_off_whole_frames,
     expected_worlds,
     key_frames,
     mode_at,
+    shortest_quaternion,
     shown_worlds,
     snapshot,
     transform_paths,
+    unit,
 )
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
 from tests.thoroughness import tried
@@ -116,6 +121,10 @@ class Editing(RuleBasedStateMachine):
         logging.getLogger("addon.animation").addHandler(self.complaints)
         self.folder = tempfile.TemporaryDirectory()
         self.owns: dict[str, Own] = {}
+        self.turned: dict[str, tuple] = {}
+        """The delta rotations of their own, as quaternions and Euler angles."""
+        self.shift = 0.0
+        self.fresh = 0
         self.before_bake: dict[str, tuple] = {}
         self.history: list[tuple] = []
         self.place = -1
@@ -133,15 +142,18 @@ class Editing(RuleBasedStateMachine):
         parented=st.booleans(),
         with_own=st.booleans(),
         mode=st.sampled_from(MODE_IDS),
+        shift=st.sampled_from((0.0, 0.0, -20.0, -60.0)),
         seed=seeds,
     )
-    def begin(self, orders, scales, parented, with_own, mode, seed):
+    def begin(self, orders, scales, parented, with_own, mode, shift, seed):
         bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, LAST
+        self.shift = shift
         parent = None
         for number, (order, scale) in enumerate(zip(orders, scales, strict=False)):
             obj = new_object(f"Tool {number}", order)
             self.owns[obj.name] = give_own_deltas(obj, seed + number) if with_own else own_deltas(obj)
-            key(obj, (1.0, 13.0, 26.0, 37.0), seed=seed + number, scale=scale)
+            self.turned[obj.name] = tuple(obj.delta_rotation_quaternion), tuple(obj.delta_rotation_euler)
+            key(obj, np.array((1.0, 13.0, 26.0, 37.0)) + shift, seed=seed + number, scale=scale)
             animation.set_mode(obj, mode)
             if parented and parent is not None:
                 obj.parent = parent
@@ -158,7 +170,8 @@ class Editing(RuleBasedStateMachine):
         self.place = 0
 
     def _remembered(self) -> tuple:
-        return {name: snapshot(bpy.data.objects[name]) for name in self.names}, dict(self.owns), dict(self.before_bake)
+        keyed = {name: snapshot(bpy.data.objects[name]) for name in self.names}
+        return keyed, dict(self.owns), dict(self.before_bake), list(self.names), dict(self.turned)
 
     def _edit(self, change: Callable[[], None], settle: Callable[[dict, dict], None] | None = None) -> None:
         """Do it, and let the handlers see it: they leave keys as the edit made them, unless `settle` says otherwise."""
@@ -220,8 +233,9 @@ class Editing(RuleBasedStateMachine):
 
         def settle(made: dict, after: dict) -> None:
             obj = bpy.data.objects[name]
+            sharing = self._sharing(name) if held else set()
             for other in self.names:
-                if other != name or not held:
+                if other not in sharing:
                     assert after[other] == made[other], f"the keys of {other} were changed"
             if held:
                 assert_only_a_key_more(made[name], after[name], frame)
@@ -252,12 +266,12 @@ class Editing(RuleBasedStateMachine):
     def pose_it_without_a_key_and_go_elsewhere(self, who, seed, frame):
         back = bpy.context.scene.frame_current
         self._pose(self._object(who), seed)
-        bpy.context.scene.frame_set(int(frame))
+        bpy.context.scene.frame_set(int(frame + self.shift))
         bpy.context.scene.frame_set(back)
 
     @rule(who=shares, frame=frames_in, seed=seeds, partly=st.booleans())
     def insert_keys_of_any_value_anywhere(self, who, frame, seed, partly):
-        name = self._object(who).name
+        name, frame = self._object(who).name, frame + self.shift
 
         def insert() -> None:
             obj = bpy.data.objects[name]
@@ -270,7 +284,7 @@ class Editing(RuleBasedStateMachine):
 
     @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans(), with_mode=st.booleans())
     def move_keys(self, who, which, to, one_channel, with_mode):
-        name = self._object(who).name
+        name, to = self._object(who).name, to + self.shift
 
         def move() -> None:
             obj = bpy.data.objects[name]
@@ -393,11 +407,14 @@ class Editing(RuleBasedStateMachine):
 
         self._edit(change)
         assert {mode_at(bpy.data.objects[name], frame) for frame in (1.0, 20.0)} == {mode}
+        assert bpy.data.objects[name].rigid_motion.mode == mode
 
     @precondition(lambda self: self.on)
     @rule(who=shares, seed=seeds)
     def change_its_own_deltas(self, who, seed):
         name = self._object(who).name
+        if len(self._sharing(name)) > 1:
+            return
         random = np.random.default_rng(seed)
         location, scale = random.normal(size=3), np.full(3, np.exp(0.3 * random.normal()))
 
@@ -415,6 +432,7 @@ class Editing(RuleBasedStateMachine):
 
     @rule(frame=frames_in)
     def go_to_a_frame(self, frame):
+        frame += self.shift
         bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
 
     @precondition(lambda self: self.on)
@@ -444,7 +462,7 @@ class Editing(RuleBasedStateMachine):
         self._is_as_remembered()
 
     def _is_as_remembered(self) -> None:
-        keyed, self.owns, self.before_bake = (dict(part) for part in self.history[self.place])
+        keyed, self.owns, self.before_bake, self.names, self.turned = (part.copy() for part in self.history[self.place])
         for name in self.names:
             assert snapshot(bpy.data.objects[name]) == keyed[name], f"the keys of {name} are not what they were"
 
@@ -452,11 +470,13 @@ class Editing(RuleBasedStateMachine):
     @rule(who=shares, step=st.sampled_from((1.0, 0.5, 3.0)), ends=st.none() | st.tuples(frames_in, frames_in))
     def bake(self, who, step, ends):
         obj = self._object(who)
+        if len(self._sharing(obj.name)) > 1:
+            return
         name, keyed, keys = obj.name, snapshot(obj), key_frames(obj)
         live = any(mode_at(obj, frame) != "BLENDER" for frame in keys[:-1])
-        first, last = sorted(ends) if ends else (None, None)
+        first, last = sorted(end + self.shift for end in ends) if ends else (None, None)
         # Between whole frames a parent's own in-betweens are not quite what they have to be.
-        every = np.arange(-2.0, LAST + 6.0, 0.5 if obj.parent is None else 1.0)
+        every = np.arange(-2.0, LAST + 6.0, 0.5 if obj.parent is None else 1.0) + self.shift
         before = expected_worlds(obj, every, self.owns)
         baked: list = []
 
@@ -523,11 +543,239 @@ class Editing(RuleBasedStateMachine):
         assert self._remembered()[0] == keyed
         self._start_history()
 
+    # Actions that go and come
+
+    def _sharing(self, name: str) -> set[str]:
+        """The objects that move by the same slot as this one, itself among them."""
+        data = bpy.data.objects[name].animation_data
+        if data is None or data.action is None:
+            return {name}
+        return {
+            other
+            for other in self.names
+            if (theirs := bpy.data.objects[other].animation_data) is not None
+            and (theirs.action, theirs.action_slot_handle) == (data.action, data.action_slot_handle)
+        }
+
+    def _is_free(self, name: str) -> bool:
+        """Whether its Action may be exchanged without losing a bake's way back, or leaving others behind."""
+        return name not in self.before_bake and self._sharing(name) == {name}
+
+    @staticmethod
+    def _linked(obj: bpy.types.Object) -> tuple:
+        data = obj.animation_data
+        return (None, None) if data is None or data.action is None else (data.action, data.action_slot)
+
+    @staticmethod
+    def _link(obj: bpy.types.Object, action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> None:
+        data = obj.animation_data_create()
+        data.action = action
+        if action is not None:
+            data.action_slot = slot
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, updated=st.booleans(), there=frames_in)
+    def unlink_the_action_and_choose_it_again(self, who, updated, there):
+        obj = self._object(who)
+        if not self._is_free(obj.name):
+            return
+        action, slot = self._linked(obj)
+        self._link(obj, None, None)
+        if updated:
+            bpy.context.view_layer.update()
+            assert not any(obj.rigid_motion.filled)
+            assert np.abs(np.subtract(obj.delta_location, self.owns[obj.name].location)).max() < 1e-6
+            bpy.context.scene.frame_set(int(there + self.shift))
+        self._link(obj, action, slot)
+        bpy.context.view_layer.update()
+
+    @precondition(lambda self: self.on and len(self.names) > 1)
+    @rule(who=shares, other=shares)
+    def swap_the_actions_of_two(self, who, other):
+        names = [self._object(share).name for share in (who, other)]
+        alike = len({bpy.data.objects[name].rotation_mode for name in names}) == 1
+        if names[0] == names[1] or not alike or not all(map(self._is_free, names)):
+            return
+
+        def swap() -> None:
+            first, second = (bpy.data.objects[name] for name in names)
+            of_first, of_second = self._linked(first), self._linked(second)
+            self._link(first, *of_second)
+            self._link(second, *of_first)
+
+        self._edit(swap)
+
+    @precondition(lambda self: self.on and len(self.names) > 1)
+    @rule(who=shares, other=shares)
+    def share_an_action_or_make_it_single_user(self, who, other):
+        name, source = (self._object(share).name for share in (who, other))
+        if len(self._sharing(name)) > 1:
+
+            def change() -> None:
+                obj = bpy.data.objects[name]
+                slot = obj.animation_data.action_slot.identifier
+                self._link(obj, obj.animation_data.action.copy(), None)
+                obj.animation_data.action_slot = obj.animation_data.action.slots[slot]
+
+        else:
+            alike = (
+                bpy.data.objects[name].rotation_mode == bpy.data.objects[source].rotation_mode
+                and self.owns[name] == self.owns[source]
+                and self._rests_alike(name, source)
+            )
+            if not alike or name in self.before_bake or source in self.before_bake:
+                return
+
+            def change() -> None:
+                self._link(bpy.data.objects[name], *self._linked(bpy.data.objects[source]))
+
+        self._edit(change)
+
+    def _rests_alike(self, name: str, source: str) -> bool:
+        """Whether two objects have the same where the source's Action keys nothing."""
+        obj, other = bpy.data.objects[name], bpy.data.objects[source]
+        keyed = {channel for channel, fcurve in curves_of(other).items() if len(fcurve.keyframe_points)}
+        return all(
+            (path, index) in keyed or getattr(obj, path)[index] == value
+            for path in transform_paths(other)[1:]
+            for index, value in enumerate(getattr(other, path))
+        )
+
+    @precondition(lambda self: self.on and len(self.names) < 4)
+    @rule(who=shares, copied=st.booleans(), seed=seeds)
+    def reuse_an_action_on_a_fresh_object(self, who, copied, seed):
+        source = self._object(who)
+        if source.name in self.before_bake or source.animation_data is None or source.animation_data.action is None:
+            return
+        name, self.fresh = f"Fresh {self.fresh}", self.fresh + 1
+        self.owns[name], self.turned[name] = Own(), ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        if self.owns[source.name] != Own() and not copied:
+            return
+        self.names.append(name)
+
+        def make() -> None:
+            obj = new_object(name, source.rotation_mode)
+            for path in transform_paths(source):
+                setattr(obj, path, getattr(source, path))
+            action, slot = self._linked(source)
+            if copied:
+                identifier = slot.identifier
+                action = action.copy()
+                slot = action.slots[identifier]
+            self._link(obj, action, slot)
+
+        self._edit(make)
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, start=st.integers(-10, 60))
+    def push_down_and_delete_the_strip(self, who, start):
+        obj = self._object(who)
+        action, slot = self._linked(obj)
+        if action is None or not self._is_free(obj.name):
+            return
+        self._link(obj, None, None)
+        track = obj.animation_data.nla_tracks.new()
+        strip = track.strips.new("Strip", start, action)
+        strip.action_slot = slot
+        bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(start + 5)
+        obj.animation_data.nla_tracks.remove(track)
+        bpy.context.view_layer.update()
+        assert not any(obj.rigid_motion.filled)
+        assert np.abs(np.subtract(obj.delta_location, self.owns[obj.name].location)).max() < 1e-6
+        self._link(obj, action, slot)
+        bpy.context.view_layer.update()
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)
+    def turn_in_another_way(self, who, order, rekeyed, seed):
+        obj = self._object(who)
+        name = obj.name
+        if not self._is_free(name):
+            return
+
+        def change() -> None:
+            obj = bpy.data.objects[name]
+            obj.rotation_mode = order
+            path = transform_paths(obj)[1]
+            keys = key_frames(obj)
+            if rekeyed and len(keys):
+                for index, values in enumerate(random_values(obj, path, len(keys), seed).T):
+                    fcurve = curves_of(obj).get((path, index)) or animation.channelbag_of(obj).fcurves.new(
+                        path, index=index
+                    )
+                    for frame, value in zip(keys, values, strict=True):
+                        fcurve.keyframe_points.insert(frame, value)
+
+        quaternion, angles = self.turned[name]
+        turned = unit(quaternion) if order == "QUATERNION" else as_quaternion(angles, order)
+        self.owns[name] = Own(self.owns[name].location, turned, self.owns[name].scale)
+        self._edit(change)
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares)
+    def rename_an_object_and_its_action(self, who):
+        old = self._object(who).name
+        if old in self.before_bake or bpy.data.objects[old].children or bpy.data.objects[old].parent:
+            return
+        new, self.fresh = f"Renamed {self.fresh}", self.fresh + 1
+        for kept in (self.owns, self.turned):
+            kept[new] = kept.pop(old)
+        self.names[self.names.index(old)] = new
+
+        def rename() -> None:
+            obj = bpy.data.objects[old]
+            obj.name = new
+            if obj.animation_data is not None and obj.animation_data.action is not None:
+                obj.animation_data.action.name = f"{new} moves"
+
+        self._edit(rename)
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, seed=seeds)
+    def set_a_matrix_and_key_it_in_one_go(self, who, seed):
+        obj, scene = self._object(who), bpy.context.scene
+        frame, name = scene.frame_current_final, obj.name
+        if obj.parent is not None or not self._holds_pose(obj, frame):
+            return
+        values = np.random.default_rng(seed).normal(size=6)
+        matrix = Matrix.LocRotScale(values[:3], Euler(values[3:]), obj.matrix_world.to_scale())
+        location, rotation, _ = transform_paths(obj)
+
+        def set_and_key() -> None:
+            obj = bpy.data.objects[name]
+            obj.matrix_world = matrix
+            for path in (location, rotation):
+                obj.keyframe_insert(path, frame=frame)
+
+        def settle(made: dict, after: dict) -> None:
+            for other in self.names:
+                if other not in self._sharing(name):
+                    assert after[other] == made[other], f"the keys of {other} were changed"
+            now = expected_bases(bpy.data.objects[name], [frame], self.owns[name])[0]
+            size = max(1.0, np.abs(matrix).max())
+            assert np.abs(now[:3, 3] - matrix.translation).max() < 2e-5 * size
+            turned = Matrix(now.tolist()).to_quaternion().rotation_difference(matrix.to_quaternion())
+            assert min(turned.angle, 2.0 * np.pi - turned.angle) < 1e-3
+
+        self._edit(set_and_key, settle)
+
+    @precondition(lambda self: not self.on)
+    @rule(who=shares)
+    def unlink_an_action_while_the_extension_is_off(self, who):
+        obj = self._object(who)
+        if self._is_free(obj.name) and obj.animation_data is not None:
+            self._link(obj, None, None)
+            bpy.context.view_layer.update()
+
     def _frames_that_are_seen(self, objects: list[bpy.types.Object]) -> range:
-        """Where curves go on outside of their keys, in-betweens do so in the frame range of the scene."""
-        if not any(map(goes_on, objects)):
-            return range(-1, LAST + 6)
-        return range(bpy.context.scene.frame_start, bpy.context.scene.frame_end + 1)
+        """Where curves go on outside of their keys, in-betweens do so from there to the frame range of the scene."""
+        first, last = int(self.shift) - 1, int(self.shift) + LAST + 5
+        for obj in filter(goes_on, objects):
+            keys = key_frames(obj)
+            first = max(first, min(bpy.context.scene.frame_start, int(np.floor(keys[0]))))
+            last = min(last, max(bpy.context.scene.frame_end, int(np.ceil(keys[-1]))))
+        return range(first, last + 1)
 
     # What holds all the time
 
@@ -540,6 +788,32 @@ class Editing(RuleBasedStateMachine):
     def everything_is_where_it_has_to_be(self):
         objects = [bpy.data.objects[name] for name in self.names]
         assert_shown(objects, self._frames_that_are_seen(objects), self.owns)
+
+    @precondition(lambda self: self.on and self.history)
+    @invariant()
+    def between_whole_frames_it_is_as_blender_has_it_from_one_to_the_next(self):
+        for name in self.names:
+            obj = bpy.data.objects[name]
+            keys = key_frames(obj)
+            if obj.parent is not None or obj.rotation_mode != "QUATERNION" or len(keys) < 2 or goes_on(obj):
+                continue
+            whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]))
+            frames = whole[:: max(1, len(whole) // 6)] + 0.25
+            if len(frames):
+                shown = shown_worlds([obj], frames)[0]
+                wanted = expected_off_whole_frames(obj, frames, self.owns[name])
+                size = max(1.0, np.abs(wanted).max(), np.abs(expected_bases(obj, whole)).max())
+                error = np.abs(shown - wanted).max(axis=(1, 2)) / size * shortest_quaternion(obj, frames)
+                assert error.max() < 1e-4, f"{name} is off by {error.max():.3g} on frame {frames[error.argmax()]}"
+
+    @precondition(lambda self: self.on and self.history)
+    @invariant()
+    def what_is_moved_by_nothing_has_its_own_delta_transforms(self):
+        for name in self.names:
+            obj = bpy.data.objects[name]
+            if obj.animation_data is None or obj.animation_data.action is None:
+                assert not any(obj.rigid_motion.filled)
+                assert np.abs(np.subtract(obj.delta_location, self.owns[name].location)).max() < 1e-6
 
     @precondition(lambda self: self.on and self.history)
     @invariant()
