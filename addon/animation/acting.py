@@ -37,6 +37,7 @@ def act_on(
     plan: Callable[[Transform, Readings], Plan],
     act: Callable[[Transform, Plan], Result],
     refused: list[Refused] | None,
+    becomes: Callable[[Source], Source] | None = None,
 ) -> dict[Transform, Result]:
     """Do something to each target.
 
@@ -49,6 +50,8 @@ def act_on(
         Does it.
     refused
         Takes the refusals; without it nothing is done where there is one, and it is raised.
+    becomes
+        What becomes of a source by it, where no F-curve of the animator's is touched: nothing is read again then.
 
     Returns
     -------
@@ -58,7 +61,8 @@ def act_on(
     transforms = transforms_of(targets)
     readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
     places = slot_transforms_of(transforms)
-    for place, sources in zip(places, sources_of_users(places), strict=True):
+    of_users = sources_of_users(places)
+    for place, sources in zip(places, of_users, strict=True):
         for user, source in zip(place.users, sources, strict=True):
             if user in readings:
                 readings[user].append((place, source))
@@ -74,5 +78,14 @@ def act_on(
         refused.extend(refusals)
     with live.paused():
         results = {transform: act(transform, planned) for transform, planned in plans}
-    live.refresh(transform for transform, _ in plans)
+    acted = {transform for transform, _ in plans}
+    if becomes is None:
+        live.refresh(acted)
+    else:
+        read = [
+            (place, [becomes(source) if isinstance(source, Source) else source for source in sources])
+            for place, sources in zip(places, of_users, strict=True)
+            if not acted.isdisjoint(place.users)
+        ]
+        live.refresh_read(read)
     return results

@@ -204,7 +204,7 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
 def _bake_place(transform: Transform, place: SlotTransform, source: Source, frames: np.ndarray) -> None:
     motion = in_betweens(source, frames)
     copy = move_by_copy(transform, place, BAKED)
-    fcurves = copy.slot.channelbag.fcurves
+    fcurves = copy.channelbag.fcurves
     cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
     for path, values in channel_values(transform, source, motion).items():
         for index, column in enumerate(values.T):
@@ -297,4 +297,3 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     for modifier in list(fcurve.modifiers):
         fcurve.modifiers.remove(modifier)
     fcurve.update()
-

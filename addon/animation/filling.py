@@ -196,12 +196,12 @@ def _write(place: SlotTransform, points: dict[Channel, np.ndarray], layout: _Lay
 
 
 def _remove(place: SlotTransform, channel: Channel) -> None:
-    place.slot.channelbag.fcurves.remove(place.curves.pop(channel))
+    place.channelbag.fcurves.remove(place.curves.pop(channel))
 
 
 def _tidy(place: SlotTransform) -> None:
     """Take out the group of the in-betweens where nothing is left in it."""
-    groups = place.slot.channelbag.groups
+    groups = place.channelbag.groups
     group = groups.get(GROUP)
     if group is not None and not group.channels:
         groups.remove(group)
@@ -210,10 +210,10 @@ def _tidy(place: SlotTransform) -> None:
 def _new(place: SlotTransform, channel: Channel, count: int) -> bpy.types.FCurve:
     """A sampled F-curve out of the animator's way: locked, and hidden in the Graph Editor."""
     path, index = channel
-    channelbag = place.slot.channelbag
+    channelbag = place.channelbag
     fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
     fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
-    fcurve.keyframe_points.insert(0.0, 0.0)
+    fcurve.keyframe_points.add(1)
     fcurve.convert_to_samples(0, count)
     fcurve.lock = fcurve.hide = True
     fcurve.select = False

@@ -20,7 +20,7 @@ from . import insertion
 from .filling import clear, fill_in, hold_originals, is_complete, restore_originals
 from .inbetweens import differences
 from .mode_property import adopt_from_properties, show_awaited, show_modes
-from .reading import differing_users, keyed_in, sources_of_users
+from .reading import differing_users, keyed_in, leading, sources_of_users
 from .records import recorded_digest
 from .refusals import refuse_numbers
 from .slots import SlotTransform, actions_of, places_of, slot_transforms_in, slot_transforms_of
@@ -91,6 +91,13 @@ def refresh(targets: Iterable[bpy.types.Object | Transform] | None = None) -> in
         return _refresh(places)
 
 
+def refresh_read(readings: Sequence[tuple[SlotTransform, list[Source | Refused]]]) -> None:
+    """Bring the in-betweens of these up to date, which are read already, as each of their users has them."""
+    with _turn() as ours:
+        if ours:
+            _refresh([place for place, _ in readings], [leading(place, sources) for place, sources in readings])
+
+
 def follow_original(transform: Transform) -> None:
     """Follow an edit of what is written down of a transform's original difference."""
     with _turn() as ours:
@@ -123,20 +130,23 @@ def problem_of(target: bpy.types.Object | Transform) -> str:
 def _refuse_differing(transform: Transform, place: SlotTransform) -> None:
     """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
     if len(place.users) > 1 and transform in (differing := differing_users(place)):
-        leading = next(user for user in place.users if user not in differing)
+        leader = next(user for user in place.users if user not in differing)
         raise Refused(
-            f"{transform.name} moves by the same Action slot as {leading.name}, but has another rotation mode or delta "
-            f"transform; the in-betweens are those of {leading.name}: give it an Action of its own "
+            f"{transform.name} moves by the same Action slot as {leader.name}, but has another rotation mode or delta "
+            f"transform; the in-betweens are those of {leader.name}: give it an Action of its own "
             "(Object > Relations > Make Single User)"
         )
 
 
-def _refresh(places: Sequence[SlotTransform]) -> int:
+def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused] | None = None) -> int:
     show_modes(places)
-    # What is linked has the in-betweens that its own file was saved with.
-    places = [place for place in places if place.slot.action.is_editable]
+    if sources is None:
+        sources = keyed_in(places)
     stale, idle = [], []
-    for place, source in zip(places, keyed_in(places), strict=True):
+    for place, source in zip(places, sources, strict=True):
+        # What is linked has the in-betweens that its own file was saved with.
+        if not place.slot.action.is_editable:
+            continue
         before = recorded_digest(place)
         _note_late_users(place)
         if not _is_wanted(place, source, before):
@@ -161,7 +171,7 @@ def _refresh(places: Sequence[SlotTransform]) -> int:
             except ValueError:
                 clear(place)
                 idle.append(place)
-    for place in (*idle, *_beside(places)):
+    for place in (*idle, *_beside([place for place in places if place.slot.action.is_editable])):
         hold_originals(place)
     return len(stale)
 

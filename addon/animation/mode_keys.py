@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import bpy
 import numpy as np
@@ -145,7 +146,8 @@ def set_mode(
 
     if mode not in MODE_NUMBERS:
         raise Refused(f"there is no mode {mode!r}; the modes are {', '.join(MODE_NUMBERS)}")
-    act_on(targets, plan, act, refused)
+    whole = None if frames is not None else partial(replace, mode=MODE_NUMBERS[mode])
+    act_on(targets, plan, act, refused, whole)
 
 
 def on_property(transform: Transform) -> None:
@@ -166,7 +168,7 @@ def set_whole(place: SlotTransform, mode: str) -> None:
     """One mode for all segments of a slot."""
     channel = place.users[0].mode_channel
     if channel in place.curves:
-        place.slot.channelbag.fcurves.remove(place.curves.pop(channel))
+        place.channelbag.fcurves.remove(place.curves.pop(channel))
     record_mode(place, MODE_NUMBERS[mode])
 
 
@@ -233,7 +235,7 @@ def _value(fcurve: bpy.types.FCurve, frame: float) -> int:
 
 def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
     path, index = channel
-    channelbag = place.slot.channelbag
+    channelbag = place.channelbag
     fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
     fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
     return fcurve

@@ -7,15 +7,11 @@ moved, the latest last: what was done last is taken back first.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 import bpy
 
 from .slots import SlotTransform, slot_transforms_of
 from .transforms import Refused, Transform
-
-if TYPE_CHECKING:
-    from .properties import ChangedAction
 
 BAKED, REDUCED = "BAKED", "REDUCED"
 """What was done to the keys."""
@@ -58,7 +54,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
     return next(copy for copy in copies if copy.slot.action == changed and copy.prefix == place.prefix)
 
 
-def entries_in_use(transform: Transform, places: Iterable[SlotTransform] | None = None) -> Iterator[ChangedAction]:
+def entries_in_use(transform: Transform, places: Iterable[SlotTransform] | None = None) -> Iterator[bpy.types.PropertyGroup]:
     """The notes on copies that something moves by, the latest first. `places` move it, where that is known already."""
     bakes = transform.motion.bakes
     if len(bakes):

@@ -47,19 +47,19 @@ def keyed_in(places: Sequence[SlotTransform]) -> list[Source | Refused]:
     Numbers and modes are as they are, which may be any in a damaged file: see `refuse_numbers`.
     """
     found = sources_of_users(places)
-    return [_leading(place, users) for place, users in zip(places, found, strict=True)]
+    return [leading(place, users) for place, users in zip(places, found, strict=True)]
 
 
 def differing_users(place: SlotTransform) -> list[Transform]:
     """The users of a slot that are moved by the in-betweens of another one, which do not fit them."""
     (found,) = sources_of_users([place])
-    leading = _leading(place, found)
-    if isinstance(leading, Refused):
+    leader = leading(place, found)
+    if isinstance(leader, Refused):
         return []
     return [
         user
         for user, source in zip(place.users, found, strict=True)
-        if isinstance(source, Refused) or source.digest != leading.digest
+        if isinstance(source, Refused) or source.digest != leader.digest
     ]
 
 
@@ -83,7 +83,7 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
     ]
 
 
-def _leading(place: SlotTransform, users: list[Source | Refused]) -> Source | Refused:
+def leading(place: SlotTransform, users: list[Source | Refused]) -> Source | Refused:
     """The source of the leading user: see `keyed_in`."""
     if len(users) == 1:
         return users[0]

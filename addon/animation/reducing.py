@@ -421,7 +421,7 @@ def _write(transform: Transform, fewer: _Fewer) -> None:
     entry = transform.motion.bakes[-1]
     entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
     entry.largest_error = fewer.largest_error
-    fcurves = copy.slot.channelbag.fcurves
+    fcurves = copy.channelbag.fcurves
     for (path, index), values in fewer.values.items():
         fcurve = copy.curves.get((path, index)) or fcurves.new(path, index=index)
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")

@@ -59,6 +59,9 @@ class SlotTransform:
     prefix: str
     """From the user to what is moved, in data paths: none for the user itself."""
 
+    channelbag: bpy.types.ActionChannelbag | None
+    """Where the F-curves of the slot are."""
+
     users: tuple[Transform, ...]
     curves: Curves
     """Its F-curves, those that in-betweens are in among them."""
@@ -80,7 +83,8 @@ class SlotTransform:
 
 def transforms_in(slot: Slot) -> list[SlotTransform]:
     """What a slot moves, transform by transform."""
-    return [SlotTransform(slot, "", tuple(map(ObjectTransform, slot.users)), curves_in(slot.channelbag))]
+    channelbag = slot.channelbag
+    return [SlotTransform(slot, "", channelbag, tuple(map(ObjectTransform, slot.users)), curves_in(channelbag))]
 
 
 def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:

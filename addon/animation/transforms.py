@@ -213,10 +213,11 @@ class ObjectTransform(Transform):
     def _noted(self) -> int:
         """The bits of the components that are written down."""
         motion = self.motion
+        if noted := motion.filled_components:
+            return noted
         # Files of a version that took all components of a delta transform, or none, have only `filled`.
-        return motion.filled_components or sum(
-            bit for (path, _), bit in _BITS.items() if motion.filled[ORIGINALS[path][1]]
-        )
+        taken = motion.filled[:]
+        return sum(bit for (path, _), bit in _BITS.items() if taken[ORIGINALS[path][1]]) if any(taken) else 0
 
     def _keep(self, noted: int) -> None:
         motion = self.motion
