@@ -20,13 +20,20 @@ import numpy as np
 
 from .curves import Cycles
 from .inbetweens import differences
+from .known_sources import changed_range, recall
 from .records import record_in_betweens, recorded_digest, recorded_rows
 from .slots import GROUP, SlotTransform, is_filled_in, is_replacing, slot_transforms_of
-from .sources import Source
+from .sources import FULL_TURN, PART_OF, ROTATION, Source
 from .transforms import ORIGINALS, Channel, Transform, default_of
 
 FARTHEST = 1_000_000
 """Frames from 0 up to which Blender can show any."""
+
+UNSEEN = 1e-9
+"""What a component varies by that has no F-curve."""
+
+SAME_ROTATION = 1e-4
+"""Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
 
 ENDLESS = 2.0**20
 """A step, in frames, that ends behind whatever Blender can show."""
@@ -93,17 +100,20 @@ class _Layout:
         return (
             len(points) == self.count
             and (points[0].co[0], points[self.count - 1].co[0]) == self.outermost
-            and [modifier.type for modifier in fcurve.modifiers] == [kind for kind, _ in self._modifiers]
-            and all(
-                getattr(modifier, name) == value
-                for modifier, (_, settings) in zip(fcurve.modifiers, self._modifiers, strict=True)
-                for name, value in settings.items()
-            )
+            and self._has_modifiers(fcurve)
+        )
+
+    def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
+        modifiers = list(fcurve.modifiers)
+        return [modifier.type for modifier in modifiers] == [kind for kind, _ in self._modifiers] and all(
+            getattr(modifier, name) == value
+            for modifier, (_, settings) in zip(modifiers, self._modifiers, strict=True)
+            for name, value in settings.items()
         )
 
     def modify(self, fcurve: bpy.types.FCurve) -> None:
         """Give an F-curve the modifiers that it needs, in place of those it has."""
-        if not (len(fcurve.modifiers) or self._modifiers):
+        if self._has_modifiers(fcurve):
             return
         for modifier in list(fcurve.modifiers):
             fcurve.modifiers.remove(modifier)
@@ -132,11 +142,19 @@ class _Layout:
 
 
 def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
-    """Compute and write the in-betweens of these."""
+    """Compute and write the in-betweens of these; of those that are there already, what has changed."""
+    changed, anew = [], []
+    for place, source in readings:
+        span = _changed_range(place, source)
+        if span is None:
+            anew.append((place, source))
+        else:
+            changed.append((place, source, span))
+    anew += _fill_in_changed(changed)
     # However far cycles are seen, one round is all that is written where it repeats.
-    rounds = [replace(source, seen=None) if source.repeats else source for _, source in readings]
+    rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
     longer = set()
-    for (place, source), samples in zip(readings, differences(rounds), strict=True):
+    for (place, source), samples in zip(anew, differences(rounds), strict=True):
         layout = _Layout.of(source)
         channels = _channels(place, source)
         _write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
@@ -144,6 +162,67 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
         if layout.outermost[0] < source.keyed_range[0] or layout.outermost[1] > source.keyed_range[1]:
             longer.add(place.slot.action)
     _limit_ranges({place.slot.action for place, _ in readings}, longer)
+
+
+def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
+    """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
+    old = recall(recorded_digest(place))
+    if old is None or old is source or _Layout.of(source).is_ring or not is_complete(place, source):
+        return None
+    return changed_range(old, source)
+
+
+def _fill_in_changed(
+    readings: Sequence[tuple[SlotTransform, Source, tuple[int, int]]],
+) -> list[tuple[SlotTransform, Source]]:
+    """Fill in a range of frames of each. Those for which that will not do are returned, and left as they are."""
+    others = []
+    found = differences([source for _, source, _ in readings], [span for *_, span in readings])
+    for (place, source, (first, last)), samples in zip(readings, found, strict=True):
+        channels, rows = _channels(place, source), recorded_rows(place)
+        begin = source.frame_range[0]
+        part = slice(2 * (first - begin) + 1, 2 * (last - begin) + 2, 2)
+        written = {}
+        for row in rows:
+            points = place.curves[channels[row]].sampled_points
+            written[row] = np.empty(2 * len(points), np.float32)
+            points.foreach_get("co", written[row])
+        values = {row: points[1::2] for row, points in samples.items()}
+        before = {row: points[part] for row, points in written.items()}
+        if not (_is_covered(values, rows) and _continue(values, before, source)):
+            others.append((place, source))
+            continue
+        for row, points in written.items():
+            points[part] = values[row]
+            place.curves[channels[row]].sampled_points.foreach_set("co", points)
+        record_in_betweens(place, source.digest, rows)
+        for user in place.users:
+            user.animated.update_tag(refresh={"TIME"})
+    return others
+
+
+def _is_covered(values: dict[int, np.ndarray], rows: Sequence[int]) -> bool:
+    """Whether there are F-curves for all components that differ in these frames."""
+    return all(row in rows or np.ptp(part) < UNSEEN for row, part in values.items()) and all(
+        row in values for row in rows
+    )
+
+
+def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], source: Source) -> bool:
+    """Have rotations go on from those on the first frame, in the sign and in the turn that they have; in place.
+
+    False where they do not arrive in those of the last frame, on from where all stays as it is.
+    """
+    rows = [row for row in before if PART_OF[row] == ROTATION]
+    if not rows:
+        return True
+    new, old = np.stack([values[row] for row in rows]), np.stack([before[row] for row in rows])
+    if source.order is None:
+        new *= -1.0 if new[:, 0] @ old[:, 0] < 0.0 else 1.0
+    else:
+        new += (FULL_TURN * np.rint((old[:, 0] - new[:, 0]) / FULL_TURN))[:, None]
+    values.update(zip(rows, new, strict=True))
+    return bool(np.abs(new[:, [0, -1]] - old[:, [0, -1]]).max() < SAME_ROTATION)
 
 
 def is_complete(place: SlotTransform, source: Source) -> bool:

@@ -87,16 +87,23 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
 
 
-def differences(sources: Sequence[Source]) -> list[Samples]:
+def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | None = None) -> list[Samples]:
     """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
     location is added, scale multiplied. Components that are the source's original ones throughout are left out.
+
+    `ranges` are the first and last frames that are wanted of each, in place of those of the source. Then no component
+    is left out that may differ elsewhere.
     """
     found = {}
-    for portion in _portions(sources):
-        of_range = {span: np.arange(span[0], span[1] + 1.0) for span in {source.frame_range for source in portion}}
-        frames = [of_range[source.frame_range] for source in portion]
+    range_of = {id(source): source.frame_range for source in sources}
+    if ranges is not None:
+        range_of = {id(source): span for source, span in zip(sources, ranges, strict=True)}
+    for portion in _portions(sources, range_of):
+        spans = [range_of[id(source)] for source in portion]
+        of_range = {span: np.arange(span[0], span[1] + 1.0) for span in set(spans)}
+        frames = [of_range[span] for span in spans]
         samples = _each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, _height(portion), samples[-1][1].stop))
@@ -115,7 +122,7 @@ def differences(sources: Sequence[Source]) -> list[Samples]:
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
         for number, (source, place) in enumerate(samples):
-            changing = {row for row in source.filled_rows if differs[row, number]}
+            changing = {row for row in source.filled_rows if differs[row, number] or ranges is not None}
             held = _held_rows(source, changing, first[:, number])
             found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
     return [found[id(source)] for source in sources]
@@ -160,7 +167,7 @@ def _range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
     return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)
 
 
-def _portions(sources: Sequence[Source]) -> Iterator[list[Source]]:
+def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -> Iterator[list[Source]]:
     """The sources in lists of about `AT_ONCE` samples, those apart that scale evenly or turn otherwise."""
     alike: dict[tuple, list[Source]] = {}
     for source in sources:
@@ -169,7 +176,8 @@ def _portions(sources: Sequence[Source]) -> Iterator[list[Source]]:
         portion, samples = [], 0
         for source in kin:
             portion.append(source)
-            samples += source.frame_range[1] - source.frame_range[0] + 1
+            first, last = range_of[id(source)]
+            samples += last - first + 1
             if samples >= AT_ONCE:
                 yield portion
                 portion, samples = [], 0

@@ -26,12 +26,10 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
+from .known_sources import recall
 from .slots import SlotTransform
 from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, SCALE, Source
 from .transforms import Transform
-
-MOST_BYTES = 32 * 2**20
-"""Of sources that are kept for comparison: hundreds of undo steps of an ordinary file."""
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -54,38 +52,13 @@ class _Posed:
     """Whether the pose is that with the difference on top."""
 
 
-class _Sources(OrderedDict[str, Source]):
-    """By their digests, those used last behind the others; what is too much in bytes is dropped."""
-
-    size = 0
-
-    def keep(self, source: Source) -> None:
-        self.drop(source.digest)
-        self[source.digest] = source
-        self.size += _size(source)
-        while self.size > MOST_BYTES and len(self) > 1:
-            self.drop(next(iter(self)))
-
-    def drop(self, digest: str) -> None:
-        if (source := self.pop(digest, None)) is not None:
-            self.size -= _size(source)
-
-
-_sources = _Sources()
 _posed: dict[tuple[int, str], _Posed] = {}
 _inserted: OrderedDict[tuple[str, str], np.ndarray] = OrderedDict()
 """What undo and redo bring back is decided as it was: the components on the screen, by the digests before and after."""
 
 
-def remember(source: Source) -> None:
-    """Keep what a slot is filled in from, by its digest."""
-    _sources.keep(source)
-
-
 def forget_file() -> None:
     """Forget all of a file that is no longer open."""
-    _sources.clear()
-    _sources.size = 0
     _posed.clear()
     _inserted.clear()
 
@@ -134,7 +107,7 @@ def keep_pose(place: SlotTransform, before: str, source: Source, frame: float, *
     bool
         Whether there was such a key.
     """
-    old = _sources.get(before)
+    old = recall(before)
     if old is None or source.key_count <= old.key_count or old.order != source.order:
         return False
     users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
@@ -163,16 +136,6 @@ def keep_pose(place: SlotTransform, before: str, source: Source, frame: float, *
 
 def _identity(transform: Transform) -> tuple[int, str]:
     return transform.animated.session_uid, transform.prefix
-
-
-def _size(source: Source) -> int:
-    """About how many bytes a source has."""
-    arrays = (
-        array
-        for keys in source.curves
-        for array in (keys.points, keys.interpolation, keys.left, keys.right, keys.easing, keys.easing_settings)
-    )
-    return sum(array.nbytes for array in arrays if array is not None)
 
 
 def _is_inserted(old: Source, new: Source, frame: float) -> bool:

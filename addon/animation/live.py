@@ -16,7 +16,7 @@ from typing import ClassVar
 import bpy
 from bpy.app.handlers import persistent
 
-from . import insertion
+from . import insertion, known_sources
 from .filling import clear, fill_in, hold_originals, is_complete, restore_originals
 from .inbetweens import differences
 from .mode_property import adopt_from_properties, show_awaited, show_modes
@@ -219,7 +219,7 @@ def _is_wanted(place: SlotTransform, source: Source | Refused, before: str) -> b
             return False
         if not source.is_live:
             return False
-    insertion.remember(source)
+    known_sources.remember(source)
     return True
 
 
@@ -398,6 +398,7 @@ def _on_file(*_: object) -> None:
 @_careful
 def _on_load(*arguments: object) -> None:
     insertion.forget_file()
+    known_sources.forget_all()
     _State.graphs.clear()
     with _turn() as ours:
         if ours:

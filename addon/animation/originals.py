@@ -54,7 +54,9 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
     return next(copy for copy in copies if copy.slot.action == changed and copy.prefix == place.prefix)
 
 
-def entries_in_use(transform: Transform, places: Iterable[SlotTransform] | None = None) -> Iterator[bpy.types.PropertyGroup]:
+def entries_in_use(
+    transform: Transform, places: Iterable[SlotTransform] | None = None
+) -> Iterator[bpy.types.PropertyGroup]:
     """The notes on copies that something moves by, the latest first. `places` move it, where that is known already."""
     bakes = transform.motion.bakes
     if len(bakes):

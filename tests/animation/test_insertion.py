@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
-from addon.animation import insertion, key_frames, set_mode
+from addon.animation import key_frames, set_mode
+from addon.animation.known_sources import MOST_BYTES, known, size_of
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object
 
@@ -184,8 +185,8 @@ def test_sources_that_are_kept_for_comparison_are_few_bytes_and_go_with_the_file
     for value in range(60):
         fcurve.keyframe_points[10].co_ui.y = value
         bpy.context.view_layer.update()
-    assert 0 < insertion._sources.size <= insertion.MOST_BYTES
-    assert insertion._sources.size == sum(map(insertion._size, insertion._sources.values()))
+    assert 0 < known.size <= MOST_BYTES
+    assert known.size == sum(map(size_of, known.values()))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert not insertion._sources
-    assert insertion._sources.size == 0
+    assert not known
+    assert known.size == 0

@@ -91,4 +91,3 @@ def test_the_numbers_of_modes_in_files_stay_what_they_are(live_file):
     }
     assert set(numbers) == set(MODE_IDS)
     assert all(MODES[name].number == number for name, number in numbers.items() if number)
-

@@ -1,0 +1,147 @@
+"""The sources that slots were filled in from last, for as long as there is room: they tell what an edit has changed.
+
+They are kept by their digests, which the Actions keep too, so that undo and redo find them again.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+
+import numpy as np
+
+from .curves import Keys
+from .sources import Source
+
+MOST_BYTES = 32 * 2**20
+"""Hundreds of undo steps of an ordinary file."""
+
+
+class _Sources(OrderedDict[str, Source]):
+    """Those used last come last; what is too much in bytes is dropped."""
+
+    size = 0
+
+    def drop(self, digest: str) -> None:
+        if (source := self.pop(digest, None)) is not None:
+            self.size -= size_of(source)
+
+
+known = _Sources()
+
+
+def remember(source: Source) -> None:
+    """Keep a source; those that were not used for longest go where there is no room."""
+    known.drop(source.digest)
+    known[source.digest] = source
+    known.size += size_of(source)
+    while known.size > MOST_BYTES and len(known) > 1:
+        known.drop(next(iter(known)))
+
+
+def recall(digest: str) -> Source | None:
+    """The source with this digest, None where it is not known any more."""
+    return known.get(digest)
+
+
+def forget_all() -> None:
+    """Forget the sources of a file that is no longer open."""
+    known.clear()
+    known.size = 0
+
+
+def size_of(source: Source) -> int:
+    """About how many bytes a source has."""
+    return sum(array.nbytes for keys in source.curves for array in _arrays(keys).values())
+
+
+def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
+    """The whole frames on which in-betweens may have changed from one source to the next, of the same transform.
+
+    None where it may be all of them.
+    """
+    alike = (
+        (old.order, old.keyed, old.in_nla, old.frame_range, old.uniform_scale)
+        == (new.order, new.keyed, new.in_nla, new.frame_range, new.uniform_scale)
+        and not (old.goes_on or new.goes_on)
+        and {row: value for row, value in old.rest.items() if row >= 3}
+        == {row: value for row, value in new.rest.items() if row >= 3}
+        and np.array_equal(old.original, new.original)
+        and _mode_bytes(old) == _mode_bytes(new)
+        and [rows for rows, _ in old.channels] == [rows for rows, _ in new.channels]
+    )
+    if not alike:
+        return None
+    ranges = [_changed(one, other) for one, other in zip(old.curves, new.curves, strict=True)]
+    if None in ranges:
+        return None
+    first, last = min(first for first, _ in ranges), max(last for _, last in ranges)
+    if first > last:
+        return None
+    # Progress is what all channels make of it together, from key to key of any of them; smooth modes look one key on.
+    margin = 1 if new.is_smooth else 0
+    ends = []
+    for source in (old, new):
+        keys = source.key_frames
+        before = np.searchsorted(keys, first, side="right") - 1 - margin
+        behind = np.searchsorted(keys, last) + margin
+        ends.append((keys[max(before, 0)], keys[min(behind, len(keys) - 1)]))
+    begin, end = new.frame_range
+    return (
+        max(begin, int(np.floor(min(first for first, _ in ends)))),
+        min(end, int(np.ceil(max(last for _, last in ends)))),
+    )
+
+
+def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
+    """From which frame on and up to which channels may have changed.
+
+    These are the nearest keys before and behind that are the same; (inf, -inf) where all are, None where there is no
+    telling.
+    """
+    before, after = _arrays(old), _arrays(new)
+    if before.keys() != after.keys() or len(old.points) != len(new.points):
+        return None
+    if len(old.times) == len(new.times):
+        differing = np.flatnonzero(_differ(before, after))
+        if not len(differing):
+            return np.inf, -np.inf
+        leading, trailing = int(differing[0]), len(new.times) - 1 - int(differing[-1])
+    else:
+        count = min(len(old.times), len(new.times))
+        first, last = slice(0, count), slice(-count, None)
+        from_start = _differ(*({n: _part(n, a, first) for n, a in arrays.items()} for arrays in (before, after)))
+        from_end = _differ(*({n: _part(n, a, last) for n, a in arrays.items()} for arrays in (before, after)))[::-1]
+        leading = int(np.argmax(from_start)) if from_start.any() else count
+        trailing = min(int(np.argmax(from_end)) if from_end.any() else count, count - leading)
+    return (
+        float(new.times[leading - 1]) if leading else -np.inf,
+        float(new.times[len(new.times) - trailing]) if trailing else np.inf,
+    )
+
+
+def _differ(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> np.ndarray:
+    """Which of the keys differ in anything, shape (n,), where there are equally many."""
+    return np.logical_or.reduce([(before[name] != after[name]).any(axis=_OTHER_AXES[name]) for name in before])
+
+
+def _part(name: str, array: np.ndarray, part: slice) -> np.ndarray:
+    """An array with these of the keys."""
+    return array[:, :, part] if name == "easing_settings" else array[:, part]
+
+
+_OTHER_AXES = {
+    **dict.fromkeys(("points", "left", "right"), (0, 2)),
+    **dict.fromkeys(("interpolation", "easing"), (0,)),
+    "easing_settings": (0, 1),
+}
+"""The arrays of `Keys`, and along which of their axes there is something else than keys."""
+
+
+def _arrays(keys: Keys) -> dict[str, np.ndarray]:
+    """The arrays that keys are made of."""
+    arrays = {name: getattr(keys, name) for name in _OTHER_AXES}
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _mode_bytes(source: Source) -> bytes | int:
+    return source.mode.raw if isinstance(source.mode, Keys) else source.mode
