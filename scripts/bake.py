@@ -14,7 +14,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -41,7 +41,9 @@ from addon import animation
 from addon.animation import Refused
 from addon.animation.mode_keys import segment_modes
 from addon.animation.reading import read
-from addon.animation.slots import MODE_PATH, Curves, curves_in, slots_of
+from addon.animation.records import recorded_mode
+from addon.animation.slots import SlotTransform, slot_transforms_of
+from addon.animation.transforms import transform_of
 from addon.motion import KEYFRAME_MODES
 from scripts.blend_files import (
     HERE,
@@ -57,7 +59,6 @@ from scripts.blend_files import (
     write_file,
 )
 from scripts.command_line import number, own_arguments
-from scripts.extreme_keys import extreme_key
 from scripts.progress import Progress
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -362,7 +363,7 @@ class _Run:
 def _baking(step: float, first: float | None, last: float | None) -> Action:
     def bake(obj: bpy.types.Object) -> str:
         if problem := animation.problem_of(obj):
-            raise Refused(extreme_key(obj) or problem)
+            raise Refused(problem)
         modes = _labels(obj)
         begin, end = animation.bake(obj, step=step, first=first, last=last)
         return f", frames {begin:g} to {end:g}, {', '.join(modes)}"
@@ -380,28 +381,27 @@ def _unbaking() -> Action:
 
 def has_rigid_segments(obj: bpy.types.Object) -> bool:
     """Whether an object is to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
-    for slot in slots_of([obj]):
-        curves = curves_in(slot.channelbag)
+    for place in slot_transforms_of([transform_of(obj)]):
         try:
-            if read(slot, curves).is_live:
+            if read(place).is_live:
                 return True
         except ValueError:
-            if segment_modes(slot) and _has_mode(obj, curves):
+            if segment_modes(place) and _has_mode(place):
                 return True
     return False
 
 
-def _has_mode(obj: bpy.types.Object, curves: Curves) -> bool:
-    """Whether an object has any mode but Blender's own in a slot, also one that this version does not know."""
-    channel = curves.get((MODE_PATH, 0))
+def _has_mode(place: SlotTransform) -> bool:
+    """Whether there is any mode but Blender's own in a slot, also one that this version does not know."""
+    channel = place.curves.get(place.users[0].mode_channel)
     if channel is None or channel.mute or not len(channel.keyframe_points):
-        return obj.rigid_motion.mode != "BLENDER"
+        return recorded_mode(place) != 0
     return any(not abs(key.co.y) < 0.5 for key in channel.keyframe_points)
 
 
 def _labels(obj: bpy.types.Object) -> list[str]:
     """The modes of an object's segments as Blender's menus show them, each once."""
-    modes = dict.fromkeys(mode for slot in slots_of([obj]) for mode in segment_modes(replace(slot, users=(obj,))))
+    modes = dict.fromkeys(mode for place in slot_transforms_of([transform_of(obj)]) for mode in segment_modes(place))
     return [KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in modes]
 
 

@@ -7,7 +7,7 @@ import math
 import bpy
 import numpy as np
 
-from .curves import Keys
+from .curves import LARGEST, Keys
 from .slots import GROUP, SlotTransform, is_filled_in
 from .sources import MODE_NAMES, UNKNOWN, Source
 from .transforms import Refused, Transform
@@ -115,11 +115,17 @@ def _explain_numbers(name: str, source: Source) -> None:
             raise Refused(f"{name}: {label(row)} is not a finite number: set it anew (sidebar, Item)")
     for rows, keys in source.channels:
         for part, numbers in _numbers(keys).items():
-            if not np.isfinite(numbers).all():
-                channel, key = np.argwhere(~np.isfinite(numbers))[0, :2].tolist()
+            # What is no number is not smaller, either.
+            unusable = np.argwhere(~(np.abs(numbers) < LARGEST))
+            if len(unusable):
+                channel, key, *axis = unusable[0].tolist()
+                number = numbers[tuple(unusable[0])]
+                what = "is not a finite number"
+                if math.isfinite(number):
+                    quantity = "setting" if part.startswith("easing") else ("frame", "value")[axis[0]]
+                    what = f"has the {quantity} {number:g}, which no motion can be computed from"
                 raise Refused(
-                    f"{name}: {part}key {key + 1} of {label(rows[channel])} is not a finite number: "
-                    "delete it (Dope Sheet, X)"
+                    f"{name}: {part}key {key + 1} of {label(rows[channel])} {what}: delete it (Dope Sheet, X)"
                 )
         if np.any(np.diff(keys.times) < 0.0):
             raise Refused(

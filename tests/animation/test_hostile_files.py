@@ -166,7 +166,10 @@ REFUSED |= {
     "a period that is no number": (easing_setting("period", "ELASTIC", INF), "easing of key 2 .* not a finite number"),
     "a last key far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 3), "delete the keys that are far off"),
     "a first key far back": (numbers(LOCATION_Y, "co.x", -1e9, 0), "delete the keys that are far off"),
-    "a last key at the end of numbers": (numbers(LOCATION_Y, "co.x", LARGEST, 3), "delete the keys that are far off"),
+    "a last key at the end of numbers": (
+        numbers(LOCATION_Y, "co.x", LARGEST, 3),
+        "key 4 of Location Y has the frame 3.4.*no motion can be computed from: delete it",
+    ),
     "a key in the middle far ahead": (numbers(LOCATION_Y, "co.x", 1e9, 1), "Location Y are not in the order"),
     "keys out of order": (numbers(LOCATION_Y, "co.x", 30.0, 1), "Location Y are not in the order"),
     "keys out of order everywhere": (
@@ -175,7 +178,7 @@ REFUSED |= {
     ),
     "values at the end of numbers": (
         each(numbers(LOCATION_Y, "co.y", LARGEST, 0, 2), numbers(LOCATION_Y, "co.y", -LARGEST, 1, 3)),
-        "too large",
+        "key 1 of Location Y has the value 3.4.*no motion can be computed from: delete it",
     ),
 }
 REFUSED |= {

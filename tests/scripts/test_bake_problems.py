@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import os
+import re
 import resource
 import shutil
 import signal
@@ -259,10 +260,13 @@ def set_key(channel: tuple[str, int], number: int, **values: float) -> Callable[
     [
         (set_key(("location", 1), 3, co_y=math.inf), "key 3 of Location Y has the value 3.4"),
         (set_key(("location", 0), 1, co_y=-math.inf), "key 1 of Location X has the value -3.4"),
-        (set_key(("rotation_quaternion", 0), 2, co_y=math.nan), "key 2 of Rotation W has the value nan"),
+        (set_key(("rotation_quaternion", 0), 2, co_y=math.nan), "key 2 of Rotation W is not a finite number"),
         (set_key(("location", 2), 4, co_x=math.inf), "key 4 of Location Z has the frame 3.4"),
-        (set_key(("location", 2), 3, co_x=math.nan), "key 3 of Location Z has the frame nan"),
-        (set_key(("location", 1), 2, handle_right_y=math.nan), "right handle of key 2 of Location Y has the value nan"),
+        (set_key(("location", 2), 3, co_x=math.nan), "key 3 of Location Z is not a finite number"),
+        (
+            set_key(("location", 1), 2, handle_right_y=math.nan),
+            "right handle of key 2 of Location Y is not a finite number",
+        ),
     ],
 )
 def test_an_infinite_key_is_named_with_its_object_its_channel_and_the_way_out(tmp_path, capsys, edit, told):
@@ -275,7 +279,9 @@ def test_an_infinite_key_is_named_with_its_object_its_channel_and_the_way_out(tm
     assert run(path) == 1
     (line,) = (line for line in capsys.readouterr().err.splitlines() if "Tool" in line)
     assert line.startswith(f"{path}: Tool: not baked: {told}")
-    assert line.endswith(", which no motion can be computed from: delete it (Dope Sheet, X)")
+    assert re.search(
+        "(is not a finite number|, which no motion can be computed from): delete it .Dope Sheet, X.$", line
+    )
     assert not baked_name(path).exists()
 
 

@@ -22,7 +22,7 @@ For 100 objects of 7 channels with 10 Bezier keys each, on 1000 frames (Blender 
 
 from .cycles import cycled, cyclic_times
 from .evaluation import evaluate
-from .keys import BEZIER, CODE, CONSTANT, EASINGS, ELASTIC, INTERPOLATIONS, LINEAR, Cycles, Keys
+from .keys import BEZIER, CODE, CONSTANT, EASINGS, ELASTIC, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
 from .reading import read_keys
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "EASINGS",
     "ELASTIC",
     "INTERPOLATIONS",
+    "LARGEST",
     "LINEAR",
     "Cycles",
     "Keys",

@@ -32,6 +32,9 @@ CODE = np.uint8
 KEY_TOLERANCE = float(np.float32(1e-4))
 """Frames from a key within which Blender takes its value."""
 
+LARGEST = 1e30
+"""Frames and values from here on are damage. An infinite one that is typed, or set by a script, becomes 3.4e38."""
+
 
 @dataclass(frozen=True)
 class Cycles:
@@ -75,7 +78,7 @@ class Keys:
     cycles: Cycles | None = None
 
     is_sound: bool = True
-    """Whether all numbers that were read are finite, and the keys in the order of their frames."""
+    """Whether all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
 
     @cached_property
     def times(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import bpy
 import numpy as np
 
-from .keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LINEAR, Cycles, Keys
+from .keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
 
 
 def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
@@ -68,7 +68,8 @@ def _read_batch(
     _replace_unknown(easing, EASINGS, AUTO)
     settings = [_read_property(name, channels, np.float32, rows=rows) for name in ("back", "amplitude", "period")]
     numbers = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
-    sound = ~any_in_group(~np.isfinite(numbers)) & ~any_in_group(~(points[:, 1:, 0] >= points[:, :-1, 0]))
+    # What is no number is not smaller, either.
+    sound = ~any_in_group(~(np.abs(numbers) < LARGEST)) & ~any_in_group(~(points[:, 1:, 0] >= points[:, :-1, 0]))
     slices = itertools.starmap(slice, itertools.pairwise(bounds))
     for number, (rows, at) in enumerate(zip(groups, slices, strict=True)):
         handles = (left[at], right[at]) if curved[number] else (None, None)
