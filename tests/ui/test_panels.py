@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from addon.animation import bake, set_enabled, set_mode, unbake
-from addon.ui.panels import facts_and_notes
+from addon.ui.notes import facts_and_notes
 from addon.ui.wording import BAKED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
@@ -17,7 +17,8 @@ IN_THE_FIRST_SEGMENT = 5.0
 
 
 def told(obj, frame=IN_THE_FIRST_SEGMENT):
-    """What the panel says, and the mode of the segment it shows."""
+    """What the panel says on a frame, and the mode of the segment it shows."""
+    bpy.context.scene.frame_set(int(frame))
     segment, notes = facts_and_notes(obj, frame)
     return [text for _, text in notes], segment and segment.mode
 

@@ -1,0 +1,68 @@
+"""The transform that is seen on the screen, as properties to be drawn by a panel: in the scene's units, and read-only.
+
+Where in-betweens are in the delta transforms, the Item tab has Blender's own values, and the object stands elsewhere.
+"""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import FloatVectorProperty, PointerProperty
+
+from ..animation.describing import shown_components
+from ..animation.sources import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..animation.transforms import Refused
+from .targets import active_target
+
+
+def _components(part: slice) -> list[float]:
+    """Some of the ten components of the active target as it is seen; it is asked for as it is drawn."""
+    target = active_target(bpy.context)
+    try:
+        shown = None if target is None else shown_components(target)
+    except Refused:
+        shown = None
+    return (REST if shown is None else shown)[part].tolist()
+
+
+class ShownTransform(bpy.types.PropertyGroup):
+    """Of the active target of the context. Nothing of it is stored."""
+
+    location: FloatVectorProperty(
+        name="Location",
+        description="Where the object is seen on this frame: its location with the in-betweens",
+        subtype="TRANSLATION",
+        precision=5,
+        get=lambda _: _components(ROWS[LOCATION]),
+    )
+    rotation_quaternion: FloatVectorProperty(
+        name="Rotation",
+        description="How the object is seen turned on this frame: its rotation with the in-betweens",
+        size=4,
+        subtype="QUATERNION",
+        precision=5,
+        get=lambda _: _components(ROWS[ROTATION]),
+    )
+    rotation_euler: FloatVectorProperty(
+        name="Rotation",
+        description="How the object is seen turned on this frame: its rotation with the in-betweens",
+        subtype="EULER",
+        precision=5,
+        get=lambda _: _components(slice(3, 6)),
+    )
+    scale: FloatVectorProperty(
+        name="Scale",
+        description="How large the object is seen on this frame: its scale with the in-betweens",
+        subtype="XYZ",
+        precision=3,
+        get=lambda _: _components(ROWS[SCALE]),
+    )
+
+
+def register() -> None:
+    bpy.utils.register_class(ShownTransform)
+    bpy.types.WindowManager.rigid_motion_shown = PointerProperty(type=ShownTransform)
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.rigid_motion_shown
+    bpy.utils.unregister_class(ShownTransform)
