@@ -24,6 +24,25 @@ def _components(part: slice) -> list[float]:
     return (REST if shown is None else shown)[part].tolist()
 
 
+# Blender holds no reference of its own to these: unnamed ones would be gone by the time that it asks.
+
+
+def _location(_: ShownTransform) -> list[float]:
+    return _components(ROWS[LOCATION])
+
+
+def _quaternion(_: ShownTransform) -> list[float]:
+    return _components(ROWS[ROTATION])
+
+
+def _euler(_: ShownTransform) -> list[float]:
+    return _components(slice(3, 6))
+
+
+def _scale(_: ShownTransform) -> list[float]:
+    return _components(ROWS[SCALE])
+
+
 class ShownTransform(bpy.types.PropertyGroup):
     """Of the active target of the context. Nothing of it is stored."""
 
@@ -32,7 +51,7 @@ class ShownTransform(bpy.types.PropertyGroup):
         description="Where the object is seen on this frame: its location with the in-betweens",
         subtype="TRANSLATION",
         precision=5,
-        get=lambda _: _components(ROWS[LOCATION]),
+        get=_location,
     )
     rotation_quaternion: FloatVectorProperty(
         name="Rotation",
@@ -40,21 +59,21 @@ class ShownTransform(bpy.types.PropertyGroup):
         size=4,
         subtype="QUATERNION",
         precision=5,
-        get=lambda _: _components(ROWS[ROTATION]),
+        get=_quaternion,
     )
     rotation_euler: FloatVectorProperty(
         name="Rotation",
         description="How the object is seen turned on this frame: its rotation with the in-betweens",
         subtype="EULER",
         precision=5,
-        get=lambda _: _components(slice(3, 6)),
+        get=_euler,
     )
     scale: FloatVectorProperty(
         name="Scale",
         description="How large the object is seen on this frame: its scale with the in-betweens",
         subtype="XYZ",
         precision=3,
-        get=lambda _: _components(ROWS[SCALE]),
+        get=_scale,
     )
 
 

@@ -1,4 +1,4 @@
-"""The words of the interface: names of modes, notes on a segment, summaries of what was done, lines that fit a panel."""
+"""The words of the interface: names of modes, notes on a segment, summaries, lines that fit a panel."""
 
 from __future__ import annotations
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 
 import bpy
+import numpy as np
 import pytest
+from mathutils import Euler, Matrix, Quaternion, Vector
 
 from addon.animation import bake, set_enabled, set_mode, unbake
 from addon.ui.notes import facts_and_notes
-from addon.ui.wording import BAKED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS
+from addon.ui.wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS
 from tests.animation.oracle import curves_of
-from tests.animation.scenes import new_object
+from tests.animation.scenes import give_own_deltas, key, new_object
+from tests.ui.conftest import keyed
 
 IN_THE_FIRST_SEGMENT = 5.0
 
@@ -79,3 +82,82 @@ def test_an_object_that_strips_move_has_its_keys_in_there(tool):
     tool.animation_data.action = None
     tool.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
     assert told(tool) == ([STRIPS], None)
+
+
+def on_screen(obj):
+    """Where an object would be seen with its own delta transforms alone, if it had the values of the panel."""
+    seen, turned = bpy.context.window_manager.rigid_motion_shown, obj.rotation_mode
+    rotation = Quaternion(seen.rotation_quaternion) if turned == "QUATERNION" else Euler(seen.rotation_euler, turned)
+    return Matrix.LocRotScale(Vector(seen.location), rotation, Vector(seen.scale))
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ", "ZXY"])
+@pytest.mark.parametrize("mode", ["dq_sclerp", "cga_slerp"])
+@pytest.mark.parametrize("own_deltas", [False, True])
+def test_the_transform_on_screen_is_what_the_object_looks_like(extension, order, mode, own_deltas):
+    obj = key(new_object(rotation_mode=order), scale="even")
+    bpy.context.view_layer.objects.active = obj
+    own = give_own_deltas(obj) if own_deltas else None
+    set_mode(obj, mode)
+    for frame in (1, 6, 17, 40, 60):
+        bpy.context.scene.frame_set(frame)
+        shown = np.array(on_screen(obj))
+        if own is not None:
+            turned = Quaternion(own.rotation).to_matrix().to_4x4() @ Matrix(shown).to_3x3().to_4x4()
+            shown[:3, :3] = np.array(turned)[:3, :3] * np.array(own.scale)
+            shown[:3, 3] += own.location
+        assert shown == pytest.approx(np.array(obj.matrix_basis), abs=1e-5), frame
+
+
+def test_the_transform_on_screen_is_that_of_the_keys_where_there_are_no_in_betweens(tool):
+    bpy.context.scene.frame_set(6)
+    shown = bpy.context.window_manager.rigid_motion_shown
+    set_mode(tool, "dq_sclerp")
+    bpy.context.scene.frame_set(11)
+    assert tuple(shown.location) == pytest.approx(tuple(tool.location))
+    assert tuple(shown.rotation_quaternion) == pytest.approx(tuple(tool.rotation_quaternion))
+
+
+def test_euler_angles_on_screen_are_those_next_to_the_keyed_ones(extension):
+    obj = keyed("Tool", "XYZ")
+    obj.delta_rotation_euler = (0.0, 0.0, 2.0)
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(36)
+    assert obj.rotation_euler.z > math.pi
+    assert bpy.context.window_manager.rigid_motion_shown.rotation_euler[2] == pytest.approx(
+        obj.rotation_euler.z, abs=0.5
+    )
+
+
+def test_the_transform_on_screen_is_for_looking_at(tool):
+    set_mode(tool, "dq_sclerp")
+    with pytest.raises(AttributeError, match="read-only"):
+        bpy.context.window_manager.rigid_motion_shown.location = (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize("clear", ["location_clear", "rotation_clear"])
+def test_a_cleared_delta_transform_that_comes_back_is_no_surprise(tool, clear):
+    tool.delta_location, tool.delta_rotation_quaternion = (1.0, 2.0, 3.0), (0.8, 0.6, 0.0, 0.0)
+    set_mode(tool, "dq_sclerp")
+    assert told(tool) == ([], "dq_sclerp")
+    getattr(bpy.ops.object, clear)(clear_delta=True)
+    bpy.context.view_layer.update()
+    notes = [text for _, text in facts_and_notes(tool, IN_THE_FIRST_SEGMENT)[1]]
+    assert notes == [DELTA_EDITED]
+    assert told(tool, 6.0) == ([], "dq_sclerp")
+
+
+def test_a_second_user_of_a_slot_that_differs_has_a_note_until_the_two_are_alike(tool):
+    other = new_object("Other")
+    data = other.animation_data_create()
+    data.action, data.action_slot = tool.animation_data.action, tool.animation_data.action_slot
+    set_mode(tool, "dq_sclerp")
+    assert told(other) == ([], "dq_sclerp")
+    tool.rigid_motion.own_location = (0.0, 0.0, 1.0)
+    bpy.context.view_layer.update()
+    differing = other if told(tool)[0] == [] else tool
+    (text,), _ = told(differing)
+    assert "Make Single User" in text
+    differing.rigid_motion.own_location = (0.0, 0.0, 1.0 if differing is other else 0.0)
+    bpy.context.view_layer.update()
+    assert told(tool) == told(other) == ([], "dq_sclerp")
