@@ -17,7 +17,7 @@ from .mode_keys import active_place
 from .records import recorded_digest, recorded_mode
 from .slots import places_of
 from .sources import LOCATION, MODE_NAMES, ROTATION, ROWS, SAME_FRAME, SCALE, Source
-from .transforms import WIDTHS, Channel, Transform, transform_of
+from .transforms import WIDTHS, Transform, transform_of
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -149,10 +149,9 @@ def shown_components(transform: Transform) -> np.ndarray | None:
     Refused
         Where it turns by axis and angle.
     """
-    filled = _filled(transform)
-    if not filled:
+    if not any(place.filled for place in places_of(transform)):
         return None
-    shown, original, added = transform.components(), transform.original(filled), np.zeros(10)
+    shown, original, added = transform.components(), transform.original(), np.zeros(10)
     for row, (path, index) in transform.differences.items():
         added[row] = transform.animated.path_resolve(path)[index]
     location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
@@ -185,11 +184,6 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
         for (path, index), fcurve in place.filled.items()
         if not fcurve.mute
     )
-
-
-def _filled(transform: Transform) -> list[Channel]:
-    """The channels that in-betweens of something are in."""
-    return [channel for place in places_of(transform) for channel in place.filled]
 
 
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import bpy
 
 from .. import animation
 from ..animation.describing import SegmentFacts, has_in_betweens
+from ..animation.sources import SCALE
 from ..animation.transforms import ORIGINALS, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
@@ -68,8 +69,11 @@ class _Shown:
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column()
         with suppress(Refused):  # that is in a note of the panel
-            for prop in active_target(context).properties.values():
-                column.prop(context.window_manager.rigid_motion_shown, prop)
+            target = active_target(context)
+            for name, prop in target.properties.items():
+                # A scale without in-betweens is that of the Item tab.
+                if name != SCALE or target.is_noted([(f"delta_{prop}", 0)]):
+                    column.prop(context.window_manager.rigid_motion_shown, prop)
 
 
 class _Path:
@@ -96,15 +100,17 @@ class _Delta:
         layout, target = self.layout, active_target(context)
         layout.use_property_split = True
         layout.use_property_decorate = False
-        noted = tuple(target.motion.filled)
         is_quaternion = target.carrier.rotation_mode == "QUATERNION"
         rotation = "delta_rotation_quaternion" if is_quaternion else "delta_rotation_euler"
-        for delta in ("delta_location", rotation, "delta_scale"):
-            original, place = ORIGINALS[delta]
-            if noted[place]:
-                layout.prop(target.motion, original)
-            else:
-                layout.prop(target.carrier, delta)
+        for path, label in (("delta_location", "Location"), (rotation, "Rotation"), ("delta_scale", "Scale")):
+            column = layout.column(align=True)
+            for index, axis in enumerate("WXYZ" if path.endswith("quaternion") else "XYZ"):
+                text = axis if index else f"{label} {axis}"
+                # Where in-betweens are in a component, the object's own value is kept elsewhere.
+                if target.is_noted([(path, index)]):
+                    column.prop(target.motion, ORIGINALS[path][0], index=index, text=text)
+                else:
+                    column.prop(target.carrier, path, index=index, text=text)
 
 
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
@@ -136,7 +142,12 @@ def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, targ
 
 def _in_space(base: type, space: str, parent: type | None = None) -> type[bpy.types.Panel]:
     name = f"RIGID_MOTION_PT_{base.__name__.strip('_').lower()}_{space.lower()}"
-    content = {"bl_space_type": space} | ({"bl_parent_id": parent.__name__} if parent else {})
+    content: dict[str, object] = {"bl_space_type": space}
+    if parent is not None:
+        content["bl_parent_id"] = parent.__name__
+    if base is _Shown and space != "VIEW_3D":
+        # The Item tab, to be compared with, is in the viewport.
+        content["bl_options"] = {"DEFAULT_CLOSED"}
     return type(name, (base, bpy.types.Panel), content)
 
 

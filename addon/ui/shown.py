@@ -5,6 +5,8 @@ Where in-betweens are in the delta transforms, the Item tab has Blender's own va
 
 from __future__ import annotations
 
+import logging
+
 import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
 
@@ -13,14 +15,20 @@ from ..animation.sources import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..animation.transforms import Refused
 from .targets import active_target
 
+log = logging.getLogger(__package__)
+
 
 def _components(part: slice) -> list[float]:
     """Some of the ten components of the active target as it is seen; it is asked for as it is drawn."""
-    target = active_target(bpy.context)
+    shown = None
     try:
-        shown = None if target is None else shown_components(target)
+        if (target := active_target(bpy.context)) is not None:
+            shown = shown_components(target)
     except Refused:
-        shown = None
+        pass  # a note of the panel has the reason
+    except Exception:
+        # Blender goes on with an error that is raised here, and crashes.
+        log.exception("The transform on the screen cannot be shown")
     return (REST if shown is None else shown)[part].tolist()
 
 
@@ -58,14 +66,13 @@ class ShownTransform(bpy.types.PropertyGroup):
         description="How the object is seen turned on this frame: its rotation with the in-betweens",
         size=4,
         subtype="QUATERNION",
-        precision=5,
+        precision=3,
         get=_quaternion,
     )
     rotation_euler: FloatVectorProperty(
         name="Rotation",
         description="How the object is seen turned on this frame: its rotation with the in-betweens",
         subtype="EULER",
-        precision=5,
         get=_euler,
     )
     scale: FloatVectorProperty(

@@ -101,10 +101,9 @@ def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str
     except ValueError:
         return set()
     keys = key_frames(target)
-    if meant is not None:
-        frames = np.array(meant)
-    else:
-        frames = keys if len(keys) else np.zeros(1)
+    frames = keys if meant is None else np.array(meant)
+    if not len(frames):
+        frames = np.zeros(1)
     # The last key begins no segment. Alone it still has a mode, for keys to come.
     return set(modes_of(target, frames[~np.isin(frames, keys[-1:])] if len(frames) > 1 else frames))
 

@@ -1,7 +1,7 @@
 """Paths that were worked out already, and which of them an edit may have made wrong.
 
-Blender's handlers name the objects and Actions that were edited. Their paths are looked at again when they are next drawn,
-and worked out anew where the digest of the source, or something else that they depend on, is another one. So a frame
+Blender's handlers name the objects and Actions that were edited. Their paths are looked at again when next drawn, and
+worked out anew where the digest of the source, or something else that they depend on, is another one. So a frame
 that is merely played, or looked at from elsewhere, costs no more than looking paths up.
 """
 
@@ -99,7 +99,7 @@ def _read(target: Transform, settings: tuple, before: _Entry | None) -> _Entry:
             selected = key_frames(target, selected=True)
             axis_length = axes_size * axis_length_of(target.carrier, source)
             entry.selected = selected.tobytes()
-            # Where it stands that is not keyed moves the path, but not its in-betweens, so it is no part of their digest.
+            # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
             entry.digest = (source.digest, tuple(source.rest.items()), entry.selected, axis_length, settings)
             if before is not None and before.digest == entry.digest:
                 entry.path = before.path

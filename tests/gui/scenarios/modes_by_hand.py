@@ -80,18 +80,21 @@ def scenario(hand: Hand) -> Steps[None]:
 def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By the pie, taken back, from the Object menu and from the context menu: for the whole object."""
     centre = places.centre(places.region(view))
-    x, y = centre
+    around = places.box_around(centre, 840, 380)
     yield from hand.hover(centre)
     yield from hand.pie("T", "NE", alt=True)
     assert_modes({}, MOTOR_SCREW)
-    yield from hand.pie("T", "W", picture="pie-ticks-the-mode", box=(x - 420, y - 190, 840, 380), alt=True)
+    yield from hand.hover(centre)
+    yield from hand.pie("T", "W", picture="pie-ticks-the-mode", box=around, alt=True)
     assert_modes({}, BLENDER)
+    yield from hand.hover(centre)
     yield from hand.pie("T", "N", alt=True)
     assert_modes({}, SMOOTH)
+    yield from hand.hover(centre)
     for _ in range(3):
         yield from hand.press("Z", ctrl=True)
     assert_modes({}, BLENDER)
-    yield from hand.pie("T", "E", picture="pie", box=(x - 420, y - 190, 840, 380), alt=True)
+    yield from hand.pie("T", "E", picture="pie", box=around, alt=True)
     assert_modes({}, SCREW)
     yield from hand.press("Z", ctrl=True)
     assert_modes({}, BLENDER)

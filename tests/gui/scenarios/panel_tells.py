@@ -85,6 +85,7 @@ def scenario(hand: Hand) -> Steps[None]:
     reader = Reader(hand, view)
     yield from easy(reader)
     yield from awkward(reader)
+    yield from edited_beside(reader)
     yield from broken(reader)
     bpy.context.view_layer.objects.active = None
     yield from reader.look("nothing-active")
@@ -97,8 +98,22 @@ def easy(reader: Reader) -> Steps[None]:
     key({1: 0, 20: 90})
     bpy.context.scene.frame_set(10)
     yield from reader.read("native", mode="BLENDER")
+    assert not bpy.ops.rigid_motion.bake.poll(), "there is nothing to bake"
     bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    assert bpy.ops.rigid_motion.bake.poll()
     yield from reader.read("screw", mode=SCREW)
+    shown = bpy.context.window_manager.rigid_motion_shown
+    seen = cube().matrix_basis.translation
+    assert (seen - cube().location).length > 0.05, "the object stands elsewhere than the Item tab says"
+    assert np.allclose(shown.location, seen, atol=1e-5)
+    yield from reader.hand.open_sidebar(reader.view, "Item")
+    yield from reader.look("item-tab")
+    yield from reader.hand.open_sidebar(reader.view, "Animation")
+    key({1: 0, 20: 90}, "XYZ")
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    yield from reader.read("screw-by-euler-angles", mode=SCREW)
+    key({1: 0, 20: 90})
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
     bpy.context.scene.frame_set(30)
     yield from reader.read("outside-the-keys", "No segment")
     bpy.ops.rigid_motion.bake(step=0.5)
@@ -132,6 +147,25 @@ def awkward(reader: Reader) -> Steps[None]:
     bpy.ops.rigid_motion.refresh()
     yield from reader.read("refreshed", mode=STRAIGHT)
     extension().preferences.live_update = True
+
+
+def edited_beside(reader: Reader) -> Steps[None]:
+    """Edits that do not last: of delta transforms with in-betweens in them; and another user of the same Action."""
+    key({1: 0, 20: 90})
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    cube().delta_location = (0, 1, 0)
+    yield from reader.read("delta-edited", "come back with the next frame", mode=SCREW)
+    bpy.context.scene.frame_set(11)
+    yield from reader.read("delta-back", mode=SCREW)
+
+    other = bpy.data.objects.new("Other", cube().data)
+    bpy.context.collection.objects.link(other)
+    other.rotation_mode, data = "XYZ", other.animation_data_create()
+    data.action, data.action_slot = cube().animation_data.action, cube().animation_data.action_slot
+    bpy.context.view_layer.objects.active = other
+    yield from reader.look("second-user")
+    bpy.context.view_layer.objects.active = cube()
+    bpy.data.objects.remove(other)
 
 
 def broken(reader: Reader) -> Steps[None]:
