@@ -3,7 +3,7 @@
 targets      the transforms and keys an editor means    operators    what can be done to them
 menus        entries in Blender's menus, and the pies   keymap       the pies' shortcut
 panels       the sidebar                                rows         its lines, aligned
-notes        what the panel has to say of a target      shown        the transform seen on the screen
+notes        what the panel notes on a target            shown        the transform seen on the screen
 overlay      paths in the viewport                      look         how they look
 wording      labels and texts                           preferences  of the extension
 """

@@ -1,4 +1,4 @@
-"""What the panel has to say of a target on a frame: the segment, and notes with the way out of what is amiss."""
+"""Notes of the panel on a target and a frame: the segment, what is amiss, and the way out."""
 
 from __future__ import annotations
 

@@ -73,6 +73,7 @@ class ShownTransform(bpy.types.PropertyGroup):
         name="Rotation",
         description="How the object is seen turned on this frame: its rotation with the in-betweens",
         subtype="EULER",
+        precision=5,
         get=_euler,
     )
     scale: FloatVectorProperty(

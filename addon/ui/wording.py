@@ -24,8 +24,8 @@ STRIPS = "Moved by strips: enter one to see its segments (NLA Editor, Tab)"
 BAKED = "Baked to keys. Un-Bake brings its own keys back"
 OUT_OF_DATE = "The keys have changed since: Live Update is off, in the preferences"
 DELTA_EDITED = (
-    "Edited delta transforms have in-betweens in them, which come back with the next frame. "
-    "The object's own are in Delta Transform below"
+    "The delta transform holds the in-betweens, so this edit of it lasts until the frame changes. "
+    "To keep it, edit Delta Transform below"
 )
 
 NEAR_HALF_TURN = math.radians(170.0)

@@ -1,4 +1,4 @@
-"""What the panel tells of an object, without a window: the segment under the playhead, and what there is to know."""
+"""What the panel shows of an object, without a window: the segment under the playhead, and what there is to know."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from tests.ui.conftest import keyed
 IN_THE_FIRST_SEGMENT = 5.0
 
 
-def told(obj, frame=IN_THE_FIRST_SEGMENT):
+def notes_on(obj, frame=IN_THE_FIRST_SEGMENT):
     """What the panel says on a frame, and the mode of the segment it shows."""
     bpy.context.scene.frame_set(int(frame))
     segment, notes = facts_and_notes(obj, frame)
     return [text for _, text in notes], segment and segment.mode
 
 
-def test_of_a_plain_segment_its_facts_are_told_and_no_more(tool):
-    assert told(tool) == ([], "BLENDER")
+def test_of_a_plain_segment_its_facts_are_shown_and_no_more(tool):
+    assert notes_on(tool) == ([], "BLENDER")
     set_mode(tool, "dq_sclerp")
-    assert told(tool) == ([], "dq_sclerp")
+    assert notes_on(tool) == ([], "dq_sclerp")
     segment, _ = facts_and_notes(tool, 15.0)
     assert (segment.first, segment.last) == (11.0, 21.0)
     assert segment.turn == pytest.approx(math.pi / 2, abs=1e-6)
@@ -37,25 +37,25 @@ def test_of_a_plain_segment_its_facts_are_told_and_no_more(tool):
 
 
 def test_without_keys_it_says_so(extension):
-    assert told(new_object()) == ([NO_KEYS], None)
+    assert notes_on(new_object()) == ([NO_KEYS], None)
 
 
 def test_outside_the_keys_there_is_no_segment(tool):
-    assert told(tool, 50.0) == ([NO_SEGMENT], None)
+    assert notes_on(tool, 50.0) == ([NO_SEGMENT], None)
 
 
-def test_a_refusal_is_told_with_the_way_out_and_without_a_segment(tool):
+def test_a_refusal_is_shown_with_the_way_out_and_without_a_segment(tool):
     set_mode(tool, "dq_sclerp")
     tool.driver_add("location", 2)
-    (text,), mode = told(tool)
+    (text,), mode = notes_on(tool)
     assert "Location Z is driven" in text
     assert mode is None
 
 
-def test_numbers_that_make_no_motion_are_told(tool):
+def test_numbers_that_make_no_motion_are_noted(tool):
     set_mode(tool, "dq_sclerp")
     curves_of(tool)["location", 0].keyframe_points[0].co.y = math.nan
-    (text,), mode = told(tool)
+    (text,), mode = notes_on(tool)
     assert "Tool" in text
     assert mode is None
 
@@ -63,25 +63,25 @@ def test_numbers_that_make_no_motion_are_told(tool):
 def test_what_is_baked_can_be_un_baked(tool):
     set_mode(tool, "dq_sclerp")
     bake(tool)
-    assert told(tool) == ([BAKED], "BLENDER")
+    assert notes_on(tool) == ([BAKED], "BLENDER")
     unbake(tool)
-    assert told(tool) == ([], "dq_sclerp")
+    assert notes_on(tool) == ([], "dq_sclerp")
 
 
-def test_an_edit_that_nobody_follows_is_told_until_it_is_refreshed(tool):
+def test_an_edit_that_nobody_follows_is_noted_until_it_is_refreshed(tool):
     set_mode(tool, "dq_sclerp")
     set_enabled(False)
     curves_of(tool)["location", 0].keyframe_points[1].co.y += 1.0
-    assert told(tool) == ([OUT_OF_DATE], "dq_sclerp")
+    assert notes_on(tool) == ([OUT_OF_DATE], "dq_sclerp")
     bpy.ops.rigid_motion.refresh()
-    assert told(tool) == ([], "dq_sclerp")
+    assert notes_on(tool) == ([], "dq_sclerp")
 
 
 def test_an_object_that_strips_move_has_its_keys_in_there(tool):
     action = tool.animation_data.action
     tool.animation_data.action = None
     tool.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
-    assert told(tool) == ([STRIPS], None)
+    assert notes_on(tool) == ([STRIPS], None)
 
 
 def on_screen(obj):
@@ -141,12 +141,12 @@ def test_the_transform_on_screen_is_for_looking_at(tool):
 def test_a_cleared_delta_transform_that_comes_back_is_no_surprise(tool, clear):
     tool.delta_location, tool.delta_rotation_quaternion = (1.0, 2.0, 3.0), (0.8, 0.6, 0.0, 0.0)
     set_mode(tool, "dq_sclerp")
-    assert told(tool) == ([], "dq_sclerp")
+    assert notes_on(tool) == ([], "dq_sclerp")
     getattr(bpy.ops.object, clear)(clear_delta=True)
     bpy.context.view_layer.update()
     notes = [text for _, text in facts_and_notes(tool, IN_THE_FIRST_SEGMENT)[1]]
     assert notes == [DELTA_EDITED]
-    assert told(tool, 6.0) == ([], "dq_sclerp")
+    assert notes_on(tool, 6.0) == ([], "dq_sclerp")
 
 
 def test_a_second_user_of_a_slot_that_differs_has_a_note_until_the_two_are_alike(tool):
@@ -154,12 +154,12 @@ def test_a_second_user_of_a_slot_that_differs_has_a_note_until_the_two_are_alike
     data = other.animation_data_create()
     data.action, data.action_slot = tool.animation_data.action, tool.animation_data.action_slot
     set_mode(tool, "dq_sclerp")
-    assert told(other) == ([], "dq_sclerp")
+    assert notes_on(other) == ([], "dq_sclerp")
     other.rigid_motion.own_location.y = 1.0
     bpy.context.view_layer.update()
-    messages = told(tool)[0] + told(other)[0]
+    messages = notes_on(tool)[0] + notes_on(other)[0]
     assert len(messages) == 1
     assert "Make Single User" in messages[0]
     tool.rigid_motion.own_location.y = 1.0
     bpy.context.view_layer.update()
-    assert told(tool) == told(other) == ([], "dq_sclerp")
+    assert notes_on(tool) == notes_on(other) == ([], "dq_sclerp")

@@ -70,7 +70,7 @@ def keep_only(drawn: int) -> None:
 def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
     """Whether keys of these are selected otherwise than in their paths; those are looked at again then.
 
-    Selecting is no edit, so Blender's handlers tell nothing of it.
+    Selecting is no edit, so Blender's handlers are silent about it.
     """
     targets = map(transform_of, targets)
     entries = [(entry, target) for target in targets if (entry := _entries.get(_identity(target))) is not None]

@@ -29,7 +29,7 @@ from .spacing import Readable, readable
 log = logging.getLogger(__package__)
 
 OUTLINE: Color = (0.0, 0.0, 0.0, 1.0)
-"""Around lines and dots, so that they are told from any background."""
+"""Around lines and dots, so that they stand out from any background."""
 
 WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 """Keys that are not selected, as in the Dope Sheet."""

@@ -1,4 +1,4 @@
-"""What the panel tells of one object after the other, in its words and on the screen; and the preferences.
+"""What the panel shows of one object after the other, in its words and on the screen; and the preferences.
 
 The words are those of the installed extension. That drawing them raises no error, the test sees in Blender's console.
 """
@@ -154,7 +154,7 @@ def edited_beside(reader: Reader) -> Steps[None]:
     key({1: 0, 20: 90})
     bpy.ops.rigid_motion.set_mode(mode=SCREW)
     cube().delta_location = (0, 1, 0)
-    yield from reader.read("delta-edited", "come back with the next frame", mode=SCREW)
+    yield from reader.read("delta-edited", "lasts until the frame changes", mode=SCREW)
     bpy.context.scene.frame_set(11)
     yield from reader.read("delta-back", mode=SCREW)
 
