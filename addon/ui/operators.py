@@ -29,6 +29,8 @@ from .wording import DESCRIPTIONS, LABELS, counted_modes, length, listed, names_
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
+NO_TARGETS = "Select an object with keys first"
+
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
 
@@ -51,10 +53,12 @@ class _OnTargets:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(map(cls.has_work, each_target(context))):
-            return True
-        is_empty = next(each_target(context), None) is None
-        cls.poll_message_set("Select an object with keys first" if is_empty else cls.nothing_to_do)
+        reason = NO_TARGETS
+        for target in each_target(context):
+            if cls.has_work(target):
+                return True
+            reason = cls.nothing_to_do
+        cls.poll_message_set(reason)
         return False
 
     def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
@@ -167,7 +171,8 @@ class RIGID_MOTION_OT_bake(_OnTargets, bpy.types.Operator):
     bl_label = "Bake to Keys"
     bl_description = (
         "Put the in-betweens on location, rotation and scale as real keys of type Generated, in a copy of the Action, "
-        "for hand-over to programs that read keys only. Un-Bake gives the original back"
+        "for hand-over to programs that read keys only. Un-Bake gives the original back. "
+        "Blender's own Bake Keyframes knows nothing of modes: it gives Blender's own in-betweens"
     )
 
     nothing_to_do = "There are no rigid in-betweens to bake: choose a mode for keys of these objects first"
@@ -257,18 +262,14 @@ class _OnChanged(_OnTargets):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        kinds = set(cls.last_changes(context).values())
-        if cls.kind in kinds:
+        changes = cls.last_changes(context)
+        if cls.kind in changes.values():
             return True
-        others = kinds and any(
-            entry.kind == cls.kind and entry.original is not None
-            for target in each_target(context)
-            for entry in target.motion.bakes
-        )
-        later = next(iter(kinds)) if others else None
-        cls.poll_message_set(
-            f"These keys were {later.lower()} since: {WAYS_BACK[later]} first" if later else cls.nothing_to_do
-        )
+        reason = cls.nothing_to_do
+        for target, later in changes.items():
+            if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
+                reason = f"These keys were {later.lower()} since: {WAYS_BACK[later]} first"
+        cls.poll_message_set(reason)
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
