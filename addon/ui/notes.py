@@ -35,7 +35,8 @@ def facts_and_notes(target: bpy.types.Object | Transform, frame: float) -> tuple
         notes += [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", NO_SEGMENT)]
         if not is_up_to_date(target, source):
             notes.append(("ERROR", OUT_OF_DATE))
-        elif has_edited_differences(target, frame):
+        elif target.animated.visible_get() and has_edited_differences(target, frame):
+            # What is hidden need not have been evaluated on this frame.
             notes.append(("INFO", DELTA_EDITED))
     if animation.is_baked(target):
         notes.append(("INFO", BAKED))
