@@ -8,6 +8,7 @@ undo step.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import ClassVar
 
 import bpy
@@ -131,11 +132,12 @@ class RIGID_MOTION_OT_set_mode(_OnTargets, bpy.types.Operator):
 
     def _set(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
         groups = grouped_by_frames(context, targets, self.on, refused)
-        # One refresh behind all of them, however many groups there are.
-        with paused():
+        # Several groups are refreshed together behind the last; a single one is read only once by the verb itself.
+        with paused() if len(groups) > 1 else nullcontext():
             for frames, group in groups.items():
                 animation.set_mode(group, self.mode, frames, refused=refused)
-        animation.refresh(targets)
+        if len(groups) > 1:
+            animation.refresh(targets)
         label = LABELS[self.mode]
         if list(groups) == [None]:
             return label
