@@ -9,19 +9,24 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from mathutils import Euler, Quaternion
 
 from ..motion.eulers import quaternions_from_extrinsic_eulers
 from .curves import cycled
 from .mode_keys import active_place
-from .records import recorded_digest
-from .sources import MODE_NAMES, SAME_FRAME, Source
-from .transforms import Transform, transform_of
+from .records import recorded_digest, recorded_mode
+from .slots import places_of
+from .sources import LOCATION, MODE_NAMES, ROTATION, ROWS, SAME_FRAME, SCALE, Source
+from .transforms import WIDTHS, Transform, transform_of
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
 
 NEAR = 1e-6
 """What differs by less is the same."""
+
+SAME_VALUE = 1e-5
+"""Values of properties that differ by less are the same but for single precision."""
 
 MOMENT = 1e-3
 """A time too short to see, in frames."""
@@ -94,6 +99,91 @@ def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
     place = active_place(transform_of(target))
     return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
+
+
+def has_mode(transform: Transform) -> bool:
+    """Whether another mode than Blender's own was chosen for something, in its slots or before it had any.
+
+    For what is asked on every redraw: nothing is looked at but its own slots.
+    """
+    if transform.motion.awaited != "BLENDER":
+        return True
+    return any(
+        recorded_digest(place) or recorded_mode(place) or place.users[0].mode_channel in place.curves
+        for place in places_of(transform)
+    )
+
+
+def has_in_betweens(transform: Transform) -> bool:
+    """Whether in-betweens were filled in for something. As quick as `has_mode`."""
+    data = transform.animated.animation_data
+    if data is None:
+        return False
+    if not len(data.nla_tracks) and (data.action is None or not len(data.action.rigid_motion.slots)):
+        # The commonest case, and the slots are not even taken apart.
+        return False
+    return any(recorded_digest(place) for place in places_of(transform))
+
+
+def has_more_keys_than(transform: Transform, count: int) -> bool:
+    """Whether a channel of location, rotation or scale has more keys than this."""
+    return any(
+        len(fcurve.keyframe_points) > count
+        for place in places_of(transform)
+        for (path, _), fcurve in place.curves.items()
+        if path.removeprefix(place.prefix) in WIDTHS
+    )
+
+
+def shown_components(transform: Transform) -> np.ndarray | None:
+    """Where something is seen on the frame that is shown, in its own channels.
+
+    Returns
+    -------
+    array, shape (10,), or None
+        What its properties would have to be for it to look as it does with its original difference alone: location,
+        rotation as it turns (quaternion or Euler angles), scale. None where no in-betweens are filled in.
+
+    Raises
+    ------
+    Refused
+        Where it turns by axis and angle.
+    """
+    if not any(place.filled for place in places_of(transform)):
+        return None
+    shown, original, added = transform.components(), transform.original(), np.zeros(10)
+    for row, (path, index) in transform.differences.items():
+        added[row] = transform.animated.path_resolve(path)[index]
+    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
+    shown[location] += added[location] - original[location]
+    shown[scale] *= added[scale] / np.where(original[scale] == 0.0, 1.0, original[scale])
+    own = Quaternion(original[rotation]).inverted()
+    if transform.rotation == "rotation_quaternion":
+        turned = Quaternion(shown[rotation])
+        seen = own @ Quaternion(added[rotation]).normalized() @ turned
+        shown[rotation] = -seen if seen.dot(turned) < 0.0 else seen
+    else:
+        order = transform.carrier.rotation_mode
+        angles = Euler(shown[3:6], order)
+        seen = own @ Euler(added[3:6], order).to_quaternion() @ angles.to_quaternion()
+        shown[3:6] = seen.to_euler(order, angles)
+    return shown
+
+
+def has_edited_differences(transform: Transform, frame: float) -> bool:
+    """Whether something has another difference than its in-betweens on this frame of its Action.
+
+    So it is once somebody has edited what they are in, until the frame changes.
+    """
+    place = active_place(transform, places_of(transform))
+    if place is None or place.slot.in_nla:
+        # Strips are blended with one another.
+        return False
+    return any(
+        abs(transform.animated.path_resolve(path)[index] - fcurve.evaluate(frame)) > SAME_VALUE
+        for (path, index), fcurve in place.filled.items()
+        if not fcurve.mute
+    )
 
 
 def _components(source: Source, ends: np.ndarray) -> np.ndarray:

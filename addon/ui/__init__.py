@@ -1,23 +1,25 @@
 """What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
 
-targets      which objects and keys an editor means     operators    what can be done to them
+targets      the transforms and keys an editor means    operators    what can be done to them
 menus        entries in Blender's menus, and the pies   keymap       the pies' shortcut
 panels       the sidebar                                rows         its lines, aligned
+notes        what the panel notes on a target            shown        the transform seen on the screen
 overlay      paths in the viewport                      look         how they look
-wording      what is said                               preferences  of the extension
+wording      labels and texts                           preferences  of the extension
 """
 
 from __future__ import annotations
 
 import bpy
 
-from . import keymap, menus, operators, overlay, panels, preferences
+from . import keymap, menus, operators, overlay, panels, preferences, shown
 
 CLASSES = (*preferences.CLASSES, *operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:
     overlay.register()
+    shown.register()
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     menus.register()
@@ -30,4 +32,5 @@ def unregister() -> None:
     menus.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
+    shown.unregister()
     overlay.unregister()

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from .targets import CURRENT, SELECTED, WHOLE, modes_meant
+from .targets import CURRENT, SELECTED, WHOLE, active_target, modes_meant
 from .wording import LABELS
 
 
@@ -21,7 +21,7 @@ def _draw_modes(
     modes: Iterable[str] = LABELS,
     no_icon: str = "BLANK1",
 ) -> None:
-    present = modes_meant(context, context.object, scope)
+    present = modes_meant(context, active_target(context), scope)
     for mode in modes:
         # One tick where all is one; dots where modes are mixed.
         icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
@@ -36,7 +36,7 @@ def _draw_rest(layout: bpy.types.UILayout, pie: str) -> None:
     layout.separator()
     layout.operator("rigid_motion.reduce_keys")
     layout.operator("rigid_motion.restore_keys")
-    layout.operator("rigid_motion.let_keys_go")
+    layout.operator("rigid_motion.discard_dense_keys")
     layout.separator()
     layout.operator("rigid_motion.clear")
     layout.operator("rigid_motion.refresh")
@@ -86,22 +86,30 @@ class RIGID_MOTION_MT_whole(bpy.types.Menu):
         _draw_modes(context, self.layout, WHOLE)
 
 
-CORNERS = ("motor_spline", "lerp_slerp", "pga_lerp", "cga_lerp", "cga_slerp")
-"""North, and then the corners. A pie has eight slices: the screw has one of them under one of its names."""
+SLICES = (
+    "BLENDER",
+    "dq_sclerp",
+    "cga_lerp",
+    "motor_spline",
+    "lerp_slerp",
+    "pga_slerp",
+    "cga_slerp",
+    "pga_lerp",
+)
+"""In the order of Blender's pies: west, east, south, north, north-west, north-east, south-west, south-east."""
 
 
 class _Pie:
-    """Blender's own in-betweens on the left, the screw on the right, what is like each other side by side."""
+    """One slice for each mode: Blender's own in-betweens on the left, the screw on the right, the smooth one on top.
+
+    Around them, what is alike is side by side: the screws, the blends, those that grow, those that go straight.
+    """
 
     scope: str
 
     def draw(self, context: bpy.types.Context) -> None:
-        pie = self.layout.menu_pie()
-        pie.operator_context = "INVOKE_REGION_WIN"
         # Entries of a menu are aligned, those of a pie stand alone.
-        _draw_modes(context, pie, self.scope, ("BLENDER", "dq_sclerp"), "NONE")
-        pie.operator("rigid_motion.bake", text="Bake to Keys...")
-        _draw_modes(context, pie, self.scope, CORNERS, "NONE")
+        _draw_modes(context, self.layout.menu_pie(), self.scope, SLICES, "NONE")
 
 
 class RIGID_MOTION_MT_pie_object(_Pie, bpy.types.Menu):

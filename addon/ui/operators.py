@@ -1,11 +1,14 @@
-"""What can be done to the motion of objects. Every operator does what it can, and names the objects that refuse.
+"""What can be done to motions. Every operator does all that it can in one go, and says why not where it cannot.
 
-An operator that every object refused has changed nothing: it is cancelled, without an undo step.
+Where there is nothing to do, a button is greyed out, and its tooltip has the reason. That is asked on every redraw, so
+it looks at as little as it can. An operator that every target refused has changed nothing: it is cancelled, without an
+undo step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import ClassVar
 
 import bpy
@@ -13,60 +16,82 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
-from ..animation.originals import BAKED, REDUCED
+from ..animation.describing import has_in_betweens, has_mode, has_more_keys_than
+from ..animation.live import paused
+from ..animation.originals import BAKED, REDUCED, WAYS_BACK, entries_in_use
 from ..animation.properties import MODE_ITEMS
 from ..animation.reducing import metres_per_unit
+from ..animation.slots import places_of
+from ..animation.transforms import Transform
 from .preferences import DEFAULT_MODE, default_mode
 from .rows import labelled
-from .targets import SCOPES, SELECTED, WHOLE, frames_meant, objects_for, scope_for
-from .wording import DESCRIPTIONS, LABELS, counted_modes, length, listed, reduction_told
+from .targets import SCOPES, SELECTED, WHOLE, each_target, grouped_by_frames, scope_for, targets_of
+from .wording import DESCRIPTIONS, LABELS, counted_modes, length, listed, names_of, reduction_summary
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
-MOST_TOLD = 5
-"""Objects that the redo panel tells of."""
+NO_TARGETS = "Select an object with keys first"
+
+MOST_LISTED = 5
+"""Targets whose reductions are listed one by one."""
+
+MOST_REFUSALS = 8
+"""Refusals that a report has room for."""
 
 
-class _OnObjects:
+class _OnTargets:
     """Operators on the selected objects, or on those that the editor shows."""
 
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
+    nothing_to_do: ClassVar[str] = ""
+    """Why the operator is greyed out where it has nothing to do on any target."""
+
+    @classmethod
+    def has_work(cls, _target: Transform) -> bool:
+        """Whether there is something to do on a target."""
+        return True
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if objects_for(context):
-            return True
-        cls.poll_message_set("Select an object with keys first")
+        reason = NO_TARGETS
+        for target in each_target(context):
+            if cls.has_work(target):
+                return True
+            reason = cls.nothing_to_do
+        cls.poll_message_set(reason)
         return False
 
-    def act(self, objects: Sequence[bpy.types.Object], on_one: Callable[[bpy.types.Object], str]) -> set[str]:
-        """Do something to each object, and say what.
+    def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
+        """Do something to all targets at once, and report it.
 
         Parameters
         ----------
-        objects
-        on_one
-            Does it to one, and returns in words what was done. May raise `Refused`.
+        targets
+        verb
+            Does it, puts refusals into the list that it is given, and returns in words what was done. May raise
+            `Refused` where nothing could be.
         """
-        done: dict[str, list[str]] = {}
-        refusals = []
-        for obj in objects:
-            try:
-                done.setdefault(on_one(obj), []).append(obj.name)
-            except Refused as refusal:
-                refusals.append(str(refusal))
-        said = "; ".join(f"{listed(names)}: {what}" for what, names in done.items())
-        if not done:
+        refused: list[Refused] = []
+        try:
+            summary = verb(refused)
+        except Refused as refusal:
+            refused, summary = [refusal], ""
+        refusals = [str(refusal) for refusal in refused[:MOST_REFUSALS]]
+        if len(refused) > MOST_REFUSALS:
+            refusals.append(f"and {len(refused) - MOST_REFUSALS} more")
+        if not summary or len(refused) >= len(targets):
             self.report({"ERROR"}, "\n".join(refusals))
             return {"CANCELLED"}
-        if refusals:
-            self.report({"WARNING"}, "\n".join([f"{said}. But", *refusals]))
+        if refused:
+            done = len(targets) - len(refused)
+            self.report({"WARNING"}, "\n".join([f"{done} of {len(targets)} objects: {summary}. But", *refusals]))
         else:
-            self.report({"INFO"}, said)
+            self.report({"INFO"}, f"{names_of(targets)}: {summary}")
         return {"FINISHED"}
 
 
-class RIGID_MOTION_OT_set_mode(_OnObjects, bpy.types.Operator):
+class RIGID_MOTION_OT_set_mode(_OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.set_mode"
     bl_label = "Set Rigid Motion Mode"
     bl_description = "Choose how the selected objects move from key to key"
@@ -97,47 +122,62 @@ class RIGID_MOTION_OT_set_mode(_OnObjects, bpy.types.Operator):
             self.mode = default_mode()
         if not self.properties.is_property_set("on"):
             self.on = scope_for(context)
-        objects = objects_for(context)
+        targets = targets_of(context)
         if self.on == SELECTED:
-            objects = [obj for obj in objects if len(animation.key_frames(obj, selected=True))]
-            if not objects:
+            targets = [target for target in targets if len(animation.key_frames(target, selected=True))]
+            if not targets:
                 self.report({"ERROR"}, "Select keys of location, rotation or scale first")
                 return {"CANCELLED"}
-        return self.act(objects, lambda obj: self._set(context, obj))
+        return self.act(targets, lambda refused: self._set(context, targets, refused))
 
-    def _set(self, context: bpy.types.Context, obj: bpy.types.Object) -> str:
-        frames = frames_meant(context, obj, self.on)
-        animation.set_mode(obj, self.mode, frames)
+    def _set(self, context: bpy.types.Context, targets: list[Transform], refused: list[Refused]) -> str:
+        groups = grouped_by_frames(context, targets, self.on, refused)
+        # Several groups are refreshed together behind the last; a single one is read only once by the verb itself.
+        with paused() if len(groups) > 1 else nullcontext():
+            for frames, group in groups.items():
+                animation.set_mode(group, self.mode, frames, refused=refused)
+        if len(groups) > 1:
+            animation.refresh(targets)
         label = LABELS[self.mode]
-        if frames is None:
+        if list(groups) == [None]:
             return label
+        frames = sorted({frame for group in groups for frame in group})
         return f"{label} from frame{'s' * (len(frames) > 1)} {listed([f'{frame:g}' for frame in frames])}"
 
 
-class RIGID_MOTION_OT_clear(_OnObjects, bpy.types.Operator):
+class RIGID_MOTION_OT_clear(_OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.clear"
     bl_label = "Clear Modes"
     bl_description = (
         "Give the objects Blender's own in-betweens again, and remove the keys of their modes. "
         "Keys of location, rotation and scale stay"
     )
+    nothing_to_do = "These objects have Blender's own in-betweens already"
+
+    @classmethod
+    def has_work(cls, target: Transform) -> bool:
+        return has_mode(target)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self.act(objects_for(context), self._clear)
+        targets = [target for target in each_target(context) if has_mode(target)]
 
-    @staticmethod
-    def _clear(obj: bpy.types.Object) -> str:
-        animation.set_mode(obj, "BLENDER")
-        return "Blender's own in-betweens"
+        def clear(refused: list[Refused]) -> str:
+            animation.set_mode(targets, "BLENDER", refused=refused)
+            return "Blender's own in-betweens"
+
+        return self.act(targets, clear)
 
 
-class RIGID_MOTION_OT_bake(_OnObjects, bpy.types.Operator):
+class RIGID_MOTION_OT_bake(_OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.bake"
     bl_label = "Bake to Keys"
     bl_description = (
         "Put the in-betweens on location, rotation and scale as real keys of type Generated, in a copy of the Action, "
-        "for hand-over to programs that read keys only. Un-Bake gives the original back"
+        "for hand-over to programs that read keys only. Un-Bake gives the original back. "
+        "Blender's own Bake Keyframes knows nothing of modes: it gives Blender's own in-betweens"
     )
+
+    nothing_to_do = "There are no rigid in-betweens to bake: choose a mode for keys of these objects first"
 
     step: FloatProperty(
         name="Step",
@@ -160,6 +200,10 @@ class RIGID_MOTION_OT_bake(_OnObjects, bpy.types.Operator):
     )
     first: FloatProperty(name="Start", description="First frame to bake", default=1.0, step=100, precision=2)
     last: FloatProperty(name="End", description="Last frame to bake", default=250.0, step=100, precision=2)
+
+    @classmethod
+    def has_work(cls, target: Transform) -> bool:
+        return has_in_betweens(target)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if self.frames != "CUSTOM":
@@ -185,11 +229,13 @@ class RIGID_MOTION_OT_bake(_OnObjects, bpy.types.Operator):
             if first > last:
                 self.report({"ERROR"}, f"The range to bake ends on frame {last:g}, before its start, {first:g}")
                 return {"CANCELLED"}
-        return self.act(objects_for(context), lambda obj: self._bake(obj, first, last))
+        targets = targets_of(context)
 
-    def _bake(self, obj: bpy.types.Object, first: float | None, last: float | None) -> str:
-        first, last = animation.bake(obj, step=self.step, first=first, last=last)
-        return f"baked from frame {first:g} to {last:g}"
+        def bake(refused: list[Refused]) -> str:
+            begin, end = animation.bake(targets, step=self.step, first=first, last=last, refused=refused)
+            return f"baked from frame {begin:g} to {end:g}"
+
+        return self.act(targets, bake)
 
 
 def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:
@@ -198,30 +244,44 @@ def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:
     return scene.frame_start, scene.frame_end
 
 
-class _OnChanged(_OnObjects):
-    """Operators on objects whose keys were baked or reduced, while what they had before is still in the file."""
+class _OnChanged(_OnTargets):
+    """Operators on targets whose keys were baked or reduced last, while what they had before is still in the file."""
 
     kind: ClassVar[str]
-    missing: ClassVar[str]
-    """Why there is nothing to do."""
+    verb: ClassVar[Callable]
+    summary: ClassVar[str]
 
     @classmethod
-    def objects_of(cls, context: bpy.types.Context) -> list[bpy.types.Object]:
-        return [
-            obj
-            for obj in objects_for(context)
-            if any(note.kind == cls.kind and note.original is not None for note in obj.rigid_motion.bakes)
-        ]
+    def last_changes(cls, context: bpy.types.Context) -> dict[Transform, str]:
+        """What was done last to the keys of each target that something was done to."""
+        found = {}
+        for target in each_target(context):
+            if len(target.motion.bakes):
+                entries = entries_in_use(target, places_of(target))
+                if kind := next((entry.kind for entry in entries if entry.original is not None), None):
+                    found[target] = kind
+        return found
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if cls.objects_of(context):
+        changes = cls.last_changes(context)
+        if cls.kind in changes.values():
             return True
-        cls.poll_message_set(cls.missing)
+        reason = cls.nothing_to_do
+        for target, later in changes.items():
+            if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
+                reason = f"These keys were {later.lower()} since: {WAYS_BACK[later]} first"
+        cls.poll_message_set(reason)
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self.act(self.objects_of(context), self.on_one)
+        targets = [target for target, kind in self.last_changes(context).items() if kind == self.kind]
+
+        def go_back(refused: list[Refused]) -> str:
+            type(self).verb(targets, refused=refused)
+            return self.summary
+
+        return self.act(targets, go_back)
 
 
 class RIGID_MOTION_OT_unbake(_OnChanged, bpy.types.Operator):
@@ -229,20 +289,22 @@ class RIGID_MOTION_OT_unbake(_OnChanged, bpy.types.Operator):
     bl_label = "Un-Bake"
     bl_description = "Give baked objects the Actions back that they had before, with their own keys and modes"
     kind = BAKED
-    missing = "None of these objects is baked"
-
-    @staticmethod
-    def on_one(obj: bpy.types.Object) -> str:
-        animation.unbake(obj)
-        return "back to the keys from before baking"
+    nothing_to_do = "None of these objects is baked"
+    verb = staticmethod(animation.unbake)
+    summary = "back to the keys from before baking"
 
 
-class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
+class RIGID_MOTION_OT_reduce_keys(_OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.reduce_keys"
     bl_label = "Reduce Keys to Poses"
     bl_description = (
         "Leave only the keys that the motion needs, location and rotation together, in a copy of the Action: "
         "for imported motion capture, baked simulations and solved cameras. Restore Keys gives all of them back"
+    )
+
+    nothing_to_do = (
+        "None of these objects has more than two keys. Constraints, drivers and simulations are turned into keys first "
+        "(Object > Animation > Bake Action, with Visual Keying)"
     )
 
     tolerance: FloatProperty(
@@ -292,10 +354,10 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
         layout.use_property_decorate = False
         for name in ("tolerance", "radius", "mode", "best_of"):
             layout.prop(self, name)
-        for obj in objects_for(context)[:MOST_TOLD]:
-            if (reduction := animation.reduction_of(obj)) is not None:
+        for target in targets_of(context)[:MOST_LISTED]:
+            if (reduction := animation.reduction_of(target)) is not None:
                 error = length(context.scene, reduction.largest_error, precision=3)
-                labelled(layout, obj.name).label(
+                labelled(layout, target.name).label(
                     text=f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}, {error} off"
                 )
                 if self.best_of:
@@ -303,17 +365,30 @@ class RIGID_MOTION_OT_reduce_keys(_OnObjects, bpy.types.Operator):
                     for line in counted_modes(reduction.segments):
                         labelled(column).label(text=line)
 
+    @classmethod
+    def has_work(cls, target: Transform) -> bool:
+        return has_more_keys_than(target, 2)
+
     def execute(self, context: bpy.types.Context) -> set[str]:
-        objects = objects_for(context)
+        targets = targets_of(context)
         if not self.properties.is_property_set("tolerance"):
             self.tolerance = 0.001 / metres_per_unit(context.scene)
-        if not self.radius and len(objects) == 1:
-            self.radius = animation.radius_of(objects[0])
-        return self.act(objects, lambda obj: self._reduce(context.scene, obj))
+        if not self.radius and len(targets) == 1:
+            self.radius = animation.radius_of(targets[0].carrier)
+        return self.act(targets, lambda refused: self._reduce(context.scene, targets, refused))
 
-    def _reduce(self, scene: bpy.types.Scene, obj: bpy.types.Object) -> str:
-        reduction = animation.reduce_keys_of(obj, self.mode, self.tolerance, self.radius or None, best_of=self.best_of)
-        return reduction_told(scene, reduction)
+    def _reduce(self, scene: bpy.types.Scene, targets: list[Transform], refused: list[Refused]) -> str:
+        before = [len(target.motion.bakes) for target in targets]
+        animation.reduce_keys_of(
+            targets, self.mode, self.tolerance, self.radius or None, best_of=self.best_of, refused=refused
+        )
+        reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
+        if len(reduced) > MOST_LISTED:
+            return "keys reduced"
+        summaries = [reduction_summary(scene, animation.reduction_of(target)) for target in reduced]
+        if len(reduced) == len(targets) == 1:
+            return summaries[0]
+        return "; ".join(f"{target.name}: {summary}" for target, summary in zip(reduced, summaries, strict=True))
 
 
 class RIGID_MOTION_OT_restore_keys(_OnChanged, bpy.types.Operator):
@@ -321,28 +396,22 @@ class RIGID_MOTION_OT_restore_keys(_OnChanged, bpy.types.Operator):
     bl_label = "Restore Keys"
     bl_description = "Give reduced objects all the keys back that they had before, to the last handle"
     kind = REDUCED
-    missing = "The keys of these objects are not reduced"
-
-    @staticmethod
-    def on_one(obj: bpy.types.Object) -> str:
-        animation.restore_keys(obj)
-        return "back to the keys from before they were reduced"
+    nothing_to_do = "The keys of these objects are not reduced"
+    verb = staticmethod(animation.restore_keys)
+    summary = "back to the keys from before they were reduced"
 
 
-class RIGID_MOTION_OT_let_keys_go(_OnChanged, bpy.types.Operator):
-    bl_idname = "rigid_motion.let_keys_go"
-    bl_label = "Let Dense Keys Go"
+class RIGID_MOTION_OT_discard_dense_keys(_OnChanged, bpy.types.Operator):
+    bl_idname = "rigid_motion.discard_dense_keys"
+    bl_label = "Discard Dense Keys"
     bl_description = (
         "Remove the keys from the file that Restore Keys would give back, once the reduced ones are good. "
         "The reduced keys stay as they are"
     )
     kind = REDUCED
-    missing = "The keys of these objects are not reduced"
-
-    @staticmethod
-    def on_one(obj: bpy.types.Object) -> str:
-        animation.discard_dense_keys(obj)
-        return "the keys from before they were reduced are gone"
+    nothing_to_do = "The keys of these objects are not reduced"
+    verb = staticmethod(animation.discard_dense_keys)
+    summary = "the keys from before they were reduced are removed from the file"
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):
@@ -369,6 +438,6 @@ CLASSES = (
     RIGID_MOTION_OT_unbake,
     RIGID_MOTION_OT_reduce_keys,
     RIGID_MOTION_OT_restore_keys,
-    RIGID_MOTION_OT_let_keys_go,
+    RIGID_MOTION_OT_discard_dense_keys,
     RIGID_MOTION_OT_refresh,
 )

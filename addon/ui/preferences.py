@@ -13,7 +13,7 @@ from .look import DEFAULT_LOOK
 EXTENSION = __package__.rpartition(".")[0]
 """What Blender knows the extension by: the package that this one is in."""
 
-DEFAULT_MODE = "dq_sclerp"
+DEFAULT_MODE = "motor_spline"
 
 
 def preferences() -> RigidMotionPreferences | None:

@@ -1,6 +1,11 @@
-"""Which objects and keys are meant: what a Dope Sheet or Graph Editor shows, else the selected objects."""
+"""From the context to targets: the transforms and keys that an editor means, here and nowhere else.
+
+In a Dope Sheet or Graph Editor these are the transforms whose channels are shown, elsewhere the selected objects.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
@@ -9,6 +14,7 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from ..animation import Refused, key_frames, modes_of
 from ..animation.describing import frame_in_action, segment_at
 from ..animation.mode_keys import source_of
+from ..animation.transforms import Transform, transform_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
@@ -19,66 +25,101 @@ SCOPES = [
     (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their modes"),
     (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their modes"),
 ]
-"""What of an object gets a mode, as the items of an enum property."""
+"""What of a target gets a mode, as the items of an enum property."""
+
+Frames = tuple[float, ...] | None
+"""Frames of keys, None for all of a target."""
 
 
 def is_key_editor(context: bpy.types.Context) -> bool:
     return context.area is not None and context.area.type in KEY_EDITORS
 
 
-def objects_for(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The objects that an operator acts on here."""
-    if is_key_editor(context):
-        return _shown_in_editor(context)
+def active_target(context: bpy.types.Context) -> Transform | None:
+    """What panels and ticks in menus are about."""
+    return None if context.object is None else transform_of(context.object)
+
+
+def each_target(context: bpy.types.Context) -> Iterator[Transform]:
+    """What an operator acts on here, one after the other: polls need no more than the first that fits."""
+    objects = _shown_in_editor(context) if is_key_editor(context) else selected_objects(context)
+    return map(transform_of, objects)
+
+
+def targets_of(context: bpy.types.Context) -> list[Transform]:
+    """What an operator acts on here."""
+    return list(each_target(context))
+
+
+def selected_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected objects, without any the active one."""
     return list(context.selected_objects) or [obj for obj in (context.object,) if obj is not None]
 
 
 def scope_for(context: bpy.types.Context) -> str:
-    """What of them gets a mode here, unless asked for otherwise."""
+    """What of the targets gets a mode here, unless asked for otherwise."""
     return SELECTED if is_key_editor(context) else WHOLE
 
 
-def frames_meant(context: bpy.types.Context, obj: bpy.types.Object, scope: str) -> np.ndarray | None:
-    """The keys of an object that begin the segments meant, None for all of it. `Refused` where there are none."""
+def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> Frames:
+    """The keys of a target that begin the segments meant, None for all of it. `Refused` where there are none."""
     if scope == WHOLE:
         return None
     if scope == SELECTED:
-        frames = key_frames(obj, selected=True)
+        frames = key_frames(target, selected=True)
         if not len(frames):
-            raise Refused(f"{obj.name}: no key of location, rotation or scale is selected")
-        return frames
-    source = source_of(obj)
+            raise Refused(f"{target.name}: no key of location, rotation or scale is selected")
+        return tuple(frames.tolist())
+    source = source_of(target)
     if source is None:
-        raise Refused(f"{obj.name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)")
-    segment = segment_at(source, frame_in_action(obj, context.scene.frame_current_final))
+        raise Refused(f"{target.name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)")
+    segment = segment_at(source, frame_in_action(target.animated, context.scene.frame_current_final))
     if segment is None:
-        raise Refused(f"{obj.name}: the playhead is not between two keys; move it there, or select keys instead")
-    return np.array([segment.key])
+        raise Refused(f"{target.name}: the playhead is not between two keys; move it there, or select keys instead")
+    return (segment.key,)
 
 
-def modes_meant(context: bpy.types.Context, obj: bpy.types.Object | None, scope: str) -> set[str]:
-    """The modes that what is meant of an object has now."""
-    if obj is None:
+def grouped_by_frames(
+    context: bpy.types.Context, targets: Iterable[Transform], scope: str, refused: list[Refused]
+) -> dict[Frames, list[Transform]]:
+    """The targets whose segments meant begin on the same keys, together. `refused` takes why others have none."""
+    groups: dict[Frames, list[Transform]] = {}
+    for target in targets:
+        try:
+            groups.setdefault(frames_meant(context, target, scope), []).append(target)
+        except Refused as refusal:
+            refused.append(refusal)
+    return groups
+
+
+def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str) -> set[str]:
+    """The modes that what is meant of a target has now."""
+    if target is None:
         return set()
     try:
-        frames = frames_meant(context, obj, scope)
+        meant = frames_meant(context, target, scope)
     except ValueError:
         return set()
-    keys = key_frames(obj)
-    if frames is None:
-        frames = keys if len(keys) else np.zeros(1)
+    keys = key_frames(target)
+    frames = keys if meant is None else np.array(meant)
+    if not len(frames):
+        frames = np.zeros(1)
     # The last key begins no segment. Alone it still has a mode, for keys to come.
-    return set(modes_of(obj, frames[~np.isin(frames, keys[-1:])] if len(frames) > 1 else frames))
+    return set(modes_of(target, frames[~np.isin(frames, keys[-1:])] if len(frames) > 1 else frames))
 
 
-def _shown_in_editor(context: bpy.types.Context) -> list[bpy.types.Object]:
+def _shown_in_editor(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
     shown = {fcurve.as_pointer() for fcurve in context.visible_fcurves or ()}
-    return [obj for obj in context.view_layer.objects if any(one.as_pointer() in shown for one in fcurves_of(obj))]
+    if shown:
+        only_selected = context.space_data.dopesheet.show_only_selected
+        for obj in context.selected_objects if only_selected else context.view_layer.objects:
+            if any(fcurve.as_pointer() in shown for fcurve in fcurves_of(obj)):
+                yield obj
 
 
-def fcurves_of(obj: bpy.types.Object) -> bpy.types.bpy_prop_collection | tuple:
+def fcurves_of(animated: bpy.types.Object) -> bpy.types.bpy_prop_collection | tuple:
     """The F-curves of an object's slot. Looks at nothing else in the file, for it is asked of many objects."""
-    data = obj.animation_data
+    data = animated.animation_data
     if data is None or data.action is None or data.action_slot is None:
         return ()
     channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)

@@ -1,4 +1,4 @@
-"""The words of the interface: what modes are called, what is to be said of a segment, lines that fit a panel."""
+"""The words of the interface: names of modes, notes on a segment, summaries, lines that fit a panel."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import bpy
 from ..animation import Reduction
 from ..animation.describing import SegmentFacts
 from ..animation.properties import MODE_ITEMS
+from ..animation.transforms import Transform
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
@@ -22,6 +23,10 @@ NO_SEGMENT = "No segment on this frame"
 STRIPS = "Moved by strips: enter one to see its segments (NLA Editor, Tab)"
 BAKED = "Baked to keys. Un-Bake brings its own keys back"
 OUT_OF_DATE = "The keys have changed since: Live Update is off, in the preferences"
+DELTA_EDITED = (
+    "The delta transform holds the in-betweens, so this edit of it lasts until the frame changes. "
+    "To keep it, edit Delta Transform below"
+)
 
 NEAR_HALF_TURN = math.radians(170.0)
 """From here on a small change of a key may send the object round the other way."""
@@ -31,20 +36,20 @@ def cautions(segment: SegmentFacts) -> list[str]:
     """What an animator may not expect of a segment, and what to do about it. Nothing where it is Blender's own."""
     if segment.mode == "BLENDER":
         return []
-    said = []
+    texts = []
     if segment.long_way:
-        said.append(
+        texts.append(
             "Blender turns this segment by more than half a turn; the mode goes the short way. "
             "To go the long way, set a key in between"
         )
     if segment.turn > NEAR_HALF_TURN:
-        said.append(
+        texts.append(
             f"{degrees(segment.turn)} is nearly half a turn: a small change of a key can send it the other way round. "
             "To be sure, set a key in between"
         )
     if segment.scales_unevenly:
-        said.append("The scale is not the same along all axes, and stays Blender's own")
-    return said
+        texts.append("The scale is not the same along all axes, and stays Blender's own")
+    return texts
 
 
 def degrees(angle: float) -> str:
@@ -60,13 +65,13 @@ def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
     return bpy.utils.units.to_string(settings.system, "LENGTH", units * settings.scale_length, precision=precision)
 
 
-def reduction_told(scene: bpy.types.Scene, reduction: Reduction) -> str:
-    """What became of the keys of an object."""
+def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
+    """What became of the keys of a target."""
     error = length(scene, reduction.largest_error, precision=3)
-    told = f"{reduction.before} keys became {reduction.after}, largest error {error}"
+    summary = f"{reduction.before} keys became {reduction.after}, largest error {error}"
     if len(reduction.segments) > 1:
-        told += f"; segments: {', '.join(counted_modes(reduction.segments))}"
-    return told
+        summary += f"; segments: {', '.join(counted_modes(reduction.segments))}"
+    return summary
 
 
 def counted_modes(segments: Mapping[str, int]) -> list[str]:
@@ -78,6 +83,11 @@ def listed(items: Sequence[str], most: int = 3) -> str:
     """A list that fits into a line."""
     rest = len(items) - most
     return ", ".join(items[:most]) + (f" and {rest} more" if rest > 0 else "")
+
+
+def names_of(targets: Sequence[Transform]) -> str:
+    """One target by its name, several by their number."""
+    return targets[0].name if len(targets) == 1 else f"{len(targets)} objects"
 
 
 def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:

@@ -46,14 +46,30 @@ MODE_MENUS = [menu for menu in menus.CLASSES if menu.__name__.startswith("RIGID_
 @pytest.mark.parametrize("menu", MODE_MENUS, ids=lambda menu: menu.__name__)
 def test_every_menu_offers_every_mode(tool, menu):
     offered = [properties.mode for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"]
-    # A pie has eight slices, and this is the motion of the screw.
-    left_out = {"pga_slerp"} if "_pie_" in menu.__name__ else set()
-    assert sorted(offered) == sorted(set(MODE_IDS) - left_out)
+    assert sorted(offered) == sorted(MODE_IDS)
 
 
-@pytest.mark.parametrize("menu", [menus.RIGID_MOTION_MT_pie_object, menus.RIGID_MOTION_MT_pie_keys])
-def test_a_pie_has_no_more_than_eight_slices(tool, menu):
-    assert len(drawn(menu)) == 8
+PIES = [menus.RIGID_MOTION_MT_pie_object, menus.RIGID_MOTION_MT_pie_keys]
+
+
+@pytest.mark.parametrize("menu", [menu for menu in MODE_MENUS if menu not in PIES], ids=lambda menu: menu.__name__)
+def test_menus_have_blenders_own_first_and_then_the_mode_to_take_for_most(tool, menu):
+    offered = [properties.mode for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"]
+    assert offered[:3] == ["BLENDER", "motor_spline", "dq_sclerp"]
+
+
+@pytest.mark.parametrize("menu", PIES)
+def test_a_pie_has_a_slice_for_each_mode_and_no_more(tool, menu):
+    west, east, _south, north, *_ = (properties.mode for _, _, properties in drawn(menu))
+    assert (west, east, north) == ("BLENDER", "dq_sclerp", "motor_spline")
+    # More than eight slices would go into a menu below the pie.
+    assert len(drawn(menu)) == len(MODE_IDS) == 8
+
+
+@pytest.mark.parametrize("mode", MODE_IDS)
+def test_a_pie_ticks_every_mode_that_is_chosen(tool, mode):
+    bpy.ops.rigid_motion.set_mode(mode=mode)
+    assert [p.mode for _, icon, p in drawn(PIES[0]) if icon == "CHECKMARK"] == [mode]
 
 
 def test_the_mode_that_is_chosen_is_ticked(tool):

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
+from addon import animation
 from addon.animation import (
     MODE_IDS,
     bake_poses,
@@ -19,6 +20,7 @@ from addon.animation import (
 )
 from addon.motion import MODES, Poses, interpolate, shell_error
 from addon.ui.operators import CLASSES
+from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
@@ -124,7 +126,7 @@ def test_one_that_refuses_is_named_and_the_others_are_done(tool, capfd):
     assert modes(tool) == ["dq_sclerp"] * 3
     assert stubborn.rigid_motion.mode == "BLENDER"
     said = capfd.readouterr().out
-    assert "Tool: Screw (Dual Quaternion)" in said
+    assert "1 of 2 objects: Screw (Dual Quaternion). But" in said
     assert "Stubborn turns by axis and angle" in said
 
 
@@ -145,11 +147,13 @@ def test_without_a_selection_the_active_object_is_meant(tool):
 
 REASONS = {
     "unbake": "None of these objects is baked",
-    **dict.fromkeys(("restore_keys", "let_keys_go"), "The keys of these objects are not reduced"),
+    **dict.fromkeys(("restore_keys", "discard_dense_keys"), "The keys of these objects are not reduced"),
 }
 
 
-@pytest.mark.parametrize("name", ["set_mode", "clear", "bake", "unbake", "reduce_keys", "restore_keys", "let_keys_go"])
+@pytest.mark.parametrize(
+    "name", ["set_mode", "clear", "bake", "unbake", "reduce_keys", "restore_keys", "discard_dense_keys"]
+)
 def test_without_any_object_an_operator_says_why_not(extension, name):
     operator = getattr(operators, name)
     assert not operator.poll()
@@ -215,9 +219,83 @@ def test_a_range_that_ends_before_its_start_is_refused(tool):
     assert not is_baked(tool)
 
 
-def test_an_object_without_a_mode_has_nothing_to_bake(tool):
-    with pytest.raises(RuntimeError, match="Tool has no rigid in-betweens to bake"):
-        operators.bake()
+def test_a_mode_for_many_is_one_verb_and_is_reported_in_one_line(tool, capfd, monkeypatch):
+    calls = []
+    set_mode = animation.set_mode
+    monkeypatch.setattr(animation, "set_mode", lambda *args, **kwargs: calls.append(args) or set_mode(*args, **kwargs))
+    others = [keyed(f"Other {number}") for number in range(3)]
+    operators.set_mode(mode="dq_sclerp")
+    assert len(calls) == 1
+    assert [modes(obj) for obj in (tool, *others)] == [["dq_sclerp"] * 3] * 4
+    assert "4 objects: Screw (Dual Quaternion)" in capfd.readouterr().out
+
+
+def test_selected_keys_that_differ_from_object_to_object_are_each_ones_own(tool):
+    other, third = keyed("Other"), keyed("Third")
+    for obj, frame in ((tool, 1.0), (other, 11.0), (third, 11.0)):
+        select_keys(obj, frame)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    assert modes(tool) == ["dq_sclerp", "BLENDER", "BLENDER"]
+    assert modes(other) == modes(third) == ["BLENDER", "dq_sclerp", "BLENDER"]
+    bpy.context.scene.frame_set(6)
+    assert np.linalg.norm(tool.delta_location) > 0.1
+    bpy.context.scene.frame_set(16)
+    assert np.linalg.norm(other.delta_location) > 0.1
+
+
+def refusal_of(name: str) -> str:
+    """Why an operator is greyed out; "" where it is not."""
+    operator = getattr(operators, name)
+    if operator.poll():
+        return ""
+    with pytest.raises(RuntimeError) as refused:
+        operator()
+    return str(refused.value)
+
+
+def test_buttons_with_nothing_to_do_are_greyed_out_with_the_reason(tool):
+    assert "choose a mode" in refusal_of("bake")
+    assert "Blender's own in-betweens already" in refusal_of("clear")
+    assert "None of these objects is baked" in refusal_of("unbake")
+    assert "not reduced" in refusal_of("restore_keys")
+    assert refusal_of("reduce_keys") == ""
+    operators.set_mode(mode="dq_sclerp")
+    assert refusal_of("bake") == refusal_of("clear") == ""
+    operators.bake()
+    assert "choose a mode" in refusal_of("bake")
+    assert refusal_of("unbake") == ""
+    operators.unbake()
+    assert refusal_of("bake") == ""
+    operators.clear()
+    assert "Blender's own in-betweens already" in refusal_of("clear")
+
+
+def test_a_mode_on_a_single_key_can_be_cleared(tool):
+    select_keys(tool, 11.0)
+    operators.set_mode(mode="dq_sclerp", on="SELECTED")
+    assert refusal_of("clear") == refusal_of("bake") == ""
+
+
+def test_a_mode_that_waits_for_keys_can_be_cleared_and_has_nothing_to_bake(extension):
+    obj = new_object()
+    obj.select_set(True)
+    operators.set_mode(mode="dq_sclerp")
+    assert refusal_of("clear") == ""
+    assert "choose a mode" in refusal_of("bake")
+
+
+def test_two_keys_have_nothing_to_reduce(tool):
+    assert refusal_of("reduce_keys") == ""
+    for fcurve in curves_of(tool).values():
+        for _ in range(2):
+            fcurve.keyframe_points.remove(fcurve.keyframe_points[-1])
+    assert "more than two keys" in refusal_of("reduce_keys")
+
+
+def test_one_object_with_something_to_do_is_enough(tool):
+    operators.set_mode(mode="dq_sclerp")
+    keyed("Other")
+    assert refusal_of("bake") == refusal_of("clear") == ""
 
 
 def recorded(name: str = "Tool", size: float = 1.0) -> bpy.types.Object:
@@ -318,7 +396,7 @@ def test_reducing_is_one_step_to_undo_and_to_redo(extension):
     assert is_reduced(bpy.data.objects["Tool"])
 
 
-def test_reduced_keys_are_restored_or_the_others_let_go(extension):
+def test_reduced_keys_are_restored_or_the_others_discarded(extension):
     obj = recorded()
     before = values(obj)
     operators.reduce_keys(tolerance=0.02)
@@ -327,10 +405,10 @@ def test_reduced_keys_are_restored_or_the_others_let_go(extension):
     assert not operators.restore_keys.poll()
     operators.reduce_keys(tolerance=0.02)
     reduced = values(obj)
-    assert operators.let_keys_go() == {"FINISHED"}
+    assert operators.discard_dense_keys() == {"FINISHED"}
     assert values(obj) == reduced
     assert not operators.restore_keys.poll()
-    assert not operators.let_keys_go.poll()
+    assert not operators.discard_dense_keys.poll()
     assert [action.name for action in bpy.data.actions] == ["ToolAction Reduced"]
 
 
@@ -338,7 +416,7 @@ def test_reduced_keys_that_were_baked_since_come_back_after_un_baking(extension)
     obj = recorded()
     operators.reduce_keys(tolerance=0.02)
     operators.bake()
-    with pytest.raises(RuntimeError, match="Tool was baked since it was reduced: Un-Bake first"):
+    with pytest.raises(RuntimeError, match="These keys were baked since: Un-Bake first"):
         operators.restore_keys()
     operators.unbake()
     operators.restore_keys()

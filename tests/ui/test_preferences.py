@@ -26,7 +26,7 @@ def chosen(empty_file):
 
 def test_without_preferences_there_are_defaults(extension):
     assert preferences() is None
-    assert default_mode() == "dq_sclerp"
+    assert default_mode() == "motor_spline"
 
 
 def test_the_colors_and_widths_are_those_of_the_overlay_at_first(chosen):
@@ -35,7 +35,7 @@ def test_the_colors_and_widths_are_those_of_the_overlay_at_first(chosen):
 
 
 def test_the_mode_where_none_is_named_is_the_default_one(chosen):
-    assert default_mode() == "dq_sclerp"
+    assert default_mode() == "motor_spline"
     chosen.default_mode = "pga_lerp"
     assert default_mode() == "pga_lerp"
     obj = keyed("Tool")

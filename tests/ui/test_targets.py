@@ -1,4 +1,4 @@
-"""Which objects an editor means. It needs no screen: areas and what they show are there in the background too."""
+"""Which transforms an editor means. It needs no screen: areas and what they show are there in the background too."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import bpy
 import pytest
 
 from addon.animation import modes_of
-from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, objects_for, scope_for
+from addon.animation.transforms import transform_of
+from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, scope_for, targets_of
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
 
@@ -34,9 +35,9 @@ def test_a_key_editor_means_the_objects_that_it_shows(tool, kind):
     with editor(kind) as space:
         assert scope_for(bpy.context) == SELECTED
         space.dopesheet.show_only_selected = True
-        assert objects_for(bpy.context) == [tool]
+        assert targets_of(bpy.context) == [transform_of(tool)]
         space.dopesheet.show_only_selected = False
-        assert set(objects_for(bpy.context)) == {tool, other}
+        assert set(targets_of(bpy.context)) == {transform_of(tool), transform_of(other)}
 
 
 @pytest.mark.parametrize("kind", KEY_EDITORS)
@@ -57,16 +58,16 @@ def test_elsewhere_the_selected_objects_are_meant_as_a_whole(tool):
     keyed("Left Out").select_set(False)
     with editor("VIEW_3D"):
         assert scope_for(bpy.context) == WHOLE
-        assert set(objects_for(bpy.context)) == {tool, other}
+        assert set(targets_of(bpy.context)) == {transform_of(tool), transform_of(other)}
 
 
 def test_the_modes_meant_are_those_of_the_scope(tool):
     select_keys(tool, 11.0)
     bpy.ops.rigid_motion.set_mode(mode="dq_sclerp", on=SELECTED)
     bpy.context.scene.frame_set(5)
-    assert modes_meant(bpy.context, tool, WHOLE) == {"BLENDER", "dq_sclerp"}
-    assert modes_meant(bpy.context, tool, SELECTED) == {"dq_sclerp"}
-    assert modes_meant(bpy.context, tool, CURRENT) == {"BLENDER"}
+    assert modes_meant(bpy.context, transform_of(tool), WHOLE) == {"BLENDER", "dq_sclerp"}
+    assert modes_meant(bpy.context, transform_of(tool), SELECTED) == {"dq_sclerp"}
+    assert modes_meant(bpy.context, transform_of(tool), CURRENT) == {"BLENDER"}
     bpy.context.scene.frame_set(50)
-    assert modes_meant(bpy.context, tool, CURRENT) == set()
+    assert modes_meant(bpy.context, transform_of(tool), CURRENT) == set()
     assert modes_meant(bpy.context, None, WHOLE) == set()

@@ -10,7 +10,7 @@ import pytest
 
 from addon.animation import Reduction
 from addon.animation.describing import SegmentFacts
-from addon.ui.wording import cautions, degrees, length, listed, reduction_told, wrapped
+from addon.ui.wording import cautions, degrees, length, listed, reduction_summary, wrapped
 
 PLAIN = SegmentFacts(
     first=1.0,
@@ -74,19 +74,19 @@ def test_no_text_has_no_lines():
     ("system", "scale", "said"),
     [("METRIC", 1.0, "0.93 mm"), ("METRIC", 0.01, "9.3 µm"), ("NONE", 1.0, "0.00093"), ("IMPERIAL", 1.0, "36.6 thou")],
 )
-def test_a_reduction_is_told_in_the_units_of_the_scene(empty_file, system, scale, said):
+def test_a_reduction_is_summed_up_in_the_units_of_the_scene(empty_file, system, scale, said):
     settings = bpy.context.scene.unit_settings
     settings.system, settings.scale_length = system, scale
     reduction = Reduction(before=251, after=18, largest_error=0.00093, segments={"motor_spline": 17})
-    assert reduction_told(bpy.context.scene, reduction) == f"251 keys became 18, largest error {said}"
+    assert reduction_summary(bpy.context.scene, reduction) == f"251 keys became 18, largest error {said}"
 
 
-def test_lengths_are_told_in_the_units_of_the_scene(empty_file):
+def test_lengths_are_in_the_units_of_the_scene(empty_file):
     bpy.context.scene.unit_settings.scale_length = 0.1
     assert length(bpy.context.scene, 20.0) == "2 m"
 
 
 def test_modes_are_counted_where_there_are_several_most_of_them_first(empty_file):
     reduction = Reduction(before=9, after=5, largest_error=0.0, segments={"lerp_slerp": 1, "motor_spline": 3})
-    told = reduction_told(bpy.context.scene, reduction)
-    assert told.endswith("; segments: 3 Smooth Screw (PGA), 1 Vector + Quaternion")
+    summary = reduction_summary(bpy.context.scene, reduction)
+    assert summary.endswith("; segments: 3 Smooth Screw (PGA), 1 Vector + Quaternion")

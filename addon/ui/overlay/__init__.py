@@ -1,7 +1,8 @@
-"""The overlay of the 3D viewport: the ways of the selected objects, Blender's own beside that of a rigid-motion mode.
+"""The overlay of the 3D viewport: paths of the selected objects, Blender's own beside that of a rigid-motion mode.
 
-settings    what to show                    points      where the ways lead, as arrays
-cache       what is worked out already      drawing     lines and dots on the screen
+settings    what to show                    points      where the paths lead, as arrays
+cache       what is worked out already      spacing     which ticks can be told apart in a view
+drawing     lines and dots on the screen
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Paths that were worked out already, and which of them an edit may have made wrong.
 
-Blender's handlers tell which objects and Actions were edited. Their paths are looked at again when they are next drawn,
-and worked out anew where the digest of the source, or something else that they depend on, is another one. So a frame
+Blender's handlers name the objects and Actions that were edited. Their paths are looked at again when next drawn, and
+worked out anew where the digest of the source, or something else that they depend on, is another one. So a frame
 that is merely played, or looked at from elsewhere, costs no more than looking paths up.
 """
 
@@ -16,6 +16,7 @@ from bpy.app.handlers import persistent
 
 from ...animation import key_frames
 from ...animation.mode_keys import source_of
+from ...animation.transforms import Transform, transform_of
 from .points import Path, axis_length_of, trace
 
 SPARE = 64
@@ -40,54 +41,66 @@ class _Entry:
     stale: bool = False
 
 
-_entries: OrderedDict[int, _Entry] = OrderedDict()
-"""By the session id of the object; those drawn last come last."""
+_entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
+"""By the identity of what is moved; those drawn last come last."""
 
 
-def path_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> Path | None:
-    """The path of an object, as the overlay of the scene is set.
+def path_of(target: bpy.types.Object | Transform, scene: bpy.types.Scene) -> Path | None:
+    """The path of a target, as the overlay of the scene is set.
 
     None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
     """
+    target = transform_of(target)
     overlay = scene.rigid_motion_overlay
     settings = (overlay.mode, overlay.tick_step, overlay.axes_size, scene.frame_start, scene.frame_end)
-    entry = _entries.get(obj.session_uid)
+    identity = _identity(target)
+    entry = _entries.get(identity)
     if entry is None or entry.stale or entry.settings != settings:
-        entry = _entries[obj.session_uid] = _read(obj, settings, entry)
-    _entries.move_to_end(obj.session_uid)
+        entry = _entries[identity] = _read(target, settings, entry)
+    _entries.move_to_end(identity)
     return entry.path
 
 
 def keep_only(drawn: int) -> None:
-    """Let go of paths that were not drawn for long, where this many were drawn just now."""
+    """Drop paths that were not drawn for long, where this many were drawn just now."""
     while len(_entries) > drawn + SPARE:
         _entries.popitem(last=False)
 
 
-def notice_selection(objects: Iterable[bpy.types.Object]) -> bool:
-    """Whether keys of these objects are selected otherwise than in their paths; those are looked at again then.
+def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
+    """Whether keys of these are selected otherwise than in their paths; those are looked at again then.
 
-    Selecting is no edit, so Blender's handlers tell nothing of it.
+    Selecting is no edit, so Blender's handlers are silent about it.
     """
-    entries = [(_entries[obj.session_uid], obj) for obj in objects if obj.session_uid in _entries]
+    targets = map(transform_of, targets)
+    entries = [(entry, target) for target in targets if (entry := _entries.get(_identity(target))) is not None]
     changed = [
-        entry for entry, obj in entries if entry.path and entry.selected != key_frames(obj, selected=True).tobytes()
+        entry
+        for entry, target in entries
+        if entry.path and entry.selected != key_frames(target, selected=True).tobytes()
     ]
     for entry in changed:
         entry.stale = True
     return bool(changed)
 
 
-def _read(obj: bpy.types.Object, settings: tuple, before: _Entry | None) -> _Entry:
-    action = obj.animation_data.action if obj.animation_data else None
+def _identity(target: Transform) -> tuple[int, str]:
+    return target.animated.session_uid, target.prefix
+
+
+def _read(target: Transform, settings: tuple, before: _Entry | None) -> _Entry:
+    data = target.animated.animation_data
+    action = data.action if data else None
     entry = _Entry(None, (), settings, action.session_uid if action else 0)
     try:
-        source = source_of(obj)
+        source = source_of(target)
         if source is not None:
             mode, tick_step, axes_size, *_ = settings
-            selected, axis_length = key_frames(obj, selected=True), axes_size * axis_length_of(obj, source)
+            selected = key_frames(target, selected=True)
+            axis_length = axes_size * axis_length_of(target.carrier, source)
             entry.selected = selected.tobytes()
-            entry.digest = (source.digest, entry.selected, axis_length, settings)
+            # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
+            entry.digest = (source.digest, tuple(source.rest.items()), entry.selected, axis_length, settings)
             if before is not None and before.digest == entry.digest:
                 entry.path = before.path
             else:
@@ -102,7 +115,7 @@ def _read(obj: bpy.types.Object, settings: tuple, before: _Entry | None) -> _Ent
 def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _entries:
         edited = {update.id.original.session_uid for update in depsgraph.updates}
-        for uid, entry in _entries.items():
+        for (uid, _), entry in _entries.items():
             entry.stale |= uid in edited or entry.action in edited
 
 

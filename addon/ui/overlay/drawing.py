@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import functools
 import logging
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
 import bpy
@@ -17,16 +18,18 @@ import numpy as np
 from mathutils import Vector
 
 from ...animation.describing import frame_in_action
+from ...animation.transforms import transform_of
 from ..look import DEFAULT_LOOK, Color
 from ..preferences import preferences
 from . import cache
 from .points import TICKS, Path, space_of, thinned
 from .settings import RigidMotionOverlay, are_paths_shown
+from .spacing import Readable, readable
 
 log = logging.getLogger(__package__)
 
 OUTLINE: Color = (0.0, 0.0, 0.0, 1.0)
-"""Around lines and dots, so that they are told from any background."""
+"""Around lines and dots, so that they stand out from any background."""
 
 WHITE: Color = (1.0, 1.0, 1.0, 1.0)
 """Keys that are not selected, as in the Dope Sheet."""
@@ -35,6 +38,9 @@ TICK, KEY, NOW = 6.0, 10.0, 12.0
 """Diameters of dots, outline included: ticks, keys, and where the object is on the current frame."""
 
 AXIS_OPACITY = 0.8
+
+MOST_VIEWS = 24
+"""Choices of ticks or axes that stay on the graphics card for each path, while it is looked at from here and there."""
 
 
 @functools.cache
@@ -77,36 +83,72 @@ def _dot_shader() -> gpu.types.GPUShader:
     return gpu.shader.create_from_info(info)
 
 
+Batch = gpu.types.GPUBatch | None
+"""Something on the graphics card; None where there is nothing of the kind."""
+
+
 @dataclass(frozen=True)
 class _Batches:
-    """A path on the graphics card; None where there is nothing of the kind."""
+    """A path on the graphics card."""
 
-    native: gpu.types.GPUBatch
-    wanted: gpu.types.GPUBatch | None
-    native_ticks: gpu.types.GPUBatch | None
-    wanted_ticks: gpu.types.GPUBatch | None
-    axes: tuple[gpu.types.GPUBatch | None, ...]
-    keys: gpu.types.GPUBatch | None
-    selected: gpu.types.GPUBatch | None
+    path: Path
+    native: Batch
+    wanted: Batch
+    keys: Batch
+    selected: Batch
+
+    views: dict[tuple, Readable] = field(default_factory=dict)
+    """What is drawn in the views that the path was last seen in."""
+
+    chosen: dict[tuple[str, bytes], tuple[Batch, ...]] = field(default_factory=dict)
+    """Ticks and axes: their name, and which of them can be told apart in a view."""
 
     @classmethod
     def of(cls, path: Path) -> _Batches:
         return cls(
+            path,
             native=_batch("LINE_STRIP", thinned(path.native)),
             wanted=None if path.wanted is None else _batch("LINE_STRIP", thinned(path.wanted)),
-            native_ticks=_batch("POINTS", path.native_ticks),
-            wanted_ticks=_batch("POINTS", path.wanted_ticks),
-            axes=tuple(_batch("LINES", path.axes[:, axis].reshape(-1, 3)) for axis in range(3)),
             keys=_batch("POINTS", path.keys[~path.selected]),
             selected=_batch("POINTS", path.keys[path.selected]),
         )
+
+    def readable(self, pen: _Pen, *, every_tick: bool) -> Readable:
+        """What of the path can be told apart in the view that is being drawn."""
+        projection = np.array(gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
+        view = projection.tobytes(), pen.size, pen.scale, every_tick
+        if view not in self.views:
+            if len(self.views) >= MOST_VIEWS:
+                self.views.clear()
+            self.views[view] = readable(self.path, projection, pen.size, pen.scale, every_tick=every_tick)
+        return self.views[view]
+
+    def ticks(self, name: str, chosen: np.ndarray) -> Batch:
+        """Some of the ticks that the path has by this name."""
+        (batch,) = self._of_view(name, chosen, lambda: (_batch("POINTS", getattr(self.path, name)[chosen]),))
+        return batch
+
+    def axes(self, chosen: np.ndarray) -> tuple[Batch, ...]:
+        """Some of the axes: x, y, z."""
+        axes = self.path.axes
+        return self._of_view(
+            "axes", chosen, lambda: tuple(_batch("LINES", axes[chosen, axis].reshape(-1, 3)) for axis in range(3))
+        )
+
+    def _of_view(self, name: str, chosen: np.ndarray, make: Callable[[], tuple[Batch, ...]]) -> tuple[Batch, ...]:
+        key = name, chosen.tobytes()
+        if key not in self.chosen:
+            if len(self.chosen) >= MOST_VIEWS:
+                self.chosen.clear()
+            self.chosen[key] = make()
+        return self.chosen[key]
 
 
 _batches: WeakKeyDictionary[Path, _Batches] = WeakKeyDictionary()
 
 
-def _batch(kind: str, points: np.ndarray | list | None) -> gpu.types.GPUBatch | None:
-    if points is None or not len(points):
+def _batch(kind: str, points: np.ndarray | list) -> Batch:
+    if not len(points):
         return None
     vertices = gpu.types.GPUVertBuf(_vertex_format(), len(points))
     vertices.attr_fill("pos", np.ascontiguousarray(points, dtype=np.float32))
@@ -132,20 +174,20 @@ class _Pen:
         self.size = context.region.width, context.region.height
         self.scale = context.preferences.system.ui_scale
 
-    def line(self, batch: gpu.types.GPUBatch | None, color: Color, width: float) -> None:
+    def line(self, batch: Batch, color: Color, width: float) -> None:
         if batch:
             self.lines.uniform_float("viewportSize", self.size)
             self.lines.uniform_float("lineWidth", width * self.scale)
             self.lines.uniform_float("color", color)
             batch.draw(self.lines)
 
-    def outlined_line(self, batch: gpu.types.GPUBatch | None, color: Color, width: float) -> None:
+    def outlined_line(self, batch: Batch, color: Color, width: float) -> None:
         self.line(batch, OUTLINE, width + 2.0)
         self.line(batch, color, width)
 
     def dot(
         self,
-        batch: gpu.types.GPUBatch | None,
+        batch: Batch,
         color: Color,
         diameter: float,
         outline: Color = OUTLINE,
@@ -193,10 +235,10 @@ def _complain(problem: Exception) -> None:
 
 
 def _draw(context: bpy.types.Context) -> None:
-    scene, depsgraph, selected = context.scene, context.view_layer.depsgraph, context.selected_objects
-    settings = scene.rigid_motion_overlay
-    paths = [(obj, path) for obj in selected if (path := cache.path_of(obj, scene)) is not None]
-    cache.keep_only(len(selected))
+    scene, depsgraph = context.scene, context.view_layer.depsgraph
+    settings, targets = scene.rigid_motion_overlay, list(map(transform_of, context.selected_objects))
+    paths = [(target, path) for target in targets if (path := cache.path_of(target, scene)) is not None]
+    cache.keep_only(len(targets))
     if not paths:
         return
     pen = _Pen(context)
@@ -205,12 +247,12 @@ def _draw(context: bpy.types.Context) -> None:
     gpu.state.depth_test_set("NONE")
     gpu.state.program_point_size_set(True)
     try:
-        for obj, path in paths:
-            space = space_of(obj, depsgraph)
+        for target, path in paths:
+            space = space_of(target.carrier, depsgraph)
             with gpu.matrix.push_pop():
                 gpu.matrix.multiply_matrix(space)
                 _draw_path(pen, path, settings)
-            native, wanted = path.at(frame_in_action(obj, scene.frame_current_final))
+            native, wanted = path.at(frame_in_action(target.animated, scene.frame_current_final))
             if settings.show_native or wanted is None:
                 native_now.append(space @ Vector(native))
             if wanted is not None:
@@ -227,15 +269,16 @@ def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
     if batches is None:
         batches = _batches[path] = _Batches.of(path)
     look = pen.look
+    chosen = batches.readable(pen, every_tick=settings.tick_step > 0)
     if settings.show_axes:
-        for batch, color in zip(batches.axes, pen.axis_colors, strict=True):
+        for batch, color in zip(batches.axes(chosen.axes), pen.axis_colors, strict=True):
             pen.line(batch, color, 0.75 * look.line_width)
     if settings.show_native or batches.wanted is None:
         pen.outlined_line(batches.native, look.native_color, 0.6 * look.line_width)
-        pen.dot(batches.native_ticks, OUTLINE, TICK, look.native_color, 1.25)
+        pen.dot(batches.ticks("native_ticks", chosen.native_ticks), OUTLINE, TICK, look.native_color, 1.25)
     if batches.wanted is not None:
         pen.outlined_line(batches.wanted, look.mode_color, look.line_width)
-        pen.dot(batches.wanted_ticks, look.tick_color, TICK)
+        pen.dot(batches.ticks("wanted_ticks", chosen.wanted_ticks), look.tick_color, TICK)
     diameter = KEY if len(path.keys) <= TICKS else TICK
     pen.dot(batches.keys, WHITE, diameter)
     pen.dot(batches.selected, look.key_color, diameter)

@@ -37,7 +37,7 @@ FINENESS = 5000
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The way of one object's origin, as Blender's own in-betweens have it and as a mode has it."""
+    """The path of one object's origin, as Blender's own in-betweens have it and as a mode has it."""
 
     frames: np.ndarray
     """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
@@ -54,14 +54,20 @@ class Path:
     selected: np.ndarray
     """Which of the keys are selected, shape (k,)."""
 
+    tick_frames: np.ndarray
+    """Evenly spaced frames, shape (t,)."""
+
     native_ticks: np.ndarray
-    """Where Blender has it at evenly spaced frames, shape (t, 3)."""
+    """Where Blender has it on these, shape (t, 3)."""
 
     wanted_ticks: np.ndarray | None
-    """Where the mode has it on the same frames, shape (t, 3)."""
+    """Where the mode has it on these, shape (t, 3)."""
+
+    axis_frames: np.ndarray
+    """Those of the frames with ticks that have axes, shape (a,)."""
 
     axes: np.ndarray
-    """How it is turned at some ticks, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
+    """How it is turned on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
 
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
@@ -103,14 +109,15 @@ def trace(
     """
     if len(source.key_frames) < 2:
         return None
-    first, last = source.frame_range
+    first, last = source.seen_range
     keys = source.keyed_frames
     ticks = tick_frames(first, last, tick_step)
+    with_axes = axis_frames(ticks)
     samples = np.unique(np.concatenate((sample_frames(first, last), keys)))
     frames = np.union1d(samples, ticks)
     motion = in_betweens(source, frames, mode)
     on_samples, on_keys, on_ticks, on_axes = (
-        np.searchsorted(frames, some) for some in (samples, keys, ticks, axis_frames(ticks))
+        np.searchsorted(frames, wanted_frames) for wanted_frames in (samples, keys, ticks, with_axes)
     )
     is_native = not source.is_live if mode is None else mode == "BLENDER"
     native, wanted = motion.native.positions, motion.wanted.positions
@@ -120,8 +127,10 @@ def trace(
         wanted=None if is_native else wanted[on_samples],
         keys=native[on_keys],
         selected=np.isin(keys, () if selected is None else selected),
+        tick_frames=ticks,
         native_ticks=native[on_ticks],
         wanted_ticks=None if is_native else wanted[on_ticks],
+        axis_frames=with_axes,
         axes=_axes((motion.native if is_native else motion.wanted)[on_axes], axis_length),
     )
 

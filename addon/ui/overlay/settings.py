@@ -46,7 +46,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     tick_step: IntProperty(
         name="Frame Step",
-        description="Frames from one tick to the next. At 0, as many ticks as can be told apart",
+        description="Frames from one tick to the next. At 0, as many ticks as can be told apart on the screen",
         min=0,
         soft_max=100,
         options=set(),

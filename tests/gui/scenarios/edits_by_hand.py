@@ -134,10 +134,10 @@ def played(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def baked(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
-    """By the pie of the Dope Sheet, and back from its Key menu: the same poses all the while."""
+    """From the Key menu of the Dope Sheet, and back: the same poses all the while."""
     keys, before = snapshot(cube()), shown()
-    yield from hand.hover(places.key(sheet, 100))
-    yield from hand.pie("T", "S", alt=True)
+    yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
+    yield from hand.choose("Bake to Keys")
     yield from hand.press("RET")
     assert key_frames(cube()).tolist() == list(range(1, 41)), key_frames(cube())
     types = [key.type for key in curves_of(cube())["location", 0].keyframe_points]

@@ -13,7 +13,7 @@ from tests.gui.driver import Hand, Steps
 
 FRAMES = (1, 20, 40)
 BETWEEN = range(4, 41, 9)
-BLENDER, STRAIGHT, SCREW = "BLENDER", "lerp_slerp", "dq_sclerp"
+BLENDER, STRAIGHT, SCREW, MOTOR_SCREW, SMOOTH = "BLENDER", "lerp_slerp", "dq_sclerp", "pga_slerp", "motor_spline"
 PIE = "wm.call_menu_pie"
 
 ROW = 26
@@ -80,9 +80,21 @@ def scenario(hand: Hand) -> Steps[None]:
 def in_the_viewport(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By the pie, taken back, from the Object menu and from the context menu: for the whole object."""
     centre = places.centre(places.region(view))
-    x, y = centre
+    around = places.box_around(centre, 840, 380)
     yield from hand.hover(centre)
-    yield from hand.pie("T", "E", picture="pie", box=(x - 270, y - 160, 840, 320), alt=True)
+    yield from hand.pie("T", "NE", alt=True)
+    assert_modes({}, MOTOR_SCREW)
+    yield from hand.hover(centre)
+    yield from hand.pie("T", "W", picture="pie-ticks-the-mode", box=around, alt=True)
+    assert_modes({}, BLENDER)
+    yield from hand.hover(centre)
+    yield from hand.pie("T", "N", alt=True)
+    assert_modes({}, SMOOTH)
+    yield from hand.hover(centre)
+    for _ in range(3):
+        yield from hand.press("Z", ctrl=True)
+    assert_modes({}, BLENDER)
+    yield from hand.pie("T", "E", picture="pie", box=around, alt=True)
     assert_modes({}, SCREW)
     yield from hand.press("Z", ctrl=True)
     assert_modes({}, BLENDER)
@@ -112,7 +124,7 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
     yield from hand.press("UP_ARROW")
     yield from hand.press("RIGHT_ARROW")
-    yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 330, 900, 560))
+    yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 120, 920, 520))
     yield from hand.choose("Screw (Dual Quaternion)")
     yield from hand.picture("panel-of-keys", places.box(places.region(sheet, "UI")))
     assert_modes({1: 2, 20: 0})
@@ -124,7 +136,7 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     yield from hand.choose("Motor Blend (PGA)")
     assert_modes({1: 2, 20: 3, 40: 0})
     yield from hand.hover(places.key(sheet, 100))
-    yield from hand.pie("T", "SE", picture="pie-of-keys", alt=True)
+    yield from hand.pie("T", "SW", picture="pie-of-keys", alt=True)
     assert_modes({1: 2, 20: 6, 40: 0})
     yield from hand.press("A", alt=True)
     yield from hand.pie("T", "E", alt=True)
@@ -138,7 +150,7 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.open_sidebar(view, "Animation")
     x, y = yield from hand.find_button(view, "UI", "rigid_motion.mode")
     yield from hand.click((x, y))
-    yield from hand.choose_row(1)
+    yield from hand.choose_row(3)
     assert_modes({}, STRAIGHT)
     yield from hand.click((x, y - ROW))
     yield from hand.picture("modes-in-the-panel")
@@ -151,15 +163,16 @@ def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
 
 
 def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """By the pie and its dialog; and back by F3."""
+    """By the button and its dialog; and back by F3."""
     before = shown_worlds([cube()], BETWEEN)[0]
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.pie("T", "S", alt=True)
+    button = yield from hand.find_button(view, "UI", "rigid_motion.bake")
+    yield from hand.click(button)
     yield from hand.picture("bake")
     yield from hand.press("RET")
     assert len(cube().rigid_motion.bakes) == 1, "the dialog bakes"
     np.testing.assert_allclose(shown_worlds([cube()], BETWEEN)[0], before, atol=1e-5)
     yield from hand.picture("baked")
+    yield from hand.hover(places.centre(places.region(view)))
     yield from hand.search("Un-Bake")
     assert len(cube().rigid_motion.bakes) == 0
     assert_modes({1: 2, 20: 6, 40: 0})

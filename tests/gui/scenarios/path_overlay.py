@@ -91,6 +91,16 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert cube().rigid_motion.mode == "BLENDER", "looking changes nothing"
     x, y, width, height = places.box(places.region(view))
     yield from hand.picture("path-and-panel", (x + width - 860, y + height - 660, 860, 440))
+    yield from from_afar(hand, view)
+
+
+def from_afar(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """The line is seen between fewer ticks, and the keys are all there, however short the path is on the screen."""
+    for distance in (40, 90):
+        view.spaces.active.region_3d.view_distance = distance
+        seen = yield from look(hand, view, f"from-afar-{distance}")
+        assert seen[MODE] > 1200 / distance, (distance, seen)
+    view.spaces.active.region_3d.view_distance = 12
 
 
 def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:

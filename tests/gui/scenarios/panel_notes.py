@@ -1,4 +1,4 @@
-"""What the panel tells of one object after the other, in its words and on the screen; and the preferences.
+"""What the panel shows of one object after the other, in its words and on the screen; and the preferences.
 
 The words are those of the installed extension. That drawing them raises no error, the test sees in Blender's console.
 """
@@ -47,7 +47,7 @@ class Reader:
 
     def __init__(self, hand: Hand, view: bpy.types.Area) -> None:
         self.hand, self.view = hand, view
-        self.panels = import_module(f"{extension().module}.ui.panels")
+        self.notes = import_module(f"{extension().module}.ui.notes")
         self.before = np.empty(0)
 
     def read(self, name: str, *words: str, mode: str | None = None) -> Steps[None]:
@@ -63,7 +63,7 @@ class Reader:
             That of the segment under the playhead, None where the panel shows no segment.
         """
         yield
-        segment, notes = self.panels.facts_and_notes(cube(), bpy.context.scene.frame_current)
+        segment, notes = self.notes.facts_and_notes(cube(), bpy.context.scene.frame_current)
         assert (segment.mode if segment else None) == mode, segment
         assert len(notes) == len(words), notes
         for (_, text), part in zip(notes, words, strict=True):
@@ -85,6 +85,7 @@ def scenario(hand: Hand) -> Steps[None]:
     reader = Reader(hand, view)
     yield from easy(reader)
     yield from awkward(reader)
+    yield from edited_beside(reader)
     yield from broken(reader)
     bpy.context.view_layer.objects.active = None
     yield from reader.look("nothing-active")
@@ -97,8 +98,22 @@ def easy(reader: Reader) -> Steps[None]:
     key({1: 0, 20: 90})
     bpy.context.scene.frame_set(10)
     yield from reader.read("native", mode="BLENDER")
+    assert not bpy.ops.rigid_motion.bake.poll(), "there is nothing to bake"
     bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    assert bpy.ops.rigid_motion.bake.poll()
     yield from reader.read("screw", mode=SCREW)
+    shown = bpy.context.window_manager.rigid_motion_shown
+    seen = cube().matrix_basis.translation
+    assert (seen - cube().location).length > 0.05, "the object stands elsewhere than the Item tab says"
+    assert np.allclose(shown.location, seen, atol=1e-5)
+    yield from reader.hand.open_sidebar(reader.view, "Item")
+    yield from reader.look("item-tab")
+    yield from reader.hand.open_sidebar(reader.view, "Animation")
+    key({1: 0, 20: 90}, "XYZ")
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    yield from reader.read("screw-by-euler-angles", mode=SCREW)
+    key({1: 0, 20: 90})
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
     bpy.context.scene.frame_set(30)
     yield from reader.read("outside-the-keys", "No segment")
     bpy.ops.rigid_motion.bake(step=0.5)
@@ -132,6 +147,25 @@ def awkward(reader: Reader) -> Steps[None]:
     bpy.ops.rigid_motion.refresh()
     yield from reader.read("refreshed", mode=STRAIGHT)
     extension().preferences.live_update = True
+
+
+def edited_beside(reader: Reader) -> Steps[None]:
+    """Edits that do not last: of delta transforms with in-betweens in them; and another user of the same Action."""
+    key({1: 0, 20: 90})
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    cube().delta_location = (0, 1, 0)
+    yield from reader.read("delta-edited", "lasts until the frame changes", mode=SCREW)
+    bpy.context.scene.frame_set(11)
+    yield from reader.read("delta-back", mode=SCREW)
+
+    other = bpy.data.objects.new("Other", cube().data)
+    bpy.context.collection.objects.link(other)
+    other.rotation_mode, data = "XYZ", other.animation_data_create()
+    data.action, data.action_slot = cube().animation_data.action, cube().animation_data.action_slot
+    bpy.context.view_layer.objects.active = other
+    yield from reader.look("second-user")
+    bpy.context.view_layer.objects.active = cube()
+    bpy.data.objects.remove(other)
 
 
 def broken(reader: Reader) -> Steps[None]:

@@ -1,0 +1,64 @@
+"""Notes of the panel on a target and a frame: the segment, what is amiss, and the way out."""
+
+from __future__ import annotations
+
+import bpy
+
+from .. import animation
+from ..animation.describing import SegmentFacts, frame_in_action, has_edited_differences, is_up_to_date, segment_at
+from ..animation.mode_keys import active_place, source_of
+from ..animation.records import recorded_digest
+from ..animation.slots import places_of
+from ..animation.sources import Source
+from ..animation.transforms import Transform, transform_of
+from .wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS, cautions
+
+Notes = list[tuple[str, str]]
+"""Texts, each behind its icon."""
+
+
+def facts_and_notes(target: bpy.types.Object | Transform, frame: float) -> tuple[SegmentFacts | None, Notes]:
+    """The segment that a frame of the scene is in, and notes on it."""
+    target = transform_of(target)
+    source, problem = _read(target)
+    segment = None
+    notes = []
+    if problem:
+        notes.append(("ERROR", problem))
+    elif source is None:
+        data = target.animated.animation_data
+        in_strips = data is not None and any(track.strips for track in data.nla_tracks)
+        notes.append(("INFO", STRIPS if in_strips else NO_KEYS))
+    else:
+        frame = frame_in_action(target.animated, frame)
+        segment = segment_at(source, frame)
+        notes += [("ERROR", caution) for caution in cautions(segment)] if segment else [("INFO", NO_SEGMENT)]
+        if not is_up_to_date(target, source):
+            notes.append(("ERROR", OUT_OF_DATE))
+        elif target.animated.visible_get() and has_edited_differences(target, frame):
+            # What is hidden need not have been evaluated on this frame.
+            notes.append(("INFO", DELTA_EDITED))
+    if animation.is_baked(target):
+        notes.append(("INFO", BAKED))
+    return segment, notes
+
+
+_problem: tuple[tuple, str] = ((), "")
+"""The last answer of `problem_of`, which looks through all frames; and before it, all that it depends on."""
+
+
+def _read(target: Transform) -> tuple[Source | None, str]:
+    """What is keyed, or why rigid motion cannot act on it."""
+    global _problem
+    try:
+        source = source_of(target)
+    except ValueError as problem:
+        return None, str(problem)
+    if source is None:
+        return None, animation.problem_of(target)
+    # What the slot was filled in from as well: of several users it is the source of the leading one.
+    place = active_place(target, places_of(target))
+    depends_on = (target.animated.session_uid, target.prefix, source.digest, place and recorded_digest(place))
+    if _problem[0] != depends_on:
+        _problem = depends_on, animation.problem_of(target)
+    return (None if _problem[1] else source), _problem[1]

@@ -1,0 +1,95 @@
+"""The transform that is seen on the screen, as properties to be drawn by a panel: in the scene's units, and read-only.
+
+Where in-betweens are in the delta transforms, the Item tab has Blender's own values, and the object stands elsewhere.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import bpy
+from bpy.props import FloatVectorProperty, PointerProperty
+
+from ..animation.describing import shown_components
+from ..animation.sources import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..animation.transforms import Refused
+from .targets import active_target
+
+log = logging.getLogger(__package__)
+
+
+def _components(part: slice) -> list[float]:
+    """Some of the ten components of the active target as it is seen; it is asked for as it is drawn."""
+    shown = None
+    try:
+        if (target := active_target(bpy.context)) is not None:
+            shown = shown_components(target)
+    except Refused:
+        pass  # a note of the panel has the reason
+    except Exception:
+        # Blender goes on with an error that is raised here, and crashes.
+        log.exception("The transform on the screen cannot be shown")
+    return (REST if shown is None else shown)[part].tolist()
+
+
+# Blender holds no reference of its own to these: unnamed ones would be gone by the time that it asks.
+
+
+def _location(_: ShownTransform) -> list[float]:
+    return _components(ROWS[LOCATION])
+
+
+def _quaternion(_: ShownTransform) -> list[float]:
+    return _components(ROWS[ROTATION])
+
+
+def _euler(_: ShownTransform) -> list[float]:
+    return _components(slice(3, 6))
+
+
+def _scale(_: ShownTransform) -> list[float]:
+    return _components(ROWS[SCALE])
+
+
+class ShownTransform(bpy.types.PropertyGroup):
+    """Of the active target of the context. Nothing of it is stored."""
+
+    location: FloatVectorProperty(
+        name="Location",
+        description="Where the object is seen on this frame: its location with the in-betweens",
+        subtype="TRANSLATION",
+        precision=5,
+        get=_location,
+    )
+    rotation_quaternion: FloatVectorProperty(
+        name="Rotation",
+        description="How the object is seen turned on this frame: its rotation with the in-betweens",
+        size=4,
+        subtype="QUATERNION",
+        precision=3,
+        get=_quaternion,
+    )
+    rotation_euler: FloatVectorProperty(
+        name="Rotation",
+        description="How the object is seen turned on this frame: its rotation with the in-betweens",
+        subtype="EULER",
+        precision=5,
+        get=_euler,
+    )
+    scale: FloatVectorProperty(
+        name="Scale",
+        description="How large the object is seen on this frame: its scale with the in-betweens",
+        subtype="XYZ",
+        precision=3,
+        get=_scale,
+    )
+
+
+def register() -> None:
+    bpy.utils.register_class(ShownTransform)
+    bpy.types.WindowManager.rigid_motion_shown = PointerProperty(type=ShownTransform)
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.rigid_motion_shown
+    bpy.utils.unregister_class(ShownTransform)

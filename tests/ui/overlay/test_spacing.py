@@ -1,0 +1,107 @@
+"""Ticks and axes leave the line of a path to be seen: in a view that looks down on it, a unit as wide as is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.ui.overlay.points import Path
+from addon.ui.overlay.spacing import CLEAR, TICK_GAP, on_screen, readable
+
+SIZE = (1000.0, 500.0)
+
+
+def straight(frames: int, places: np.ndarray | None = None, *, mode: bool = False, keys: tuple = (0, -1)) -> Path:
+    """A path along x with a tick on each of its frames, by one unit in all, or with these places."""
+    at = np.arange(1.0, frames + 1.0)
+    line = np.zeros((frames, 3))
+    line[:, 0] = np.linspace(0.0, 1.0, frames) if places is None else places
+    return Path(
+        frames=at,
+        native=line,
+        wanted=line if mode else None,
+        keys=line[list(keys)],
+        selected=np.zeros(len(keys), dtype=bool),
+        tick_frames=at,
+        native_ticks=line,
+        wanted_ticks=line if mode else None,
+        axis_frames=at,
+        axes=np.repeat(line[:, None, None], 3, axis=1).repeat(2, axis=2),
+    )
+
+
+def view(width: float) -> np.ndarray:
+    """An orthographic projection in which a unit is so many pixels wide."""
+    return np.diag((2.0 * width / SIZE[0], 2.0 * width / SIZE[1], 0.0, 1.0))
+
+
+def ticks(path: Path, width: float, **options: object) -> np.ndarray:
+    """The frames of the ticks that are drawn."""
+    return path.tick_frames[readable(path, view(width), SIZE, **options).native_ticks]
+
+
+def test_the_middle_of_a_view_is_where_nothing_is_moved_to():
+    assert on_screen(np.zeros((1, 3)), view(100.0), SIZE).tolist() == [[500.0, 250.0]]
+    assert on_screen(np.array([[1.0, 1.0, 0.0]]), view(100.0), SIZE).tolist() == [[600.0, 350.0]]
+
+
+def test_behind_the_viewer_there_is_no_place_on_the_screen():
+    projection = np.eye(4)[[0, 1, 2, 2]]
+    assert np.isnan(on_screen(np.array([[0.0, 0.0, -1.0]]), projection, SIZE)).all()
+
+
+def test_a_long_path_has_all_its_ticks_but_those_under_keys():
+    assert ticks(straight(41), 40 * TICK_GAP).tolist() == list(range(2, 41))
+
+
+@pytest.mark.parametrize(("gap", "step"), [(TICK_GAP, 1), (TICK_GAP / 2, 2), (TICK_GAP / 3, 5), (TICK_GAP / 8, 10)])
+def test_the_shorter_a_path_the_fewer_ticks_and_all_are_evenly_timed(gap, step):
+    found = ticks(straight(101), 100 * gap)
+    assert (np.diff(found) == step).all()
+    assert (found % step == 0.0).all()
+    assert len(found) >= 100 // step - 2
+
+
+def test_a_path_that_is_seen_as_a_dot_has_no_ticks():
+    assert not len(ticks(straight(41), 3.0))
+    assert not len(ticks(straight(41, np.zeros(41)), 1000.0))
+
+
+def test_no_tick_touches_another_or_a_key_where_the_object_slows_down():
+    eased = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 61))
+    path = straight(61, eased)
+    chosen = readable(path, view(900.0), SIZE).native_ticks
+    drawn = 900.0 * eased[chosen]
+    assert (np.diff(drawn) >= CLEAR).all()
+    assert drawn.min() >= CLEAR
+    assert drawn.max() <= 900.0 - CLEAR
+    # In the middle, where it is fast, there is one on every frame.
+    assert chosen[20:40].all()
+
+
+def test_a_rest_takes_no_ticks_from_what_moves():
+    rests = np.concatenate((np.zeros(50), np.linspace(0.0, 1.0, 11)))
+    found = ticks(straight(61, rests), 10 * TICK_GAP)
+    assert found.tolist() == list(range(52, 61))
+
+
+def test_both_paths_have_ticks_on_the_same_frames():
+    path = straight(41, mode=True)
+    found = readable(path, view(20 * TICK_GAP), SIZE)
+    assert (found.native_ticks == found.wanted_ticks).all()
+    assert found.native_ticks.any()
+
+
+def test_axes_are_further_apart_than_ticks():
+    found = readable(straight(41), view(40 * TICK_GAP), SIZE)
+    assert 2 < found.axes.sum() < found.native_ticks.sum() / 2
+
+
+def test_on_a_screen_of_twice_the_resolution_it_is_the_same():
+    one = readable(straight(41), view(200.0), SIZE)
+    two = readable(straight(41), view(200.0), (2 * SIZE[0], 2 * SIZE[1]), 2.0)
+    assert (one.native_ticks == two.native_ticks).all()
+
+
+def test_ticks_that_somebody_asked_for_are_all_there():
+    assert len(ticks(straight(41), 3.0, every_tick=True)) == 41
