@@ -86,10 +86,8 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
         behind = np.searchsorted(keys, last) + margin
         ends.append((keys[max(before, 0)], keys[min(behind, len(keys) - 1)]))
     begin, end = new.frame_range
-    return (
-        max(begin, int(np.floor(min(first for first, _ in ends)))),
-        min(end, int(np.ceil(max(last for _, last in ends)))),
-    )
+    first = min(max(int(np.floor(min(first for first, _ in ends))), begin), end)
+    return first, max(first, min(int(np.ceil(max(last for _, last in ends))), end))
 
 
 def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:

@@ -17,6 +17,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import insertion, known_sources
+from .densification import keep_motion
 from .filling import clear, fill_in, hold_originals, is_complete, restore_originals
 from .inbetweens import differences
 from .mode_property import adopt_from_properties, show_awaited, show_modes
@@ -155,7 +156,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
             idle.append(place)
             restore_originals(place.users)
         elif source.digest != before or not is_complete(place, source):
-            if insertion.keep_pose(place, before, source, _State.frame, again=_State.again):
+            kept = insertion.keep_pose(place, before, source, _State.frame, again=_State.again)
+            if kept or keep_motion(place, before, source):
                 place = place.read_again()
                 (source,) = keyed_in([place])
                 if not _is_wanted(place, source, before):

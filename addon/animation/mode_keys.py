@@ -21,7 +21,7 @@ from .mode_property import await_mode, is_keyed
 from .reading import read
 from .records import record_mode, recorded_mode
 from .refusals import refuse_numbers
-from .slots import GROUP, SlotTransform, slot_transforms_of
+from .slots import GROUP, SlotTransform, places_of, slot_transforms_of
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
 from .transforms import WIDTHS, Channel, Refused, Transform, transform_of
 
@@ -54,14 +54,15 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
 
     Keys of the mode channel count among the selected ones.
     """
-    place = active_place(transform_of(carrier))
+    transform = transform_of(carrier)
+    place = active_place(transform, places_of(transform))
     return np.empty(0) if place is None else _frames_in(place, selected=selected)
 
 
 def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
     """The modes of the segments at these frames. Without an Action, the mode that is awaited."""
     transform = transform_of(carrier)
-    place = active_place(transform)
+    place = active_place(transform, places_of(transform))
     if place is None:
         return [transform.motion.mode or "BLENDER"] * len(frames)
     return [MODE_NAMES[number] for number in _modes_in(place, frames)]

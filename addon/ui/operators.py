@@ -173,8 +173,7 @@ class RIGID_MOTION_OT_bake(_OnTargets, bpy.types.Operator):
     bl_label = "Bake to Keys"
     bl_description = (
         "Put the in-betweens on location, rotation and scale as real keys of type Generated, in a copy of the Action, "
-        "for hand-over to programs that read keys only. Un-Bake gives the original back. "
-        "Blender's own Bake Keyframes knows nothing of modes: it gives Blender's own in-betweens"
+        "for hand-over to programs that read keys only. Un-Bake gives the original back"
     )
 
     nothing_to_do = "There are no rigid in-betweens to bake: choose a mode for keys of these objects first"

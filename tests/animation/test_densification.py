@@ -1,0 +1,109 @@
+"""Bake Keyframes and Bake Channels on live in-betweens keep the motion that was seen."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import bpy
+import pytest
+
+from addon.animation import key_frames, set_mode
+from tests.animation.oracle import curves_of, shown_worlds
+from tests.animation.scenes import key, new_object
+
+FRAMES = range(1, 41)
+
+
+@pytest.fixture(params=["QUATERNION", "YZX"])
+def tool(request, live_file) -> bpy.types.Object:
+    """An object that moves by screws, all keys selected."""
+    obj = key(new_object(rotation_mode=request.param), scale="even")
+    set_mode(obj, "cga_slerp")
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    for fcurve in curves_of(obj).values():
+        fcurve.select = True
+        select(fcurve, FRAMES)
+    return obj
+
+
+def select(fcurve: bpy.types.FCurve, frames) -> None:
+    """Have the keys on these frames selected, with their handles, and no others."""
+    for point in fcurve.keyframe_points:
+        for part in ("select_control_point", "select_left_handle", "select_right_handle"):
+            setattr(point, part, point.co.x in frames)
+
+
+@contextmanager
+def dope_sheet():
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, "DOPESHEET_EDITOR"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            yield
+    finally:
+        area.type = before
+
+
+def bake_keyframes():
+    with dope_sheet():
+        bpy.ops.action.bake_keys()
+    bpy.context.view_layer.update()
+
+
+def test_bake_keyframes_keeps_the_motion(tool):
+    before = shown_worlds([tool], FRAMES)[0]
+    bake_keyframes()
+    assert len(key_frames(tool)) == 40
+    assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)
+
+
+def test_where_only_a_channel_is_selected_all_get_keys(tool):
+    before = shown_worlds([tool], FRAMES)[0]
+    for (path, index), fcurve in curves_of(tool).items():
+        select(fcurve, FRAMES if (path, index) == ("location", 0) else ())
+    bake_keyframes()
+    assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)
+
+
+def test_between_selected_keys_alone(tool):
+    before = shown_worlds([tool], FRAMES)[0]
+    for fcurve in curves_of(tool).values():
+        select(fcurve, (11.0, 24.0))
+    bake_keyframes()
+    assert len(key_frames(tool)) == 4 + 12
+    # The other segments have their own in-betweens, as before.
+    assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=1e-3)
+
+
+def test_keys_that_are_not_on_the_curves_stay_as_they_are(tool):
+    fcurve = curves_of(tool)["location", 0]
+    for frame in (14.0, 17.0):
+        fcurve.keyframe_points.insert(frame, 7.0)
+    bpy.context.view_layer.update()
+    assert [point.co.y for point in fcurve.keyframe_points if point.co.x in (14.0, 17.0)] == [7.0, 7.0]
+
+
+def test_undo_and_redo_give_the_same_motion(tool):
+    before = shown_worlds([tool], FRAMES)[0]
+    bpy.ops.ed.undo_push(message="begin")
+    with dope_sheet():
+        bpy.ops.action.bake_keys()
+    bpy.ops.ed.undo_push(message="baked")
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo()
+    assert shown_worlds([bpy.data.objects["Tool"]], FRAMES)[0] == pytest.approx(before, abs=2e-5)
+    bpy.ops.ed.redo()
+    assert len(key_frames(bpy.data.objects["Tool"])) == 40
+    assert shown_worlds([bpy.data.objects["Tool"]], FRAMES)[0] == pytest.approx(before, abs=2e-5)
+
+
+@pytest.mark.parametrize("remove", [False, True])
+def test_bake_channels_keeps_the_motion(tool, remove):
+    before = shown_worlds([tool], FRAMES)[0]
+    with dope_sheet():
+        bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, remove_outside_range=remove, interpolation_type="LIN")
+    bpy.context.view_layer.update()
+    assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)

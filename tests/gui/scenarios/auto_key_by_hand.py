@@ -1,0 +1,81 @@
+"""Auto Key on frames between keys, and an Action that goes and comes: what lands where, in a window.
+
+What is put somewhere (snapped, grabbed) stays there once it is keyed, and nothing of an in-between stays on the cube.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from tests.animation.oracle import assert_shown, key_frames
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+from tests.gui.scenarios.edits_by_hand import ALIKE, FRAMES, SCREW, WHOLE, assert_on_the_screw, cube, key_the_cube
+
+CURSOR = (1.0, 2.0, 0.5)
+
+
+def place() -> np.ndarray:
+    """Where the cube is on the screen."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return np.array(cube().evaluated_get(depsgraph).matrix_world)
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator works with Auto Key between the keys of a screw, and exchanges its Action."""
+    hand.window.workspace = bpy.data.workspaces["Animation"]
+    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    view = hand.area("VIEW_3D")
+    key_the_cube()
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.pie("T", "E", alt=True)
+    assert_on_the_screw(*FRAMES)
+    bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
+    yield from snapped(hand, view)
+    yield from grabbed(hand, view)
+    yield from unlinked(hand)
+
+
+def snapped(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Shift S, Selection to Cursor: the cube is keyed where the cursor is, and turned as it was on the screen."""
+    bpy.context.scene.cursor.location = CURSOR
+    before = place()
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.pie("S", "N", shift=True)
+    yield from hand.wait_until(lambda: 10.0 in key_frames(cube()), "the snapped cube is keyed")
+    np.testing.assert_allclose(place()[:3, 3], CURSOR, atol=ALIKE)
+    np.testing.assert_allclose(place()[:3, :3], before[:3, :3], atol=ALIKE)
+    assert_on_the_screw(1, 10, 20, 40)
+    yield from hand.picture("snapped")
+
+
+def grabbed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """G X 2 on a frame between keys: two metres from where it was on the screen."""
+    bpy.context.scene.frame_set(30)
+    before = place()
+    yield from hand.hover(places.centre(places.region(view)))
+    for key in ("G", "X", "TWO", "RET"):
+        yield from hand.press(key)
+    yield from hand.wait_until(lambda: 30.0 in key_frames(cube()), "the grabbed cube is keyed")
+    before[0, 3] += 2.0
+    np.testing.assert_allclose(place(), before, atol=ALIKE)
+    assert_on_the_screw(1, 10, 20, 30, 40)
+
+
+def unlinked(hand: Hand) -> Steps[None]:
+    """The Action is unlinked in the Action Editor on a frame between keys, and chosen again."""
+    sheet = hand.area("DOPESHEET_EDITOR")
+    sheet.spaces.active.mode = "ACTION"
+    bpy.context.scene.frame_set(15)
+    action, slot = cube().animation_data.action, cube().animation_data.action_slot
+    action.use_fake_user = True
+    with bpy.context.temp_override(window=hand.window, area=sheet, region=places.region(sheet)):
+        bpy.ops.action.unlink()
+    yield from hand.wait_until(lambda: cube().animation_data.action is None, "the Action is unlinked")
+    yield from hand.wait_until(lambda: not any(cube().rigid_motion.filled), "the cube has its own delta transforms")
+    assert tuple(cube().delta_location) == (0.0, 0.0, 0.0)
+    cube().animation_data.action, cube().animation_data.action_slot = action, slot
+    yield from hand.wait_until(lambda: cube().rigid_motion.mode == SCREW, "the mode is back with the Action")
+    assert_shown([cube()], WHOLE)
+    yield from hand.picture("chosen-again")
