@@ -55,8 +55,10 @@ def grabbed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     bpy.context.scene.frame_set(30)
     before = place()
     yield from hand.hover(places.centre(places.region(view)))
-    for key in ("G", "X", "TWO", "RET"):
+    for key in ("G", "X"):
         yield from hand.press(key)
+    yield from hand.type("2")
+    yield from hand.press("RET")
     yield from hand.wait_until(lambda: 30.0 in key_frames(cube()), "the grabbed cube is keyed")
     before[0, 3] += 2.0
     np.testing.assert_allclose(place(), before, atol=ALIKE)
