@@ -1,0 +1,42 @@
+"""The same work by turns, and what is told of the seconds that it takes."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+
+Seconds = dict[str, list[float]]
+
+TABLE = (
+    "| what | Rigid Motion: median (fastest) | beside: median (fastest) | ratio | goal |",
+    "|---|---:|---:|---:|---:|",
+)
+
+
+def in_turns(rounds: int, **contestants: Callable[[], object]) -> Seconds:
+    """Seconds of every round of each."""
+    seconds: Seconds = {name: [] for name in contestants}
+    for _ in range(rounds):
+        for name, run in contestants.items():
+            start = time.perf_counter()
+            run()
+            seconds[name].append(time.perf_counter() - start)
+    return seconds
+
+
+def told(seconds: Sequence[float]) -> str:
+    """The median, and the fastest where there are several."""
+    fastest = f" ({min(seconds):.3f})" if len(seconds) > 1 else ""
+    return f"{statistics.median(seconds):.3f} s{fastest}"
+
+
+def judged(value: float, goal: float, unit: str = "") -> str:
+    """Whether a figure is within its goal."""
+    return f"at most {goal:g}{unit}: {'met' if value <= goal else 'missed'}"
+
+
+def against(ours: Sequence[float], theirs: Sequence[float]) -> str:
+    """How many times faster ours is, or slower."""
+    ratio = statistics.median(theirs) / statistics.median(ours)
+    return f"{ratio:.1f} times faster" if ratio >= 1.0 else f"{1.0 / ratio:.1f} times as long"

@@ -1,0 +1,194 @@
+"""The benchmark of live in-betweens: its scenes are what it says, and its pages follow from what was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import channelbag_of, read_poses
+from scripts import benchmark_live
+from scripts.live_benchmark.baking import long_bakes
+from scripts.live_benchmark.everyday import everyday
+from scripts.live_benchmark.scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
+from scripts.live_benchmark.shots import KEY, SAMPLE, choosing, file_sizes, samples_of, shot, shots, what_is_left
+from scripts.live_benchmark.turns import against, judged, told
+
+SMALL = Size(3, 5, 40)
+
+
+@pytest.fixture
+def live_file(empty_file):
+    animation.register()
+    yield
+    animation.set_enabled(True)
+    animation.unregister()
+
+
+def tables(lines) -> dict[str, list[list[str]]]:
+    """The cells of each table's rows, by the heading above it; every row is as wide as its head."""
+    found: dict[str, list[list[str]]] = {}
+    for line in lines:
+        assert "nan" not in line
+        if line.startswith("### "):
+            heading = line.removeprefix("### ")
+            found[heading] = []
+        elif line.startswith("|"):
+            found[heading].append([cell.strip() for cell in line.strip("|").split("|")])
+    for rows in found.values():
+        assert {len(row) for row in rows} == {len(rows[0])}
+        del rows[:2]
+    return found
+
+
+@pytest.mark.usefixtures("live_file")
+def test_everyday_work_is_told_for_quaternions_and_euler_angles():
+    size = Size(3, 10, 40)
+    found = tables(everyday(size, 1))
+    assert list(found) == [f"{size}, turned by QUATERNION", f"{size}, turned by XYZ"]
+    for rows in found.values():
+        assert [row[0] for row in rows] == [
+            "one key edited, and the view updated",
+            "another object moved",
+            "all frames played",
+            "all in-betweens anew",
+            "all in-betweens anew",
+        ]
+
+
+@pytest.mark.usefixtures("live_file")
+def test_choosing_a_mode_is_told_beside_native_baking_and_its_goal():
+    found = tables(choosing(SMALL, 1))
+    assert list(found) == [f"A mode for {SMALL}, turned by QUATERNION", f"A mode for {SMALL}, turned by XYZ"]
+    for chosen, updated in found.values():
+        assert chosen[0] == "`set_mode` for all in one call"
+        assert chosen[2].startswith("`bake_action_objects`: ")
+        assert chosen[4] == "at most 0.2 s: met"
+        assert updated[0] == "the same, and the view updated"
+
+
+@pytest.mark.usefixtures("live_file")
+def test_shots_are_told_for_every_motion_and_rotation_mode():
+    found = tables(shots(SMALL, 1))
+    assert list(found) == [
+        f"A shot of {SMALL}, turned by {rotation_mode}, {motion}"
+        for motion in MOTIONS
+        for rotation_mode in ("QUATERNION", "XYZ")
+    ]
+
+
+@pytest.mark.usefixtures("live_file")
+def test_a_shot_tells_the_ratios_of_what_stands_beside_them(monkeypatch):
+    sizes = iter(((100_000, 1_000_000), (390_000, 6_100_000), (780_000, 24_400_000)))
+    monkeypatch.setattr("scripts.live_benchmark.shots.file_sizes", lambda: next(sizes))
+    page = list(shot(SMALL, "QUATERNION", "about general axes", 3))
+    (rows,) = tables(page).values()
+    assert [row[0] for row in rows] == [
+        "`set_mode` for all in one call",
+        "the same, and the view updated",
+        "the view updated after an edit of each",
+        *["the file, compressed"] * 2,
+        *["the file, not compressed"] * 2,
+    ]
+    edit = rows[2]
+    assert "Blender's own update" in edit[2]
+    assert edit[4].startswith("at most 3: ")
+    assert [row[1:] for row in rows[3:]] == [
+        ["0.39 MB", "without modes: 0.10 MB", "3.9 times as large", "at most 4: met"],
+        ["0.39 MB", "baked by `bake_action_objects`: 0.78 MB", "0.50 times as large", ""],
+        ["6.10 MB", "without modes: 1.00 MB", "6.1 times as large", "at most 6: missed"],
+        ["6.10 MB", "baked by `bake_action_objects`: 24.40 MB", "0.25 times as large", ""],
+    ]
+
+
+@pytest.mark.usefixtures("live_file")
+@pytest.mark.parametrize(
+    ("rotation_mode", "motion", "components"),
+    [
+        ("QUATERNION", "about general axes", 7),
+        ("XYZ", "about general axes", 6),
+        ("QUATERNION", "in a plane", 4),
+        ("XYZ", "in a plane", 3),
+    ],
+)
+def test_a_planar_motion_has_samples_of_fewer_components(rotation_mode, motion, components):
+    objects = scene_of(SMALL, rotation_mode, MOTIONS[motion])
+    assert samples_of(objects) == []
+    set_modes(objects, MODE)
+    assert samples_of(objects) == [SMALL.frames] * components * SMALL.objects
+
+
+@pytest.mark.usefixtures("live_file")
+def test_a_file_is_larger_by_its_samples_and_keys():
+    (obj,) = scene_of(Size(1, 2, 5001), "QUATERNION")
+    plain = file_sizes()[1]
+    set_modes([obj], MODE)
+    assert file_sizes()[1] - plain == pytest.approx(7 * 5001 * SAMPLE, rel=0.02)
+    set_modes([obj], "BLENDER")
+    channelbag_of(obj).fcurves.find("location").keyframe_points.add(10_000)
+    assert file_sizes()[1] - plain == pytest.approx(10_000 * KEY, rel=0.02)
+
+
+def test_what_is_left_follows_from_the_samples():
+    lines = what_is_left(Size(10, 20, 1000), [1000] * 70, (500_000, 1_220_000), (80_000, 100_000), refresh=0.008)
+    text = " ".join(lines)
+    assert max(map(len, lines)) <= 120
+    assert "here 7 of each object" in text
+    assert "16 bytes in Blender's file format: they are 1.12 MB of the 1.22 MB" in text
+    assert "Compressed, a sample takes 6.0 bytes" in text
+    assert "20 keys of 72 bytes" in text
+    # 600 000 bytes, of which 100 000 are no samples, at 16 bytes for 10 000 poses.
+    assert "room for the samples of 3.1 components" in text
+    assert "in 800 ns for each pose" in text
+
+
+@pytest.mark.usefixtures("live_file")
+def test_long_bakes_are_told_beside_each_other():
+    found = tables(long_bakes((Size(1, 5, 50), Size(1, 5, 100)), 2))
+    (rows,) = found.values()
+    assert [row[0] for row in rows] == ["50 frames", "100 frames", "100 frames beside 50"]
+    assert rows[0][4] == rows[1][4] == "at most 5 s: met"
+    assert rows[2][4].startswith("at most 2.2: ")
+
+
+@pytest.mark.usefixtures("live_file")
+def test_native_baking_keys_what_is_shown_and_gives_it_back():
+    objects = scene_of(SMALL, "QUATERNION")
+    set_modes(objects, MODE)
+    actions = [obj.animation_data.action for obj in objects]
+    frames = np.arange(1, SMALL.frames + 1)
+    shown = read_poses(objects[1], frames)
+    native = NativeBaking(objects, range(1, SMALL.frames + 1))
+    animation.set_enabled(False)
+    native.bake()
+    fcurve = channelbag_of(objects[1]).fcurves.find("location", index=2)
+    assert len(fcurve.keyframe_points) == SMALL.frames
+    objects[1].delta_location, objects[1].delta_rotation_quaternion = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    np.testing.assert_allclose(read_poses(objects[1], frames).positions, shown.positions, atol=1e-5)
+    native.restore()
+    assert [obj.animation_data.action for obj in objects] == actions
+    np.testing.assert_allclose(read_poses(objects[1], frames).positions, shown.positions, atol=1e-6)
+
+
+def test_figures_are_judged_by_their_goals():
+    assert judged(2.2, 2.2) == "at most 2.2: met"
+    assert judged(0.21, 0.2, " s") == "at most 0.2 s: missed"
+    assert told([0.3, 0.1, 0.2]) == "0.200 s (0.100)"
+    assert told([0.25]) == "0.250 s"
+    assert against([0.1], [0.4]) == "4.0 times faster"
+    assert against([0.4], [0.1]) == "4.0 times as long"
+
+
+def test_the_command_goes_through_the_sections_that_it_is_asked_for(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(benchmark_live, "CHOOSING", SMALL)
+    monkeypatch.setattr(benchmark_live, "LONG", (Size(1, 5, 50), Size(1, 5, 100)))
+    page = tmp_path / "page.md"
+    assert benchmark_live.main(["--rounds", "1", "--only", "choosing", "baking", "--output", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "`python scripts/benchmark_live.py --rounds 1 --only choosing baking`" in text
+    assert [line for line in text.splitlines() if line.startswith("###")] == [
+        f"### A mode for {SMALL}, turned by QUATERNION",
+        f"### A mode for {SMALL}, turned by XYZ",
+        "### Baking one object with 5 keys",
+    ]
+    assert "50 and 100 frames of one object ..." in capsys.readouterr().err
