@@ -39,10 +39,10 @@ import addon_utils
 
 from addon import animation
 from addon.animation import Refused
-from addon.animation.mode_keys import segment_modes
-from addon.animation.reading import read
-from addon.animation.records import recorded_mode
-from addon.animation.slots import SlotTransform, slot_transforms_of
+from addon.animation.actions.reading import read
+from addon.animation.actions.records import recorded_mode
+from addon.animation.actions.slots import SlotTransform, slot_transforms_of
+from addon.animation.inbetweens.mode_keys import segment_modes
 from addon.animation.transforms import transform_of
 from addon.motion import KEYFRAME_MODES
 from scripts.blend_files import (

@@ -26,8 +26,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from addon import animation
-from addon.animation.inbetweens import in_betweens
-from addon.animation.mode_keys import source_of
+from addon.animation.inbetweens.differences import in_betweens
+from addon.animation.inbetweens.mode_keys import source_of
 from addon.motion import KEYFRAME_MODES, Poses, shell_error
 from addon.motion.eulers import extrinsic_eulers_from_quaternions
 from addon.motion.measures import rms

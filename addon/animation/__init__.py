@@ -1,23 +1,28 @@
 """Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
-transforms  what is moved, and where differences go     slots       what moves it, by which F-curves
-reading     what is keyed, from Blender's data          sources     the same as arrays
-curves      F-curves in NumPy                           refusals    why not, and the way out
-inbetweens  from sources to differences                 filling     writing those
-records     what an Action keeps: mode and digest       mode_property   what an object shows of it
-live        refreshing after every edit                 insertion   keys that are inserted in between
-acting      many targets at once                        mode_keys   choosing modes
-bake        real keys for every frame                   reducing    the few keys that a recording needs
-originals   what there was before either                describing  what there is to tell of a segment
+curves      F-curves in NumPy                           transforms  what is moved, and where differences go
+actions     what is keyed: slots, channels, modes       inbetweens  what happens between the keys
+baking      other keys for the same motion              properties  what is kept in files
+
+Each room knows only those before it.
 """
 
-from . import live, properties
-from .bake import bake, bake_poses, is_baked, unbake
-from .channels import channelbag_of, read_poses, write_channel
-from .live import problem_of, refresh, set_enabled
-from .mode_keys import key_frames, modes_of, set_mode
-from .reducing import Reduction, discard_dense_keys, is_reduced, radius_of, reduce_keys_of, reduction_of, restore_keys
-from .sources import MODE_IDS
+from . import properties
+from .actions.channels import channelbag_of, read_poses, write_channel
+from .actions.sources import MODE_IDS
+from .baking.bake import bake, bake_poses, is_baked, unbake
+from .baking.reducing import (
+    Reduction,
+    discard_dense_keys,
+    is_reduced,
+    radius_of,
+    reduce_keys_of,
+    reduction_of,
+    restore_keys,
+)
+from .inbetweens import live
+from .inbetweens.live import problem_of, refresh, set_enabled
+from .inbetweens.mode_keys import key_frames, modes_of, set_mode
 from .transforms import Refused
 
 __all__ = [

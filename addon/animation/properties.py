@@ -20,8 +20,8 @@ from bpy.props import (
 )
 
 from ..motion import KEYFRAME_MODES
-from . import live, mode_keys
-from .originals import BAKED, REDUCED
+from .baking.originals import BAKED, REDUCED
+from .inbetweens import live, mode_keys
 from .transforms import transform_of
 
 FIRST = ("motor_spline", "dq_sclerp")

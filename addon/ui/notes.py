@@ -5,11 +5,17 @@ from __future__ import annotations
 import bpy
 
 from .. import animation
-from ..animation.describing import SegmentFacts, frame_in_action, has_edited_differences, is_up_to_date, segment_at
-from ..animation.mode_keys import active_place, source_of
-from ..animation.records import recorded_digest
-from ..animation.slots import places_of
-from ..animation.sources import Source
+from ..animation.actions.records import recorded_digest
+from ..animation.actions.slots import places_of
+from ..animation.actions.sources import Source
+from ..animation.inbetweens.describing import (
+    SegmentFacts,
+    frame_in_action,
+    has_edited_differences,
+    is_up_to_date,
+    segment_at,
+)
+from ..animation.inbetweens.mode_keys import active_place, source_of
 from ..animation.transforms import Transform, transform_of
 from .wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS, cautions
 

@@ -16,12 +16,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
-from ..animation.describing import has_in_betweens, has_mode, has_more_keys_than
-from ..animation.live import paused
-from ..animation.originals import BAKED, REDUCED, WAYS_BACK, entries_in_use
+from ..animation.actions.slots import places_of
+from ..animation.baking.originals import BAKED, REDUCED, WAYS_BACK, entries_in_use
+from ..animation.baking.reducing import metres_per_unit
+from ..animation.inbetweens.describing import has_in_betweens, has_mode, has_more_keys_than
+from ..animation.inbetweens.live import paused
 from ..animation.properties import MODE_ITEMS
-from ..animation.reducing import metres_per_unit
-from ..animation.slots import places_of
 from ..animation.transforms import Transform
 from .preferences import DEFAULT_MODE, default_mode
 from .rows import labelled

@@ -8,9 +8,8 @@ from contextlib import suppress
 import bpy
 
 from .. import animation
-from ..animation.describing import SegmentFacts, has_in_betweens
-from ..animation.sources import SCALE
-from ..animation.transforms import ORIGINALS, Refused, Transform
+from ..animation.inbetweens.describing import SegmentFacts, has_in_betweens
+from ..animation.transforms import ORIGINALS, SCALE, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled

@@ -10,9 +10,8 @@ import logging
 import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
 
-from ..animation.describing import shown_components
-from ..animation.sources import LOCATION, REST, ROTATION, ROWS, SCALE
-from ..animation.transforms import Refused
+from ..animation.inbetweens.describing import shown_components
+from ..animation.transforms import LOCATION, REST, ROTATION, ROWS, SCALE, Refused
 from .targets import active_target
 
 log = logging.getLogger(__package__)

@@ -12,8 +12,8 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..animation import Refused, key_frames, modes_of
-from ..animation.describing import frame_in_action, segment_at
-from ..animation.mode_keys import source_of
+from ..animation.inbetweens.describing import frame_in_action, segment_at
+from ..animation.inbetweens.mode_keys import source_of
 from ..animation.transforms import Transform, transform_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import bpy
 
 from ..animation import Reduction
-from ..animation.describing import SegmentFacts
+from ..animation.inbetweens.describing import SegmentFacts
 from ..animation.properties import MODE_ITEMS
 from ..animation.transforms import Transform
 

@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import bake, filling, key_frames, modes_of, problem_of, refresh, set_mode, unbake
+from addon.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
+from addon.animation.inbetweens import filling
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 

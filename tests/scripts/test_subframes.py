@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from addon import animation
-from addon.animation.inbetweens import in_betweens
-from addon.animation.mode_keys import source_of
+from addon.animation.inbetweens.differences import in_betweens
+from addon.animation.inbetweens.mode_keys import source_of
 from addon.motion import KEYFRAME_MODES
 from scripts import subframes
 from scripts.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure

@@ -9,7 +9,7 @@ import bpy
 import pytest
 
 from addon.animation import Reduction
-from addon.animation.describing import SegmentFacts
+from addon.animation.inbetweens.describing import SegmentFacts
 from addon.ui.wording import cautions, degrees, length, listed, reduction_summary, wrapped
 
 PLAIN = SegmentFacts(

@@ -15,7 +15,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ...animation import key_frames
-from ...animation.mode_keys import source_of
+from ...animation.inbetweens.mode_keys import source_of
 from ...animation.transforms import Transform, transform_of
 from .points import Path, axis_length_of, trace
 

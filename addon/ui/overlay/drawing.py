@@ -17,7 +17,7 @@ import gpu
 import numpy as np
 from mathutils import Vector
 
-from ...animation.describing import frame_in_action
+from ...animation.inbetweens.describing import frame_in_action
 from ...animation.transforms import transform_of
 from ..look import DEFAULT_LOOK, Color
 from ..preferences import preferences

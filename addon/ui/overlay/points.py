@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...animation.inbetweens import in_betweens
-from ...animation.sources import Source
+from ...animation.actions.sources import Source
+from ...animation.inbetweens.differences import in_betweens
 from ...motion import Poses
 from ...motion.quaternions import rotate
 

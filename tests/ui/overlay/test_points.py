@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from addon.animation import MODE_IDS, set_mode
-from addon.animation.mode_keys import source_of
-from addon.animation.sources import ROWS
+from addon.animation.inbetweens.mode_keys import source_of
+from addon.animation.transforms import ROWS
 from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from addon.ui.overlay.cache import path_of
 from addon.ui.overlay.points import (

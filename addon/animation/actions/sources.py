@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..motion import KEYFRAME_MODES
-from .curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
+from ...motion import KEYFRAME_MODES
+from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
+from ..transforms import PART_OF, REST, ROTATION, ROWS, SCALE
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
 """The modes, and what the mode channel and saved files have for each. 0 is Blender's own in-betweens."""
@@ -30,16 +31,6 @@ UNKNOWN = -1
 
 LAYOUT = b"2"
 """How in-betweens are laid out in F-curves. With another number, those of older files are made anew."""
-
-LOCATION, ROTATION, SCALE = "location", "rotation", "scale"
-ROWS = {LOCATION: slice(0, 3), ROTATION: slice(3, 7), SCALE: slice(7, 10)}
-"""Where the components of each are, in arrays with a row for each of the ten. Euler angles leave row 6 alone."""
-
-PART_OF = tuple(name for name, own in ROWS.items() for _ in range(own.start, own.stop))
-"""Of which of them each row is a component."""
-
-REST = np.array((0, 0, 0, 1, 0, 0, 0, 1, 1, 1), dtype=np.float64)
-"""The components of something that is not moved. Rotations are quaternions where they are not channels."""
 
 FULL_TURN = 2.0 * np.pi
 

@@ -11,13 +11,13 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from ..motion.eulers import quaternions_from_extrinsic_eulers
-from .curves import cycled
+from ...motion.eulers import quaternions_from_extrinsic_eulers
+from ..actions.records import recorded_digest, recorded_mode
+from ..actions.slots import places_of
+from ..actions.sources import MODE_NAMES, SAME_FRAME, Source
+from ..curves import cycled
+from ..transforms import LOCATION, ROTATION, ROWS, SCALE, WIDTHS, Transform, transform_of
 from .mode_keys import active_place
-from .records import recorded_digest, recorded_mode
-from .slots import places_of
-from .sources import LOCATION, MODE_NAMES, ROTATION, ROWS, SAME_FRAME, SCALE, Source
-from .transforms import WIDTHS, Transform, transform_of
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""

@@ -10,12 +10,12 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .bake import channel_values
-from .inbetweens import in_betweens
+from ..actions.slots import SlotTransform
+from ..actions.sources import SAME_FRAME, Source
+from .channel_values import channel_values
+from .differences import in_betweens
 from .insertion import TOLERANCE
 from .known_sources import recall
-from .slots import SlotTransform
-from .sources import SAME_FRAME, Source
 
 
 def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:

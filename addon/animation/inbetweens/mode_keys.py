@@ -14,16 +14,16 @@ from functools import partial
 import bpy
 import numpy as np
 
+from ..actions.channels import replace_keys
+from ..actions.mode_property import await_mode, is_keyed
+from ..actions.reading import read
+from ..actions.records import record_mode, recorded_mode
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import GROUP, SlotTransform, places_of, slot_transforms_of
+from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
+from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
 from . import live
 from .acting import Readings, Targets, act_on
-from .channels import replace_keys
-from .mode_property import await_mode, is_keyed
-from .reading import read
-from .records import record_mode, recorded_mode
-from .refusals import refuse_numbers
-from .slots import GROUP, SlotTransform, places_of, slot_transforms_of
-from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
-from .transforms import WIDTHS, Channel, Refused, Transform, transform_of
 
 
 def active_place(transform: Transform, places: Iterable[SlotTransform] | None = None) -> SlotTransform | None:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from ..transforms import Transform
 from .records import has_mode, record_mode, recorded_mode
 from .slots import SlotTransform
 from .sources import MODE_NAMES, MODE_NUMBERS
-from .transforms import Transform
 
 
 def await_mode(transform: Transform, mode: str) -> None:

@@ -9,18 +9,19 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..motion import Poses
-from ..motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
-from ..motion.quaternions import align_signs, conjugate, multiply
-from .acting import Readings, Targets, act_on
-from .channels import add_cycles, code_of, write_channel
-from .inbetweens import InBetweens, in_betweens
-from .mode_keys import set_mode_in, set_whole
+from ...motion import Poses
+from ...motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
+from ...motion.quaternions import align_signs
+from ..actions.channels import add_cycles, code_of, write_channel
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import SlotTransform
+from ..actions.sources import SAME_FRAME, Source
+from ..inbetweens.acting import Readings, Targets, act_on
+from ..inbetweens.channel_values import channel_values
+from ..inbetweens.differences import in_betweens
+from ..inbetweens.mode_keys import set_mode_in, set_whole
+from ..transforms import Refused, Transform, transform_of
 from .originals import BAKED, has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
-from .refusals import refuse_numbers
-from .slots import SlotTransform
-from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, Source
-from .transforms import Refused, Transform, transform_of
 
 FIELDS = {
     "co": (2, np.float32),
@@ -217,49 +218,6 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
         set_whole(copy, "BLENDER")
     else:
         set_mode_in(copy.read_again(), "BLENDER", frames[:-1])
-
-
-def channel_values(transform: Transform, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
-    """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
-    own, poses, channels = source.original, motion.wanted, {}
-    first = source.values_at(motion.frames[:1])[:, 0]
-    if LOCATION in source.keyed:
-        channels["location"] = poses.positions - own[:3]
-    if ROTATION in source.keyed:
-        # In the sign and the turn that the animator's first key has.
-        quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))
-        if source.order is None:
-            channels[transform.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
-        else:
-            angles = extrinsic_eulers_from_quaternions(quaternions, source.order)
-            channels[transform.rotation] = _beginning_near(first[3:6], angles, source.order)
-    if poses.scales is not None and own[7:].mean() != 0.0:
-        # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
-        segments = np.searchsorted(source.key_frames, motion.frames, side="right") - 1
-        is_even = source.modes[np.clip(segments, 0, len(source.modes) - 1)] > 0
-        native = source.values_at(motion.frames)[7:].T
-        channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / own[7:].mean(), native)
-    # What is left alone before and behind goes on from the animator's values, whatever sign or turn they are in.
-    keys, ends = source.keyed_frames, source.values_at(motion.frames[[0, -1]]).T
-    for place, goes_on in (
-        (0, keys[0] < motion.frames[0] - SAME_FRAME),
-        (-1, keys[-1] > motion.frames[-1] + SAME_FRAME),
-    ):
-        if goes_on:
-            for name, prop in transform.properties.items():
-                if prop in channels:
-                    channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
-    return {transform.prefix + prop: values for prop, values in channels.items()}
-
-
-def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:
-    """The same turns as these Euler angles (m, 3), of which the first are as near to `first` (3,) as may be."""
-    # Half a turn more about the outer axes, and the middle one from the other side, turn alike.
-    middle = "XYZ".index(order[1])
-    others = angles + np.pi
-    others[:, middle] = np.pi - angles[:, middle]
-    near = [turned + 2.0 * np.pi * np.rint((first - turned[0]) / (2.0 * np.pi)) for turned in (angles, others)]
-    return min(near, key=lambda turned: float(np.abs(turned[0] - first).sum()))
 
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:

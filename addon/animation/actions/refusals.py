@@ -7,10 +7,10 @@ import math
 import bpy
 import numpy as np
 
-from .curves import LARGEST, Keys
+from ..curves import LARGEST, Keys
+from ..transforms import Refused, Transform
 from .slots import GROUP, SlotTransform, is_filled_in
 from .sources import MODE_NAMES, UNKNOWN, Source
-from .transforms import Refused, Transform
 
 MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""

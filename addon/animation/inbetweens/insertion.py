@@ -26,10 +26,10 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
+from ..actions.slots import SlotTransform
+from ..actions.sources import SAME_FRAME, Source
+from ..transforms import LOCATION, ROTATION, ROWS, SCALE, Transform
 from .known_sources import recall
-from .slots import SlotTransform
-from .sources import LOCATION, ROTATION, ROWS, SAME_FRAME, SCALE, Source
-from .transforms import Transform
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""

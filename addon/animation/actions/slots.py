@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from .transforms import MODE_PROPERTY, Channel, ObjectTransform, Transform
+from ..transforms import MODE_PROPERTY, Channel, ObjectTransform, Transform
 
 GROUP = "Rigid Motion"
 """The group of F-curves that the mode channel and the differences are in."""

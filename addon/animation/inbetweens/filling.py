@@ -3,28 +3,24 @@
 A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
 nothing of it. There are samples only where a mode counts, and only of components that it changes. Where some have to
 lie outside of the keys, a manual frame range keeps the Action, its strips and exports from being longer for it.
-
-Blender reads a sampled curve between two whole frames below zero one frame late. The samples of a range that begins
-there go round in a ring behind frame 0 instead, see `_Layout`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from .curves import Cycles
-from .inbetweens import differences
+from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
+from ..actions.slots import GROUP, SlotTransform, is_filled_in, is_replacing, slot_transforms_of
+from ..actions.sources import FULL_TURN, Source
+from ..transforms import ORIGINALS, PART_OF, ROTATION, Channel, Transform, default_of
+from .differences import differences
 from .known_sources import changed_range, recall
-from .records import record_in_betweens, recorded_digest, recorded_rows
-from .slots import GROUP, SlotTransform, is_filled_in, is_replacing, slot_transforms_of
-from .sources import FULL_TURN, PART_OF, ROTATION, Source
-from .transforms import ORIGINALS, Channel, Transform, default_of
+from .layout import Layout
 
 FARTHEST = 1_000_000
 """Frames from 0 up to which Blender can show any."""
@@ -34,111 +30,6 @@ UNSEEN = 1e-9
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
-
-ENDLESS = 2.0**20
-"""A step, in frames, that ends behind whatever Blender can show."""
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """How the samples on the whole frames of a range lie in an F-curve.
-
-    A range of n frames that begins below zero lies in a ring: frame f on f modulo n, and what is asked for below zero
-    is looked up a number of rounds later, by a Cycles modifier. Two Stepped modifiers hold the outermost frames.
-    """
-
-    first: int
-    last: int
-
-    ends: tuple[float, float]
-    """Where the outermost samples lie: not outside of the keys."""
-
-    cycles: Cycles | None = None
-    """How the channels repeat, and the differences with them."""
-
-    is_ring: bool = False
-
-    @classmethod
-    def of(cls, source: Source) -> _Layout:
-        first, last = source.frame_range
-        ends = (float(first), float(last))
-        if source.repeats or not source.goes_on:
-            begin, end = source.keyed_range
-            ends = max(first, begin), min(last, end)
-        cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, ends, cycles, first < 0 and cycles is None)
-
-    @property
-    def count(self) -> int:
-        """How many samples there are in the F-curve."""
-        return self.last - self.first + (2 if self.is_ring else 1)
-
-    @property
-    def outermost(self) -> tuple[float, float]:
-        """The frames that the first and the last sample lie on."""
-        return (0.0, float(self.count - 1)) if self.is_ring else self.ends
-
-    @cached_property
-    def _order(self) -> np.ndarray:
-        """Which sample of the range lies on each place of the ring."""
-        period = self.count - 1
-        return (np.arange(self.count) - self.first) % period
-
-    def points(self, samples: np.ndarray) -> np.ndarray:
-        """What goes into the F-curve, from frame and value of every sample by turns."""
-        points = samples.reshape(-1, 2)
-        if self.is_ring:
-            points = points[self._order]
-            points[:, 0] = np.arange(self.count)
-        else:
-            points[0, 0], points[-1, 0] = self.ends
-        return points.ravel()
-
-    def fits(self, fcurve: bpy.types.FCurve) -> bool:
-        """Whether an F-curve has its samples so, and repeats them so."""
-        points = fcurve.sampled_points
-        return (
-            len(points) == self.count
-            and (points[0].co[0], points[self.count - 1].co[0]) == self.outermost
-            and self._has_modifiers(fcurve)
-        )
-
-    def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
-        modifiers = list(fcurve.modifiers)
-        return [modifier.type for modifier in modifiers] == [kind for kind, _ in self._modifiers] and all(
-            getattr(modifier, name) == value
-            for modifier, (_, settings) in zip(modifiers, self._modifiers, strict=True)
-            for name, value in settings.items()
-        )
-
-    def modify(self, fcurve: bpy.types.FCurve) -> None:
-        """Give an F-curve the modifiers that it needs, in place of those it has."""
-        if self._has_modifiers(fcurve):
-            return
-        for modifier in list(fcurve.modifiers):
-            fcurve.modifiers.remove(modifier)
-        for kind, settings in self._modifiers:
-            modifier = fcurve.modifiers.new(kind)
-            for name, value in settings.items():
-                setattr(modifier, name, value)
-
-    @cached_property
-    def _modifiers(self) -> list[tuple[str, dict[str, object]]]:
-        """Types and settings. Blender asks the last one first."""
-        if self.cycles is not None:
-            # The difference repeats as it is also where the channels go on from where they have come.
-            before, after = (mode.removesuffix("_OFFSET") for mode in (self.cycles.before, self.cycles.after))
-            settings = {"mode_before": before, "mode_after": after}
-            counts = {"cycles_before": self.cycles.before_count, "cycles_after": self.cycles.after_count}
-            return [("CYCLES", settings | counts)]
-        if not self.is_ring:
-            return []
-        first, last = float(self.first), float(self.last)
-        return [
-            ("CYCLES", {"mode_before": "REPEAT", "mode_after": "NONE", "cycles_before": 0}),
-            ("STEPPED", {"frame_step": ENDLESS, "frame_offset": first, "use_frame_end": True, "frame_end": first}),
-            ("STEPPED", {"frame_step": ENDLESS, "frame_offset": last, "use_frame_start": True, "frame_start": last}),
-        ]
 
 
 def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
@@ -155,7 +46,7 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
     longer = set()
     for (place, source), samples in zip(anew, differences(rounds), strict=True):
-        layout = _Layout.of(source)
+        layout = Layout.of(source)
         channels = _channels(place, source)
         _write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
         record_in_betweens(place, source.digest, samples)
@@ -167,7 +58,7 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
 def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
     """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
     old = recall(recorded_digest(place))
-    if old is None or old is source or _Layout.of(source).is_ring or not is_complete(place, source):
+    if old is None or old is source or Layout.of(source).is_ring or not is_complete(place, source):
         return None
     return changed_range(old, source)
 
@@ -227,7 +118,7 @@ def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], sour
 
 def is_complete(place: SlotTransform, source: Source) -> bool:
     """Whether all F-curves are as they were written for a source."""
-    layout, channels, curves = _Layout.of(source), _channels(place, source), place.curves
+    layout, channels, curves = Layout.of(source), _channels(place, source), place.curves
     written = [channels.get(row) for row in recorded_rows(place)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
@@ -249,7 +140,7 @@ def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
     return place.users[0].differences_for(rotation)
 
 
-def _write(place: SlotTransform, points: dict[Channel, np.ndarray], layout: _Layout | None) -> None:
+def _write(place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
     """Replace the in-betweens of a transform by these samples, frame and value of each by turns.
 
     Channels that have none are taken out.
@@ -352,7 +243,7 @@ def hold_originals(place: SlotTransform) -> None:
         # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
         starts = [start for fcurve in place.curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
         first = math.floor(min(starts, default=0.0))
-        layout = _Layout(first, first + 1, (first, first + 1))
+        layout = Layout(first, first + 1, (first, first + 1))
         points = {
             channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()
         }

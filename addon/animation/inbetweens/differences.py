@@ -16,13 +16,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..motion import KEYFRAME_MODES, Poses, prepare
-from ..motion.eulers import extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
-from ..motion.piecewise import blocks, combine
-from ..motion.poses import beyond
-from ..motion.quaternions import conjugate, multiply
-from .curves import Keys, evaluate
-from .sources import LOCATION, MODE_NAMES, MODE_NUMBERS, PART_OF, REST, ROTATION, ROWS, SAME_FRAME, SCALE, Source
+from ...motion import KEYFRAME_MODES, Poses, prepare
+from ...motion.eulers import extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
+from ...motion.piecewise import blocks, combine
+from ...motion.poses import beyond
+from ...motion.quaternions import conjugate, multiply
+from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
+from ..curves import Keys, evaluate
+from ..transforms import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
-from .slots import SlotTransform, slot_transforms_of
-from .transforms import Refused, Transform
+from ..actions.slots import SlotTransform, slot_transforms_of
+from ..transforms import Refused, Transform
 
 BAKED, REDUCED = "BAKED", "REDUCED"
 """What was done to the keys."""

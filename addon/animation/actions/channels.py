@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..motion import Poses
-from .curves import Cycles
+from ...motion import Poses
+from ..curves import Cycles
 
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:

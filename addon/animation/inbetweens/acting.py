@@ -10,11 +10,11 @@ from typing import TypeVar
 
 import bpy
 
+from ..actions.reading import sources_of_users
+from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.sources import Source
+from ..transforms import Refused, Transform, transform_of
 from . import live
-from .reading import sources_of_users
-from .slots import SlotTransform, slot_transforms_of
-from .sources import Source
-from .transforms import Refused, Transform, transform_of
 
 Targets = bpy.types.Object | Transform | Iterable[bpy.types.Object | Transform]
 """What to act on: one or several."""

@@ -16,17 +16,17 @@ from typing import ClassVar
 import bpy
 from bpy.app.handlers import persistent
 
+from ..actions.mode_property import adopt_from_properties, show_awaited, show_modes
+from ..actions.reading import differing_users, keyed_in, leading, sources_of_users
+from ..actions.records import recorded_digest
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import SlotTransform, actions_of, places_of, slot_transforms_in, slot_transforms_of
+from ..actions.sources import Source
+from ..transforms import Refused, Transform, transform_of
 from . import insertion, known_sources
 from .densification import keep_motion
+from .differences import differences
 from .filling import clear, fill_in, hold_originals, is_complete, restore_originals
-from .inbetweens import differences
-from .mode_property import adopt_from_properties, show_awaited, show_modes
-from .reading import differing_users, keyed_in, leading, sources_of_users
-from .records import recorded_digest
-from .refusals import refuse_numbers
-from .slots import SlotTransform, actions_of, places_of, slot_transforms_in, slot_transforms_of
-from .sources import Source
-from .transforms import Refused, Transform, transform_of
 
 log = logging.getLogger(__package__)
 

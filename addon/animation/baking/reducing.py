@@ -14,14 +14,19 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
-from ..motion.best_of import least_errors
-from .acting import Readings, Targets, act_on
-from .bake import channel_values, go_back
-from .channels import replace_keys
-from .curves import CODE, CONSTANT, LINEAR, Keys
-from .inbetweens import in_betweens
-from .mode_keys import segment_modes, set_mode_in
+from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
+from ...motion.best_of import least_errors
+from ..actions.channels import replace_keys
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source, distinct
+from ..curves import CODE, CONSTANT, LINEAR, Keys
+from ..inbetweens.acting import Readings, Targets, act_on
+from ..inbetweens.channel_values import channel_values
+from ..inbetweens.differences import in_betweens
+from ..inbetweens.mode_keys import segment_modes, set_mode_in
+from ..transforms import ROWS, SCALE, Channel, Refused, Transform, transform_of
+from .bake import go_back
 from .originals import (
     REDUCED,
     discard_originals,
@@ -31,10 +36,6 @@ from .originals import (
     refuse_tweak_mode,
     refuse_without_original,
 )
-from .refusals import refuse_numbers
-from .slots import SlotTransform, slot_transforms_of
-from .sources import MODE_NAMES, MODE_NUMBERS, ROWS, SAME_FRAME, SCALE, Source, distinct
-from .transforms import Channel, Refused, Transform, transform_of
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far the object gets."""

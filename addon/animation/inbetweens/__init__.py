@@ -1,0 +1,9 @@
+"""What happens between keys: computed, written, and kept up to date after every edit.
+
+differences  from sources to differences                channel_values  and back to values of channels
+filling      writing those as sampled F-curves          layout      how samples lie in these
+live         refreshing after every edit                known_sources   what an edit has changed
+insertion    a key inserted in between                  densification   keys inserted all along
+mode_keys    choosing modes                             acting      many targets at once
+describing   what there is to tell of a segment
+"""

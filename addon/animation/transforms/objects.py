@@ -1,0 +1,136 @@
+"""Objects as transforms: what their in-betweens differ in goes into delta transforms.
+
+An object may have delta transforms of its own: those it had before any in-betweens are its *original* ones. They are
+written down on the object, component by component, before in-betweens take their place, and given back when these go.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from functools import cache
+
+import bpy
+import numpy as np
+
+from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
+from .components import REST, ROTATION, ROWS
+from .transform import Channel, Transform, channels_under
+
+ORIGINALS = {
+    "delta_location": ("own_location", 0),
+    "delta_rotation_quaternion": ("own_quaternion", 1),
+    "delta_rotation_euler": ("own_euler", 2),
+    "delta_scale": ("own_scale", 3),
+}
+"""Each delta transform: where an object's original is written down, and its place in `filled`. Files have the names."""
+
+
+_BITS = {
+    channel: 1 << place
+    for place, channel in enumerate(
+        (path, index) for path in ORIGINALS for index in range(4 if path.endswith("quaternion") else 3)
+    )
+}
+"""The bit of each component of the delta transforms in `filled_components`."""
+
+
+class ObjectTransform(Transform):
+    """An object. The difference goes into its delta transforms."""
+
+    def __init__(self, obj: bpy.types.Object) -> None:
+        self.animated = self.carrier = obj
+
+    def differences_for(self, rotation: str) -> dict[int, Channel]:
+        return channels_under("delta_", rotation)
+
+    def original(self) -> np.ndarray:
+        noted = self._noted
+
+        def values(path: str) -> list[float]:
+            now = getattr(self.carrier, path)[:]
+            if not noted:
+                return now
+            then = getattr(self.motion, ORIGINALS[path][0])[:]
+            return [then[i] if _BITS[path, i] & noted else value for i, value in enumerate(now)]
+
+        rotation = REST[ROWS[ROTATION]]
+        if self.carrier.rotation_mode in ORDERS:
+            angles = values("delta_rotation_euler")
+            if any(angles):
+                rotation = quaternions_from_extrinsic_eulers(np.array((angles,)), self.carrier.rotation_mode)[0]
+        else:
+            quaternion = values("delta_rotation_quaternion")
+            if length := math.hypot(*quaternion):
+                rotation = [component / length for component in quaternion]
+        return np.array((*values("delta_location"), *rotation, *values("delta_scale")))
+
+    def is_noted(self, filled: Iterable[Channel]) -> bool:
+        noted = self._noted
+        return all(_BITS[channel] & noted for channel in filled if channel in _BITS)
+
+    def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
+        noted = self._noted
+        added = [channel for channel in filled if channel in _BITS and not _BITS[channel] & noted]
+        for path in {path for path, _ in added}:
+            now, then = getattr(self.carrier, path), list(getattr(self.motion, ORIGINALS[path][0]))
+            for i, value in enumerate(now):
+                if (path, i) in added and overwritten:
+                    then[i] = default_of(path)[i]
+                elif not _BITS[path, i] & noted:
+                    then[i] = value
+            _set_if_other(self.motion, ORIGINALS[path][0], then)
+        self._keep(noted | sum(_BITS[channel] for channel in set(added)))
+
+    def follow_original(self) -> None:
+        noted = self._noted
+        for path in _paths_in(noted):
+            now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
+            values = [now[i] if _BITS[path, i] & noted else value for i, value in enumerate(then)]
+            _set_if_other(self.carrier, path, values)
+
+    def restore_original(self, filled: Iterable[Channel]) -> None:
+        noted = self._noted
+        gone = noted & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS)
+        for path in _paths_in(gone):
+            now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
+            setattr(self.carrier, path, [then[i] if _BITS[path, i] & gone else value for i, value in enumerate(now)])
+        if gone:
+            self._keep(noted & ~gone)
+
+    @property
+    def _noted(self) -> int:
+        """The bits of the components that are written down."""
+        motion = self.motion
+        if noted := motion.filled_components:
+            return noted
+        # Files of a version that took all components of a delta transform, or none, have only `filled`.
+        taken = motion.filled[:]
+        return sum(bit for (path, _), bit in _BITS.items() if taken[ORIGINALS[path][1]]) if any(taken) else 0
+
+    def _keep(self, noted: int) -> None:
+        motion = self.motion
+        if motion.filled_components != noted:
+            motion.filled_components = noted
+        paths = _paths_in(noted)
+        summary = [path in paths for path in ORIGINALS]
+        if list(motion.filled) != summary:
+            motion.filled = summary
+
+
+def _paths_in(bits: int) -> set[str]:
+    """The delta transforms that have any of these components."""
+    return {path for (path, _), bit in _BITS.items() if bit & bits}
+
+
+def _set_if_other(owner: bpy.types.bpy_struct, name: str, values: Iterable[float]) -> None:
+    """Set a property where it is not that already: to set it costs an update of the object."""
+    values = tuple(values)
+    if tuple(getattr(owner, name)) != values:
+        setattr(owner, name, values)
+
+
+@cache
+def default_of(path: str) -> tuple[float, ...]:
+    """What a delta transform is where an object has none of its own."""
+    return tuple(bpy.types.Object.bl_rna.properties[path].default_array)
