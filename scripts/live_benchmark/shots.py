@@ -28,7 +28,7 @@ CHOOSING_GOAL = 0.2
 EDIT_GOAL = 3
 """How many times as long as Blender's own an update may take after an edit of all objects."""
 
-COMPRESSED_GOAL, PLAIN_GOAL = 4, 6
+COMPRESSED_GOAL, PLAIN_GOAL = 6, 4
 """How many times as large a file may be as without modes."""
 
 

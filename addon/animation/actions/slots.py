@@ -74,7 +74,10 @@ class SlotTransform:
     @property
     def filled(self) -> Curves:
         """Those of its F-curves that in-betweens are in."""
-        return {channel: fcurve for channel, fcurve in self.curves.items() if is_filled_in(fcurve)}
+        group = None if self.channelbag is None else self.channelbag.groups.get(GROUP)
+        if group is None:
+            return {}
+        return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels if _is_sampled(fcurve)}
 
     def read_again(self) -> SlotTransform:
         """The same, with the F-curves that there are by now."""
@@ -198,9 +201,9 @@ def curves_in(channelbag: bpy.types.ActionChannelbag | None) -> Curves:
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is one that in-betweens are in: sampled, and in the group of them."""
     group = fcurve.group
-    return (
-        group is not None
-        and group.name == GROUP
-        and not fcurve.keyframe_points
-        and not fcurve.data_path.endswith(MODE_PROPERTY)
-    )
+    return group is not None and group.name == GROUP and _is_sampled(fcurve)
+
+
+def _is_sampled(fcurve: bpy.types.FCurve) -> bool:
+    """Whether an F-curve of the group of in-betweens is one of these, and no mode channel without keys."""
+    return not fcurve.keyframe_points and not fcurve.data_path.endswith(MODE_PROPERTY)

@@ -282,7 +282,7 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
 def _concerns_us(obj: bpy.types.Object) -> bool:
     """Whether an object has, or had, anything to do with modes."""
     motion = obj.rigid_motion
-    if motion.mode != "BLENDER" or motion.awaited != "BLENDER" or any(motion.filled):
+    if motion.filled_components or motion.mode != "BLENDER" or motion.awaited != "BLENDER":
         return True
     return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
 
@@ -293,8 +293,6 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
     Returns whether there is any such object.
     """
     edited = dict(_unevaluated(scene))
-    if not edited:
-        return False
     operator = _last_operator()
     by_operator, _State.operator = operator != _State.operator, operator
     for obj, depsgraph in edited.items():
@@ -311,7 +309,7 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
             with suppress(Refused):
                 evaluated = transform.carrier.evaluated_get(depsgraph)
                 insertion.notice_assignment(transform, evaluated, frame, by_operator=by_operator)
-    return True
+    return bool(edited)
 
 
 def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
