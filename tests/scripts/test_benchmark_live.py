@@ -94,9 +94,9 @@ def test_a_shot_tells_the_ratios_of_what_stands_beside_them(monkeypatch):
     assert "Blender's own update" in edit[2]
     assert edit[4].startswith("at most 3: ")
     assert [row[1:] for row in rows[3:]] == [
-        ["0.39 MB", "without modes: 0.10 MB", "3.9 times as large", "at most 4: met"],
+        ["0.39 MB", "without modes: 0.10 MB", "3.9 times as large", "at most 6: met"],
         ["0.39 MB", "baked by `bake_action_objects`: 0.78 MB", "0.50 times as large", ""],
-        ["6.10 MB", "without modes: 1.00 MB", "6.1 times as large", "at most 6: missed"],
+        ["6.10 MB", "without modes: 1.00 MB", "6.1 times as large", "at most 4: missed"],
         ["6.10 MB", "baked by `bake_action_objects`: 24.40 MB", "0.25 times as large", ""],
     ]
 
@@ -137,9 +137,9 @@ def test_what_is_left_follows_from_the_samples():
     assert "16 bytes in Blender's file format: they are 1.12 MB of the 1.22 MB" in text
     assert "Compressed, a sample takes 6.0 bytes" in text
     assert "20 keys of 72 bytes" in text
-    # 600 000 bytes, of which 100 000 are no samples, at 16 bytes for 10 000 poses.
-    assert "room for the samples of 3.1 components" in text
-    assert "in 800 ns for each pose" in text
+    # 400 000 bytes, of which 100 000 are no samples, at 16 bytes for 10 000 poses.
+    assert "room for the samples of 1.9 components" in text
+    assert "0.80 ms an object" in text
 
 
 @pytest.mark.usefixtures("live_file")
