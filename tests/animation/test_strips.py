@@ -186,6 +186,18 @@ def test_what_a_strip_holds_goes_and_comes_with_the_mode_of_the_other(live_file)
     assert_at(obj, ACTION_FRAMES + 100, expected_bases(obj, ACTION_FRAMES, own))
 
 
+def test_an_action_that_holds_them_takes_no_mode_from_the_one_before_it(live_file):
+    obj, _, actions, wanted = two_strips()
+    data = obj.animation_data
+    for track in list(data.nla_tracks):
+        track.mute = True
+    for action, mode, worlds in zip(actions * 2, ("dq_sclerp", "BLENDER") * 2, wanted * 2, strict=True):
+        data.action, data.action_slot = action, action.slots[0]
+        bpy.context.view_layer.update()
+        assert set(modes_of(obj, np.array(KEYS[:3]))) == {mode}
+        assert_at(obj, ACTION_FRAMES, worlds)
+
+
 def test_baking_the_other_strip_and_back_keeps_the_own_delta_transforms(live_file):
     obj, _, actions, wanted = two_strips()
     strips = [track.strips[0] for track in obj.animation_data.nla_tracks]

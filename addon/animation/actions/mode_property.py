@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ..transforms import Transform
-from .records import has_mode, record_mode, recorded_mode
+from .records import has_in_betweens, has_mode, record_mode, recorded_mode
 from .slots import SlotTransform
 from .sources import MODE_NAMES, MODE_NUMBERS
 
@@ -29,9 +29,12 @@ def show_modes(places: Iterable[SlotTransform]) -> None:
     """Have the property of all users say what is in their slots, and have slots take what their users waited with."""
     for place in places:
         users = [user for user in place.users if _is_shown(user, place) and user.animated.is_editable]
+        keyed = is_keyed(place)
+        if not has_mode(place) and has_in_betweens(place) and not (keyed or place.slot.action.is_editable):
+            # From a library of a version that kept modes on objects.
+            continue
         if not has_mode(place) and place.slot.action.is_editable:
             _adopt(place, users)
-        keyed = is_keyed(place)
         mode = MODE_NAMES.get(recorded_mode(place), "BLENDER")
         for user in users:
             motion = user.motion
@@ -70,7 +73,7 @@ def _adopt(place: SlotTransform, users: Sequence[Transform]) -> None:
     Action by one of Blender's operators that move slots: it goes on as its user shows it.
     """
     waiting = next((user.motion.awaited for user in users if user.motion.awaited not in ("BLENDER", "")), None)
-    if waiting is None and place.filled:
+    if waiting is None and has_in_betweens(place):
         waiting = next((user.motion.mode for user in users if user.motion.mode not in ("BLENDER", "")), None)
     if waiting:
         record_mode(place, MODE_NUMBERS[waiting])

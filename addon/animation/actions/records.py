@@ -41,6 +41,11 @@ def has_mode(place: SlotTransform) -> bool:
     return record is not None and record.is_property_set("mode")
 
 
+def has_in_betweens(place: SlotTransform) -> bool:
+    """Whether a transform was filled in, by whichever version; constants that are held beside strips are none."""
+    return bool(recorded_digest(place)) or any(len(fcurve.sampled_points) > 2 for fcurve in place.filled.values())
+
+
 def record_mode(place: SlotTransform, number: int) -> None:
     """Keep the mode that a transform has throughout, and have its users show it."""
     mode = MODE_NAMES[number]

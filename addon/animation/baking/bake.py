@@ -13,10 +13,9 @@ from ...motion import Poses
 from ...motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs
 from ..actions.channels import add_cycles, code_of, write_channel
-from ..actions.refusals import refuse_numbers
 from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
-from ..inbetweens.acting import Readings, Targets, act_on
+from ..inbetweens.acting import Readings, Targets, act_on, readable
 from ..inbetweens.channel_values import channel_values
 from ..inbetweens.differences import in_betweens
 from ..inbetweens.mode_keys import set_mode_in, set_whole
@@ -113,7 +112,7 @@ def bake(
 
     def plan(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source, np.ndarray]]:
         refuse_tweak_mode(transform)
-        live = live_sources(transform, readings)
+        live = [(place, source) for place, source in readable(transform, readings) if source.is_live]
         if not live:
             raise Refused(f"{transform.name} has no rigid in-betweens to bake: choose a mode for its keys first")
         return [
@@ -163,15 +162,6 @@ def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
 def is_baked(target: bpy.types.Object | Transform) -> bool:
     """Whether something moves by an Action with baked keys, and its original is still in the file."""
     return has_original(transform_of(target), BAKED)
-
-
-def live_sources(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
-    """What there is of a transform that a mode moves. `Refused` where one of its slots cannot be read."""
-    for _, source in readings:
-        if isinstance(source, Refused):
-            raise source
-        refuse_numbers(transform.name, source)
-    return [(place, source) for place, source in readings if source.is_live]
 
 
 def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:

@@ -17,11 +17,10 @@ import numpy as np
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.best_of import least_errors
 from ..actions.channels import replace_keys
-from ..actions.refusals import refuse_numbers
 from ..actions.slots import SlotTransform, slot_transforms_of
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source, distinct
 from ..curves import CODE, CONSTANT, LINEAR, Keys
-from ..inbetweens.acting import Readings, Targets, act_on
+from ..inbetweens.acting import Readings, Targets, act_on, readable
 from ..inbetweens.channel_values import channel_values
 from ..inbetweens.differences import in_betweens
 from ..inbetweens.mode_keys import segment_modes, set_mode_in
@@ -133,7 +132,8 @@ def reduce_keys_of(
             _fewer_keys(
                 transform, place, source, mode, tolerance, radius or radius_of(transform.carrier), best_of=best_of
             )
-            for place, source in _keyed(transform, readings)
+            for place, source in readable(transform, readings)
+            if source.channels
         ]
         if not found:
             raise Refused(_why_nothing_is_keyed(transform, 0))
@@ -149,15 +149,6 @@ def reduce_keys_of(
 
     done = act_on(targets, plan, act, refused)
     return reduction_of(list(done)[-1]) if done else None
-
-
-def _keyed(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
-    """What is keyed of a transform. `Refused` where one of its slots cannot be read."""
-    for _, source in readings:
-        if isinstance(source, Refused):
-            raise source
-        refuse_numbers(transform.name, source)
-    return [(place, source) for place, source in readings if source.channels]
 
 
 def reduction_of(target: bpy.types.Object | Transform) -> Reduction | None:

@@ -11,6 +11,7 @@ from typing import TypeVar
 import bpy
 
 from ..actions.reading import sources_of_users
+from ..actions.refusals import refuse_numbers
 from ..actions.slots import SlotTransform, slot_transforms_of
 from ..actions.sources import Source
 from ..transforms import Refused, Transform, transform_of
@@ -89,3 +90,12 @@ def act_on(
         ]
         live.refresh_read(read)
     return results
+
+
+def readable(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
+    """What is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
+    for _, source in readings:
+        if isinstance(source, Refused):
+            raise source
+        refuse_numbers(transform.name, source)
+    return list(readings)
