@@ -7,11 +7,10 @@ which of the two its value is:
   stays as it is.
 - The property had it when it was last evaluated. Then the animator saw it with the difference on top, be it the
   in-between as it was or a pose made by hand, and the key gets the pose that was to be seen.
-- The property was set and keyed in one go. If an operator did it (*Snap*, *Paste*), or more than one of location,
-  rotation
-  and scale have changed, then a pose was computed for the world, and Blender has taken the difference off:
-  `matrix_world = M` sets all three of them. The key gets that pose. A single property (`location = v`, a value typed
-  with Auto Key) is the value that somebody wanted, and stays as it is.
+- The property was set and keyed in one go. If one of the operators did it that go by what is on the screen (*Snap*,
+  *Align*, *Move*), or more than one of location, rotation and scale have changed, then a pose was computed for the
+  world, and Blender has taken the difference off: `matrix_world = M` sets all three of them. The key gets that pose. A
+  single property (`location = v`, a value typed with Auto Key) is the value that somebody wanted, and stays as it is.
 
 Where a key gets a pose, so do all keyed channels of the transform.
 """
@@ -30,6 +29,9 @@ from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
 from ..transforms import LOCATION, ROTATION, ROWS, SCALE, Transform
 from .known_sources import recall
+
+PLACING = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
+"""How the names of operators begin that set single properties to bring what is on the screen to a certain place."""
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -68,15 +70,18 @@ def notice_pose(transform: Transform, frame: float) -> None:
     _posed[_identity(transform)] = _Posed(frame, transform.components(), True)
 
 
-def notice_assignment(transform: Transform, evaluated: bpy.types.Object, frame: float, *, by_operator: bool) -> None:
-    """Keep what the properties of a transform were set to, where they have not been evaluated so yet."""
+def notice_assignment(transform: Transform, evaluated: bpy.types.Object, frame: float, *, placed: bool) -> None:
+    """Keep what the properties of a transform were set to, where they have not been evaluated so yet.
+
+    `placed`: an operator did it that goes by what is on the screen, see `PLACING`.
+    """
     carrier = transform.carrier
     changed = sum(
         tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
         for prop in ("location", transform.rotation, "scale")
     )
     if changed:
-        _posed[_identity(transform)] = _Posed(frame, transform.components(), by_operator or changed > 1)
+        _posed[_identity(transform)] = _Posed(frame, transform.components(), placed or changed > 1)
 
 
 def forget_poses(transforms: Iterable[Transform] | None = None) -> None:

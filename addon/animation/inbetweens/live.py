@@ -52,7 +52,7 @@ class _State:
     edited = False
     """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
 
-    operator = 0
+    operator = (0, "")
     """The operator that had ended last when edits were last seen."""
 
     ranges: ClassVar[dict[int, tuple[int, int]]] = {}
@@ -294,7 +294,8 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
     """
     edited = dict(_unevaluated(scene))
     operator = _last_operator()
-    by_operator, _State.operator = operator != _State.operator, operator
+    placed = operator != _State.operator and operator[1].startswith(insertion.PLACING)
+    _State.operator = operator
     for obj, depsgraph in edited.items():
         if not (_concerns_us(obj) and obj.is_editable):
             continue
@@ -308,7 +309,7 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
         if depsgraph is not None:
             with suppress(Refused):
                 evaluated = transform.carrier.evaluated_get(depsgraph)
-                insertion.notice_assignment(transform, evaluated, frame, by_operator=by_operator)
+                insertion.notice_assignment(transform, evaluated, frame, placed=placed)
     return bool(edited)
 
 
@@ -330,11 +331,11 @@ def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy
             )
 
 
-def _last_operator() -> int:
-    """Tells one operator that has ended from the next."""
+def _last_operator() -> tuple[int, str]:
+    """The operator that has ended last, told from others of its kind, and its name."""
     manager = bpy.context.window_manager
     operators = manager.operators if manager is not None else ()
-    return operators[-1].as_pointer() if len(operators) else 0
+    return (operators[-1].as_pointer(), operators[-1].bl_idname) if len(operators) else (0, "")
 
 
 def _look_through(*_: object) -> None:
