@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from tests.animation.oracle import assert_shown, key_frames
+from tests.animation.oracle import assert_shown, curves_of, key_frames
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.gui.scenarios.edits_by_hand import ALIKE, FRAMES, SCREW, WHOLE, assert_on_the_screw, cube, key_the_cube
@@ -34,6 +34,7 @@ def scenario(hand: Hand) -> Steps[None]:
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     yield from snapped(hand, view)
     yield from grabbed(hand, view)
+    yield from typed(hand)
     yield from unlinked(hand)
 
 
@@ -63,6 +64,21 @@ def grabbed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     before[0, 3] += 2.0
     np.testing.assert_allclose(place(), before, atol=ALIKE)
     assert_on_the_screw(1, 10, 20, 30, 40)
+
+
+def typed(hand: Hand) -> Steps[None]:
+    """After the playhead was dragged, a value that is typed into the Properties editor is the value of the key."""
+    yield from hand.click(places.playhead(hand.area("DOPESHEET_EDITOR"), 35))
+    assert bpy.context.scene.frame_current == 35, bpy.context.scene.frame_current
+    field = yield from hand.find_button(hand.area("PROPERTIES"), "WINDOW", "location")
+    yield from hand.hover(field)
+    yield from hand.press("RET")
+    yield from hand.type("5")
+    yield from hand.press("RET")
+    yield from hand.wait_until(lambda: 35.0 in key_frames(cube()), "the typed value is keyed")
+    assert curves_of(cube())["location", 0].evaluate(35) == 5.0
+    assert abs(place()[0, 3] - 5.0) < ALIKE
+    yield from hand.picture("typed")
 
 
 def unlinked(hand: Hand) -> Steps[None]:
