@@ -5,5 +5,5 @@ filling      writing those as sampled F-curves          layout      how samples 
 live         refreshing after every edit                known_sources   what an edit has changed
 insertion    a key inserted in between                  densification   keys inserted all along
 mode_keys    choosing modes                             acting      many targets at once
-describing   what there is to tell of a segment
+describing   what there is to tell of a segment        on_screen       what is seen, as properties
 """

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Euler, Quaternion
 
 from ...motion.eulers import quaternions_from_extrinsic_eulers
 from ..actions.records import recorded_digest, recorded_mode
 from ..actions.slots import places_of
 from ..actions.sources import MODE_NAMES, SAME_FRAME, Source
 from ..curves import cycled
-from ..transforms import LOCATION, ROTATION, ROWS, SCALE, WIDTHS, Transform, transform_of
+from ..transforms import PART_OF, WIDTHS, Transform, transform_of
 from .mode_keys import active_place
+from .on_screen import seen_components
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -149,25 +149,15 @@ def shown_components(transform: Transform) -> np.ndarray | None:
     Refused
         Where it turns by axis and angle.
     """
-    if not any(place.filled for place in places_of(transform)):
+    filled = {channel for place in places_of(transform) for channel in place.filled}
+    if not filled:
         return None
-    shown, original, added = transform.components(), transform.original(), np.zeros(10)
-    for row, (path, index) in transform.differences.items():
-        added[row] = transform.animated.path_resolve(path)[index]
-    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
-    shown[location] += added[location] - original[location]
-    shown[scale] *= added[scale] / np.where(original[scale] == 0.0, 1.0, original[scale])
-    own = Quaternion(original[rotation]).inverted()
-    if transform.rotation == "rotation_quaternion":
-        turned = Quaternion(shown[rotation])
-        seen = own @ Quaternion(added[rotation]).normalized() @ turned
-        shown[rotation] = -seen if seen.dot(turned) < 0.0 else seen
-    else:
-        order = transform.carrier.rotation_mode
-        angles = Euler(shown[3:6], order)
-        seen = own @ Euler(added[3:6], order).to_quaternion() @ angles.to_quaternion()
-        shown[3:6] = seen.to_euler(order, angles)
-    return shown
+    difference, rows = np.zeros(10), transform.differences
+    for row, (path, index) in rows.items():
+        difference[row] = transform.animated.path_resolve(path)[index]
+    order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
+    parts = {PART_OF[row] for row, channel in rows.items() if channel in filled}
+    return seen_components(transform.components(), transform.original(), difference, order, parts)
 
 
 def has_edited_differences(transform: Transform, frame: float) -> bool:

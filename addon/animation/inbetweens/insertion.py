@@ -23,12 +23,12 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Euler, Quaternion
 
 from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
-from ..transforms import LOCATION, ROTATION, ROWS, SCALE, Transform
+from ..transforms import PART_OF, Channel, Transform
 from .known_sources import recall
+from .on_screen import seen_components
 
 PLACING = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
 """How the names of operators begin that set single properties to bring what is on the screen to a certain place."""
@@ -165,45 +165,16 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
 
 def _on_screen(
     user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
-) -> dict[tuple[str, int], float]:
+) -> dict[Channel, float]:
     """The values of the channels that, with the original difference alone, look as the screen does."""
-    rows, values = user.differences, shown.copy()
-
-    def difference(name: str) -> np.ndarray | None:
-        """What is on top of a property at the frame, None where there are no in-betweens of it."""
-        channels = [rows[row] for row in range(ROWS[name].start, ROWS[name].stop) if row in rows]
-        if not any(channel in place.curves for channel in channels):
-            return None
-        return np.array(
-            [
-                place.curves[channel].evaluate(frame)
-                if channel in place.curves
-                else user.animated.path_resolve(channel[0])[channel[1]]
-                for channel in channels
-            ]
-        )
-
-    original = {name: old.original[part] for name, part in ROWS.items()}
-    if (added := difference(LOCATION)) is not None:
-        values[ROWS[LOCATION]] += added - original[LOCATION]
-    if (factor := difference(SCALE)) is not None:
-        values[ROWS[SCALE]] *= factor / np.where(original[SCALE] == 0.0, 1.0, original[SCALE])
-    own = Quaternion(original[ROTATION])
-    if old.order is None:
-        turned = Quaternion(shown[3:7])
-        added = difference(ROTATION)
-        if added is not None:
-            seen = own.inverted() @ Quaternion(added) @ turned
-            if seen.dot(turned) < 0.0:
-                seen.negate()
-            values[3:7] = seen
-    else:
-        angles = Euler(shown[3:6], old.order)
-        added = difference(ROTATION)
-        if added is not None:
-            seen = own.inverted() @ Euler(added, old.order).to_quaternion() @ angles.to_quaternion()
-            values[3:6] = seen.to_euler(old.order, angles)
-    return {channel: values[row] for row, channel in user.channels.items()}
+    rows, filled, difference = user.differences, place.filled, np.zeros(10)
+    for row, channel in rows.items():
+        path, index = channel
+        fcurve = filled.get(channel)
+        difference[row] = user.animated.path_resolve(path)[index] if fcurve is None else fcurve.evaluate(frame)
+    parts = {PART_OF[row] for row, channel in rows.items() if channel in filled}
+    seen = seen_components(shown, old.original, difference, old.order, parts)
+    return {channel: seen[row] for row, channel in user.channels.items()}
 
 
 def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:

@@ -1,0 +1,51 @@
+"""What is seen on the screen in the terms of what an animator keys: properties with the in-betweens worked in."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from mathutils import Euler, Quaternion
+
+from ..transforms import LOCATION, ROTATION, ROWS, SCALE
+
+
+def seen_components(
+    components: np.ndarray, original: np.ndarray, difference: np.ndarray, order: str | None, parts: Collection[str]
+) -> np.ndarray:
+    """What the properties would have to be to look the same with the original difference alone.
+
+    Parameters
+    ----------
+    components : array, shape (10,)
+        What the properties are.
+    original : array, shape (10,)
+        The difference without in-betweens: rotation as a unit quaternion.
+    difference : array, shape (10,)
+        The one that there is: rotation as the properties have it.
+    order : str or None
+        Of Euler angles, or None for quaternions.
+    parts : collection of str
+        Which of location, rotation and scale in-betweens are in. The others stay what they are, to the last bit.
+
+    Returns
+    -------
+    array, shape (10,)
+    """
+    seen = components.copy()
+    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
+    if LOCATION in parts:
+        seen[location] += difference[location] - original[location]
+    if SCALE in parts:
+        seen[scale] *= difference[scale] / np.where(original[scale] == 0.0, 1.0, original[scale])
+    if ROTATION in parts:
+        taken_off = Quaternion(original[rotation]).inverted()
+        if order is None:
+            turned = Quaternion(components[rotation])
+            quaternion = taken_off @ Quaternion(difference[rotation]).normalized() @ turned
+            seen[rotation] = -quaternion if quaternion.dot(turned) < 0.0 else quaternion
+        else:
+            angles = Euler(components[3:6], order)
+            added = Euler(difference[3:6], order).to_quaternion()
+            seen[3:6] = (taken_off @ added @ angles.to_quaternion()).to_euler(order, angles)
+    return seen
