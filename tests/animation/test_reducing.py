@@ -22,13 +22,13 @@ from addon.animation import (
     radius_of,
     read_poses,
     reduce_keys_of,
-    reducing,
     reduction_of,
     restore_keys,
     set_mode,
     unbake,
     write_channel,
 )
+from addon.animation.baking import reducing
 from addon.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
 from addon.motion.quaternions import multiply
 from scripts.trajectories import read_trajectories
