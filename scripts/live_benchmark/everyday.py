@@ -69,7 +69,8 @@ def refresh_all(objects: list[bpy.types.Object], rounds: int) -> Seconds:
 
     def forgotten() -> None:
         for action in bpy.data.actions:
-            action.rigid_motion.slots.clear()
+            for record in action.rigid_motion.slots:
+                record.digest = ""
 
     seconds = in_turns(rounds, forget=forgotten, refresh=refreshed)
     same, default = (NativeBaking(objects, all_frames(), every_channel=every) for every in (False, True))

@@ -337,3 +337,15 @@ def test_there_are_samples_only_where_something_differs(live_file):
     live_file.scene.frame_set(BETWEEN)
     link(obj, None)
     assert tuple(obj.delta_location) == (0.0, 0.0, 0.75)
+
+
+def test_what_is_deleted_with_an_edit_of_it_still_to_be_seen_is_asked_for_nothing_more(live_file):
+    for number in range(30):
+        obj = tool(name=f"Tool {number}", seed=number)
+        obj.location.x += 1.0
+        bpy.data.objects.remove(obj)
+        if number % 2:
+            live_file.scene.frame_set(number)
+        else:
+            bpy.context.view_layer.update()
+    assert not live_file.scene.objects

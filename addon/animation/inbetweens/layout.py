@@ -84,6 +84,8 @@ class Layout:
         )
 
     def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
+        if not self._modifiers:
+            return not fcurve.modifiers
         modifiers = list(fcurve.modifiers)
         return [modifier.type for modifier in modifiers] == [kind for kind, _ in self._modifiers] and all(
             getattr(modifier, name) == value

@@ -194,9 +194,10 @@ def _beside(places: Sequence[SlotTransform]) -> list[SlotTransform]:
 def _note_late_users(place: SlotTransform) -> None:
     """Note the original differences of users that were evaluated with a slot before they could be."""
     filled = place.filled
-    for user in place.users if filled else ():
-        if not user.is_noted(filled) and user.animated.is_editable:
-            user.note_original(filled, overwritten=_is_overwritten(user, filled))
+    if filled:
+        for user in place.users:
+            if not user.is_noted(filled) and user.animated.is_editable:
+                user.note_original(filled, overwritten=_is_overwritten(user, filled))
 
 
 def _is_overwritten(user: Transform, filled: dict) -> bool:
@@ -324,11 +325,10 @@ def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy
         if not known or depsgraph.id_type_updated("SCENE") or depsgraph.id_type_updated("COLLECTION"):
             yield from ((obj, None) for obj in scene.objects)
         if known and depsgraph.id_type_updated("OBJECT"):
-            yield from (
-                (update.id.original, depsgraph)
-                for update in depsgraph.updates
-                if isinstance(update.id, bpy.types.Object)
-            )
+            # By name: the original of what was deleted just now is no longer there to be asked for.
+            blocks = (update.id for update in depsgraph.updates)
+            found = (bpy.data.objects.get(block.name) for block in blocks if isinstance(block, bpy.types.Object))
+            yield from ((obj, depsgraph) for obj in found if obj is not None)
 
 
 def _last_operator() -> tuple[int, str]:
