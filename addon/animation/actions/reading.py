@@ -50,15 +50,17 @@ def keyed_in(places: Sequence[SlotTransform]) -> list[Source | Refused]:
     return [leading(place, users) for place, users in zip(places, found, strict=True)]
 
 
-def differing_users(place: SlotTransform) -> list[Transform]:
-    """The users of a slot that are moved by the in-betweens of another one, which do not fit them."""
-    (found,) = sources_of_users([place])
-    leader = leading(place, found)
+def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> list[Transform]:
+    """The users of a slot that are moved by the in-betweens of another one, which do not fit them.
+
+    `sources` is what is keyed as each of the users has it.
+    """
+    leader = leading(place, sources)
     if isinstance(leader, Refused):
         return []
     return [
         user
-        for user, source in zip(place.users, found, strict=True)
+        for user, source in zip(place.users, sources, strict=True)
         if isinstance(source, Refused) or source.digest != leader.digest
     ]
 

@@ -18,15 +18,12 @@ from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
 from ..actions.slots import GROUP, SlotTransform, is_filled_in, is_replacing, slot_transforms_of
 from ..actions.sources import FULL_TURN, Source
 from ..transforms import ORIGINALS, PART_OF, ROTATION, Channel, Transform, default_of
-from .differences import differences
+from .differences import NOTHING, differences
 from .known_sources import changed_range, recall
 from .layout import Layout
 
 FARTHEST = 1_000_000
 """Frames from 0 up to which Blender can show any."""
-
-UNSEEN = 1e-9
-"""What a component varies by that has no F-curve."""
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -94,7 +91,7 @@ def _fill_in_changed(
 
 def _is_covered(values: dict[int, np.ndarray], rows: Sequence[int]) -> bool:
     """Whether there are F-curves for all components that differ in these frames."""
-    return all(row in rows or np.ptp(part) < UNSEEN for row, part in values.items()) and all(
+    return all(row in rows or np.ptp(part) < NOTHING for row, part in values.items()) and all(
         row in values for row in rows
     )
 

@@ -120,7 +120,7 @@ def problem_of(target: bpy.types.Object | Transform) -> str:
             refuse_numbers(transform.name, source)
             if source.is_live:
                 differences([source])
-                _refuse_differing(transform, place)
+                _refuse_differing(transform, place, sources)
     except Refused as problem:
         return str(problem)
     except ValueError as problem:
@@ -128,9 +128,9 @@ def problem_of(target: bpy.types.Object | Transform) -> str:
     return ""
 
 
-def _refuse_differing(transform: Transform, place: SlotTransform) -> None:
+def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[Source | Refused]) -> None:
     """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
-    if len(place.users) > 1 and transform in (differing := differing_users(place)):
+    if transform in (differing := differing_users(place, sources)):
         leader = next(user for user in place.users if user not in differing)
         raise Refused(
             f"{transform.name} moves by the same Action slot as {leader.name}, but has another rotation mode or delta "
