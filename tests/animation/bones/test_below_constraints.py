@@ -42,7 +42,7 @@ def armature(rig: bpy.types.Object, target: bpy.types.Object) -> None:
 
 def ik(*, limited: bool = False, **settings: object) -> Constrain:
     def add(rig: bpy.types.Object, target: bpy.types.Object) -> None:
-        on("Hand", "IK", chain_count=3, iterations=200, **settings)(rig, target)
+        on("Hand", "IK", chain_count=3, **({"iterations": 200} | settings))(rig, target)
         if settings.get("use_stretch"):
             rig.pose.bones["Lower"].ik_stretch = 0.1
         rig.pose.bones["Upper"].use_ik_limit_x = limited
@@ -100,7 +100,7 @@ CONSTRAINTS: dict[str, Constrain] = {
     "IK": ik(),
     "IK with limits": ik(limited=True),
     "IK with a pole": ik(pole_subtarget="Body"),
-    "IK with rotation": ik(use_rotation=True, orient_weight=0.5),
+    "IK with rotation": ik(use_rotation=True, orient_weight=0.5, iterations=20),
     "IK that stretches": ik(use_stretch=True),
     "IK halfway": ik(influence=0.5),
     "an Action": action_of_the_animators,
