@@ -22,7 +22,7 @@ class Trajectory:
     """One body of one file, exactly as recorded: unrepaired, native axes, units and signs."""
 
     name: str
-    """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object."""
+    """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object, or OBJECT/BONE."""
 
     times: np.ndarray
     """Seconds, shape (n,). Neither rising nor finite unless the recording is sound."""
@@ -32,6 +32,9 @@ class Trajectory:
 
     metres_per_unit: float = 1.0
     """The length of one unit of the positions, where the file tells it; 1 otherwise."""
+
+    remark: str = ""
+    """What whoever asked for this body should know of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,8 @@ class Recording:
     """The names of the bodies that were left."""
 
     note: str = ""
-    """For a file of several bodies of which none was named: what was taken, what is left, how to name it."""
+    """For a file of several bodies of which none was named: what was taken, what is left, how to name it. And what
+    there is to say of those that were taken."""
 
 
 class TrajectoryError(ValueError):
@@ -95,16 +99,16 @@ class Selection:
         return [self.wanted]
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
-        """The result, with what there is to say about the bodies that were not taken."""
+        """The result, with what there is to say about the bodies that were taken, and those that were not."""
         taken = {trajectory.name for trajectory in trajectories}
         others = tuple(name for name in self.names if name not in taken)
-        note = ""
+        notes = [trajectory.remark for trajectory in trajectories if trajectory.remark]
         if others and self.wanted is None:
-            note = printable(
+            notes.append(
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
                 f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
             )
-        return Recording(self.path, tuple(trajectories), others, note)
+        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)))
 
 
 def unique(names: Sequence[str]) -> list[str]:
