@@ -84,11 +84,14 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
             bodies = {name: Body(obj) for name, obj in objects.items()}
             animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
             still = [name for name in objects if name not in animated]
-            bones = [f"{name}/{bone}" for name, obj in objects.items() for bone in _bones_with_keys(obj)[:FEW]]
             wanted = selection.wanted or ""
-            if wanted not in bodies and (bone := _bone_called(path, wanted, objects)):
-                bodies[wanted], bones = bone, [wanted]
-            taken = selection.of(animated, unlisted=[*bones, *still])
+            if wanted not in bodies and (body := _bone_called(path, wanted, objects)):
+                selection.of(animated, unlisted=[wanted])
+                return [_sample(path, body, scenes)]
+            with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
+            few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
+            more = sum(map(len, with_keys.values())) - len(few)
+            taken = selection.of(animated, unlisted=[*few, *still], more=more)
             return [_sample(path, bodies[name], scenes) for name in taken]
     except (UnicodeDecodeError, SystemError):
         # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
@@ -240,7 +243,8 @@ def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.
 
 def _by_name(own: list[bpy.types.Object], scenes: list[bpy.types.Scene]) -> dict[str, bpy.types.Object]:
     """The objects of the file, and then those of libraries, each in the order of their names."""
-    linked = (obj for scene in scenes for obj in scene.collection.all_objects)
+    # A scene of a damaged file may come without its collection.
+    linked = (obj for scene in scenes if scene.collection for obj in scene.collection.all_objects)
     objects = {obj.name: obj for obj in sorted(own, key=lambda obj: obj.name)}
     for obj in sorted(linked, key=lambda obj: obj.name):
         objects.setdefault(obj.name, obj)

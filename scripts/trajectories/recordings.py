@@ -71,7 +71,7 @@ class Selection:
         self.wanted = wanted
         self.names: tuple[str, ...] = ()
 
-    def of(self, names: Sequence[str], unlisted: Sequence[str] = ()) -> list[str]:
+    def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
         """The wanted ones among the bodies of the file.
 
         Parameters
@@ -80,6 +80,8 @@ class Selection:
             The bodies, in the order of the file.
         unlisted : sequence of str
             More bodies, to be had by name only.
+        more : int
+            How many of those there are besides, which an error counts and does not name.
 
         Raises
         ------
@@ -89,13 +91,16 @@ class Selection:
         self.names = tuple(names)
         if self.wanted in (None, ALL):
             if not names:
-                way_out = f"name one with {self.path}:NAME: {listed(unlisted)}" if unlisted else "record at least one"
+                way_out = (
+                    f"name one with {self.path}:NAME: {listed(unlisted, more=more)}"
+                    if unlisted
+                    else "record at least one"
+                )
                 raise TrajectoryError(self.path, "no moving body in this file", way_out)
             return list(names) if self.wanted == ALL else [names[0]]
         if self.wanted not in names and self.wanted not in unlisted:
-            raise TrajectoryError(
-                self.path, f"no body named {shown(self.wanted)}", f"it holds {listed([*names, *unlisted])}"
-            )
+            way_out = f"it holds {listed([*names, *unlisted], more=more)}"
+            raise TrajectoryError(self.path, f"no body named {shown(self.wanted)}", way_out)
         return [self.wanted]
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
@@ -128,10 +133,10 @@ def unique(names: Sequence[str]) -> list[str]:
     return result
 
 
-def listed(names: Sequence[str], limit: int = 30) -> str:
-    """The names with commas, cut off where they become too many to read."""
-    shown_names = ", ".join(names[:limit])
-    return f"{shown_names} and {len(names) - limit} more" if len(names) > limit else shown_names
+def listed(names: Sequence[str], limit: int = 30, more: int = 0) -> str:
+    """The names with commas, cut off where they become too many to read; `more` there are that are not among them."""
+    shown_names, left = ", ".join(names[:limit]), max(len(names) - limit, 0) + more
+    return f"{shown_names} and {left} more" if left else shown_names
 
 
 def shown(text: str, limit: int = 24) -> str:

@@ -264,6 +264,16 @@ def test_a_file_in_which_only_bones_move_is_answered_with_some_of_them(saved, re
     )
 
 
+def test_of_many_bones_a_few_are_named_and_the_others_counted(saved, refusal) -> None:
+    arm = rig("Rig", dict.fromkeys([f"Tail {number}" for number in range(9)], ((0, 0, 0), (0, 1, 0), None)))
+    for pose_bone in arm.pose.bones:
+        key(pose_bone, 1, location=(0, 0, 0))
+    path = saved()
+    few = "Rig/Tail 0, Rig/Tail 1, Rig/Tail 2, Rig/Tail 3, Rig/Tail 4, Rig and 4 more"
+    assert refusal(path)[1] == f"no moving body in this file; name one with {path}:NAME: {few}"
+    assert refusal(f"{path}:Gone")[1] == f"no body named 'Gone'; it holds {few}"
+
+
 def test_what_is_open_stays_as_it_is_and_can_be_read_itself(saved) -> None:
     waving()
     path = saved()
