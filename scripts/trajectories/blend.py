@@ -37,6 +37,9 @@ FEW = 5
 STILL = 1e-6
 """What single precision makes of a body that does not move, in Blender units and in numbers of a quaternion."""
 
+STEADY = 1e-4
+"""By what share a scale may differ that is one and the same: single precision, through a chain of bones."""
+
 LAST_FRAME = 1048574
 """Blender goes no further; a damaged file could, and would keep it at work for hours."""
 
@@ -176,14 +179,19 @@ def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene]) -> Trajectory
 
 
 def _remark(path: Path, body: Body, poses: Poses) -> str:
-    """Where an armature stands still and its bones move: how to name one of them."""
-    bones = [] if body.bone is not None else _bones_with_keys(body.obj)
+    """Where an armature stands still and its bones move, how to name one; of a bone, what its rig's size does to it."""
+    if body.bone is not None:
+        scales = poses.scales
+        if scales is None or not np.allclose(scales, scales[0], rtol=STEADY, atol=0.0):
+            return ""
+        size = f"{scales[0]:.4g} times its own size"
+        return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"
+    bones = _bones_with_keys(body.obj)
     channels = np.hstack([poses.positions, poses.quaternions])
     if not bones or np.ptp(channels, axis=0).max() > STILL:
         return ""
-    return (
-        f"{body.name} itself does not move, its bones do: name one with {path}:{body.name}/BONE: {listed(bones, FEW)}"
-    )
+    some = listed(bones, FEW)
+    return f"{body.name} itself does not move, its bones do: name one with {path}:{body.name}/BONE: {some}"
 
 
 def _bones_with_keys(obj: bpy.types.Object) -> list[str]:

@@ -113,6 +113,23 @@ def test_constraints_drivers_and_parents_of_a_hidden_rig_are_evaluated(saved, sc
     )
 
 
+@pytest.mark.parametrize(("scale", "said"), [(1.0, ""), (0.01, "Rig/Hand is 0.01 times its own size all along, ")])
+def test_a_bone_of_a_rig_in_another_unit_says_so(saved, scale: float, said: str) -> None:
+    waving().scale = (scale,) * 3
+    note = read_trajectories(saved() + ":Rig/Hand").note
+    assert note.startswith(said)
+    assert bool(note) == bool(said)
+
+
+def test_a_bone_that_grows_is_not_taken_for_one_in_another_unit(saved) -> None:
+    arm = waving()
+    for frame in (1, 9):
+        key(arm.pose.bones["Hand"], frame, scale=(frame,) * 3)
+    recording = read_trajectories(saved() + ":Rig/Hand")
+    np.testing.assert_allclose(recording.trajectories[0].poses.scales[[0, -1]], [1, 9], rtol=1e-6)
+    assert recording.note == ""
+
+
 def test_nla_strips_move_bones_too(saved) -> None:
     arm = rig("Rig", ARM)
     for frame in (1, 11):
