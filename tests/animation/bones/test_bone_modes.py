@@ -211,12 +211,12 @@ def test_the_mode_of_a_bone_is_chosen_by_its_property(live_file):
 
 @pytest.mark.parametrize("mode", MODES)
 def test_linear_extrapolation_goes_on(live_file, mode):
-    rig = key_all(new_rig(), interpolation="LINEAR")
+    rig = key_all(new_rig(), (21.0, 31.0, 44.0, 60.0), interpolation="LINEAR")
     for fcurve in curves_of(rig).values():
         fcurve.extrapolation = "LINEAR"
-    live_file.scene.frame_start, live_file.scene.frame_end = -20, 60
+    live_file.scene.frame_start, live_file.scene.frame_end = 0, 80
     set_mode(list(rig.pose.bones), mode)
-    assert_posed(rig, np.arange(-20.0, 61.0))
+    assert_posed(rig, np.arange(81.0))
 
 
 def cyclic(order: str, kind: str, interpolation: str) -> bpy.types.Object:
@@ -235,6 +235,8 @@ def test_a_cycle_repeats_the_motion_of_its_first_round(live_file, mode, order):
     rig = cyclic(order, "REPEAT", "BEZIER")
     around = np.arange(76.0)
     set_mode(list(rig.pose.bones), mode)
+    # On a seam the last pose of one round and the first pose of the next are one frame.
+    around = around[(around - 31.0) % 11.0 != 0.0]
     first = 31.0 + (around - 31.0) % 11.0
     (shown,) = shown_poses([rig], around)
     assert_same_poses(rig, around, shown, expected_poses(rig, first))

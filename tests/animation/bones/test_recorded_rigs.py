@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import addon_utils
 import bpy
 import numpy as np
@@ -45,7 +47,10 @@ def imported(name: str) -> bpy.types.Object:
     """The rig in this file, as Blender's importer makes it."""
     path = str(FILES[name][0])
     if path.endswith(".bvh"):
-        bpy.ops.import_anim.bvh(filepath=path, update_scene_duration=True)
+        with warnings.catch_warnings():
+            # Blender's importer leaves the file to be closed by whoever collects it.
+            warnings.simplefilter("ignore", ResourceWarning)
+            bpy.ops.import_anim.bvh(filepath=path, update_scene_duration=True)
     else:
         bpy.ops.import_scene.fbx(filepath=path)
     return next(obj for obj in bpy.context.scene.objects if obj.type == "ARMATURE")
@@ -86,9 +91,12 @@ def test_a_rig_takes_a_mode_on_all_of_its_bones_and_plays(importers, name, mode)
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_rig_with_a_key_on_every_frame_is_as_it_was(importers, name):
+def test_on_its_keys_a_rig_is_as_it_was(importers, name):
     rig = imported(name)
-    frames = some_frames(rig, tried(60))
+    keyed = set.intersection(*(set(key_frames(bone)) for bone in rig.pose.bones if len(key_frames(bone))))
+    frames = np.array(sorted(frame for frame in keyed if frame.is_integer()))
+    frames = frames[:: max(1, len(frames) // tried(60))]
+    assert len(frames) > 10
     (before,) = shown_poses([rig], frames)
     set_mode(list(rig.pose.bones), "dq_sclerp")
     assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
