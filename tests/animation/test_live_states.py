@@ -1,4 +1,4 @@
-"""Whatever is edited of objects, in whatever order, in-betweens are what a fresh computation gives, and keys as keyed."""
+"""Whatever is edited of objects, in whatever order, in-betweens are what a fresh computation gives, keys as keyed."""
 
 from __future__ import annotations
 
