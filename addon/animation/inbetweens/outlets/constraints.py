@@ -281,18 +281,21 @@ Line = tuple[float, float]
 def _held(place: SlotTransform) -> dict[Channel, Line]:
     """What an Action has of constraints in the NLA of a rig: of its own the influence, of the others the time too."""
     user = place.users[0]
-    if not len(user.animated.animation_data.nla_tracks):
-        return {}
-    if not any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves):
+    if not (len(user.animated.animation_data.nla_tracks) and _moves_bone(place)):
         return {}
     held: dict[Channel, Line] = {}
-    for other in slot_transforms_of([user]):
-        if other.filled and not _is_same(other, place):
+    others = [other for other in slot_transforms_of([user]) if not _is_same(other, place) and _moves_bone(other)]
+    for other in others:
+        if other.filled:
             held[_influence_path(other), 0] = (0.0, 0.0)
             held[_time_path(other), 0] = _time_seen_from(place, other, user.animated)
-    if held and place.filled:
+    if others and place.filled:
         held[_influence_path(place), 0] = (1.0, 0.0)
     return held
+
+
+def _moves_bone(place: SlotTransform) -> bool:
+    return any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves)
 
 
 def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.Object) -> Line:
