@@ -1,8 +1,9 @@
 """Pose bones: differences are put on top of a bone by an Action constraint, first in its stack.
 
 The differences are in a second slot of the Action that has the keys. Nothing but constraints uses it. Which frame of it
-a constraint takes, its evaluation time says, from 0 for the first sample to 1 for the last: that is animated beside the
-bone's own channels, by an F-curve without keys, and so it goes through strips as they do.
+a constraint takes, its evaluation time says, from 0 for frame 0, which no sample is before, to 1 for a power of two: so
+Blender comes to whole frames again without an error, in single precision. That is animated beside the bone's own
+channels, by an F-curve without keys, and so it goes through strips as they do.
 
 Where several Actions of a rig fill in the same bone, in strips of the NLA, each has a constraint of its own, of another
 name, that has no influence while another Action plays. From one strip to the next both influences blend, as Blender
@@ -50,6 +51,10 @@ SETTINGS = {
     "target_space": "LOCAL",
 }
 """How the constraint mixes: location added, rotation from the left, scale multiplied, and transforms by hand see it."""
+
+
+MOST_FRAMES = 1_048_574
+"""The last frame that Blender lets a constraint have."""
 
 
 class Constraints(Outlet):
@@ -246,10 +251,14 @@ def _dismount(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> 
 
 
 def _span(place: SlotTransform) -> tuple[int, int]:
-    """The frames of the first and the last sample."""
+    """The frames that an evaluation time of 0 and one of 1 stand for."""
     points = next(iter(place.filled.values())).sampled_points
-    first = math.floor(points[0].co[0])
-    return first, first + len(points) - 1
+    return 0, _duration(math.ceil(points[len(points) - 1].co[0]))
+
+
+def _duration(last: int) -> int:
+    """The power of two that this frame of the samples is not behind."""
+    return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
 
 
 def _name(place: SlotTransform) -> str:
@@ -339,7 +348,8 @@ def _write_time(place: SlotTransform, layout: Layout) -> None:
         _write_line(place, path, _line(layout))
         return
     fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
-    replace_keys(fcurve, np.array((layout.first, layout.last)), np.array((0.0, 1.0)))
+    frames, times = np.array(_seams(layout)).T
+    replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
     put_away(place.channelbag, bone_name(place.prefix), fcurve)
 
@@ -374,15 +384,22 @@ def _says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
     if fcurve.mute or [modifier.type for modifier in modifiers] != ["CYCLES"]:
         return False
     (modifier,) = modifiers
-    ends = [(layout.first, 0.0), (layout.last, 1.0)]
     cycles = Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
-    return [tuple(key.co) for key in fcurve.keyframe_points] == ends and cycles == _without_offset(layout.cycles)
+    return cycles == _without_offset(layout.cycles) and np.array_equal(
+        [key.co for key in fcurve.keyframe_points], np.float32(_seams(layout))
+    )
 
 
 def _line(layout: Layout) -> Line:
-    """From 0 on the first frame to 1 on the last."""
-    duration = max(layout.last - layout.first, 1)
-    return -layout.first / duration, 1.0 / duration
+    """From frames to the evaluation times of their samples."""
+    duration = _duration(layout.last + layout.shift)
+    return layout.shift / duration, 1.0 / duration
+
+
+def _seams(layout: Layout) -> list[tuple[float, float]]:
+    """The outermost frames, and the evaluation times of their samples."""
+    start, step = _line(layout)
+    return [(frame, start + step * frame) for frame in (layout.first, layout.last)]
 
 
 def _without_offset(cycles: Cycles) -> Cycles:
