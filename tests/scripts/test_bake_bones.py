@@ -216,6 +216,40 @@ def test_bones_whose_keys_are_elsewhere_are_told_from_those_whose_names_begin_al
     assert f"{path}: Rig/Arm: baked, frames 1 to 40, Screw (Dual Quaternion)" in lines
 
 
+def test_the_bones_of_a_library_override_are_baked_and_given_back(tmp_path):
+    with extension():
+        new_file()
+        new_rig()
+        library = save(tmp_path / "library.blend")
+        new_file()
+        with bpy.data.libraries.load(str(library), link=True, relative=False) as (_, here):
+            here.objects = ["Rig"]
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        rig = here.objects[0].override_create(remap_local_usages=True)
+        rig.animation_data.action = rig.animation_data.action.copy()
+        set_mode(list(rig.pose.bones), "dq_sclerp")
+        wanted, keys = shown_bones(rig), snapshot(rig)
+        path = save(tmp_path / "shot.blend")
+    assert run(path, "--output", tmp_path / "farm") == 0
+    assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
+    for name, baked in (("shot-baked", list(NAMES)), ("shot-baked-unbaked", [])):
+        with extension():
+            open_again(tmp_path / "farm" / f"{name}.blend")
+            rig = next(obj for obj in bpy.data.objects if obj.override_library)
+            assert baked_bones(rig) == baked
+            np.testing.assert_allclose(shown_bones(rig), wanted, atol=1e-4)
+    assert snapshot(rig) == keys
+
+
+def shown_bones(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones of a rig are on all frames, in its own space (frames, bones, 4, 4)."""
+    found = []
+    for frame in PLAYED:
+        bpy.context.scene.frame_set(int(frame))
+        found.append([np.array(bone.matrix) for bone in rig.pose.bones])
+    return np.array(found)
+
+
 def test_a_linked_rig_is_named_once_and_says_how_many_bones_it_has(tmp_path, capsys):
     library = rig_file(tmp_path / "library.blend")
     with extension():
