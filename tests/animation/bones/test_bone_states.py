@@ -289,8 +289,8 @@ class EditingBones(Editing):
         names = [name for name in names if self._sharing(name) == {name}]
         keyed = self._keyed()
         live = [name for name in names if has_live_segments(self._found(name))]
-        before = {name: self._wanted(self._found(name), self._frames_around(name, step)) for name in live}
         frames = {name: self._frames_around(name, step) for name in live}
+        before = {name: expected_bases(self._found(name), frames[name]) for name in live}
         refused: list[animation.Refused] = []
         self._edit(lambda: animation.bake([self._found(name) for name in names], step=step, refused=refused) and None)
         assert len(refused) == len(names) - len(live)
