@@ -60,6 +60,12 @@ class _State:
     edited = False
     """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
 
+    followed: ClassVar[set[int]] = set()
+    """The Actions, by session id, that were followed before Blender evaluated them."""
+
+    moved: ClassVar[set[Transform]] = set()
+    """What these move."""
+
     operator = (0, "")
     """The operator that had ended last when edits were last seen."""
 
@@ -260,18 +266,23 @@ def _turn() -> Iterator[bool]:
             _State.busy = False
 
 
-def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[Transform]:
-    """Refresh after an update in which Actions were edited or not, and say what those move."""
-    if _State.unseen:
-        _look_through()
-    if not edited:
-        return set()
-    actions = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+def _follow(actions: Iterable[bpy.types.Action]) -> set[Transform]:
+    """Refresh what these Actions, which were edited, move; and say what that is."""
     places = [place for slot in slots_in(actions) for place in transforms_in(slot, glances.changed_in(slot))]
     with _turn() as ours:
         if ours:
             _refresh(places)
     return {user for place in places for user in place.users}
+
+
+def _edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Action]:
+    """The Actions that wait to be evaluated, or just were."""
+    if depsgraph is None or not depsgraph.id_type_updated("ACTION"):
+        return []
+    # By name: the original of what was deleted just now is no longer there to be asked for.
+    blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+    found = (bpy.data.actions.get((block.name, block.library and block.library.filepath)) for block in blocks)
+    return [action for action in found if action is not None]
 
 
 def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Transform]) -> None:
@@ -384,14 +395,25 @@ def _careful(handler: Callable) -> Callable:
 
 @_careful
 def _before_update(scene: bpy.types.Scene, *_: object) -> None:
-    _before_evaluation(scene, scene.frame_current_final)
+    _State.frame = scene.frame_current_final
+    _before_evaluation(scene, _State.frame)
+    # In-betweens that are there by now are evaluated with the edit; later they would cost an evaluation of their own.
+    edited = {action for layer in scene.view_layers for action in _edited_actions(layer.depsgraph)}
+    _State.followed = {action.session_uid for action in edited}
+    _State.moved = _follow(edited) if edited else set()
+    insertion.forget_poses(_State.moved)
 
 
 @_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
-    seen = _follow(depsgraph, edited=depsgraph.id_type_updated("ACTION"))
-    insertion.forget_poses(seen)
+    if _State.unseen:
+        _look_through()
+    edited = _edited_actions(depsgraph)
+    later = _follow([action for action in edited if action.session_uid not in _State.followed])
+    insertion.forget_poses(later)
+    seen = _State.moved | later
+    _State.followed, _State.moved = set(), set()
     if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
         _follow_objects(depsgraph, _State.frame, seen)
 
@@ -407,7 +429,10 @@ def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
 @_careful
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     # Edits that nobody has seen yet were made on the frame before this one.
-    _follow(depsgraph, edited=_State.edited)
+    if _State.unseen:
+        _look_through()
+    elif _State.edited:
+        _follow(_edited_actions(depsgraph))
     insertion.forget_poses()
     _State.frame = scene.frame_current_final
 

@@ -65,7 +65,7 @@ def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[
     place = active_place(transform, places_of(transform))
     if place is None:
         return [transform.motion.mode or "BLENDER"] * len(frames)
-    return [MODE_NAMES[number] for number in _modes_in(place, frames)]
+    return [MODE_NAMES[number] for number in _modes_in(place, np.asarray(frames, dtype=np.float64))]
 
 
 def segment_modes(place: SlotTransform) -> list[str]:

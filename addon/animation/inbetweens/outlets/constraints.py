@@ -21,7 +21,7 @@ from mathutils import Euler, Quaternion
 
 from ...actions.channels import add_cycles, replace_keys
 from ...actions.records import ensure_record, record_of, recorded_digest
-from ...actions.slots import Slot, SlotTransform, actions_of, slot_transforms_of, strips_of
+from ...actions.slots import Slot, SlotTransform, slot_transforms_of, strips_of, uses_of
 from ...actions.sources import Source
 from ...curves import Cycles
 from ...transforms import (
@@ -197,8 +197,17 @@ def _is_mounted(user: Transform, place: SlotTransform) -> bool:
 def _has_stale(user: BoneTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
     shown = [_shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
-    actions = set(actions_of(user.animated))
-    return len(set(shown)) < len(shown) or any(action not in actions for action, _ in shown)
+    return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
+
+
+def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
+    """The Actions of a rig, and the handles of the slots in them that differences of its bones are in."""
+    return {
+        (action, pair.differences)
+        for action, handle, _ in uses_of(rig).values()
+        for pair in action.rigid_motion.bone_slots
+        if pair.handle == handle
+    }
 
 
 def _is_free_to_mount(user: Transform, place: SlotTransform) -> bool:
@@ -212,6 +221,9 @@ def _mount(user: BoneTransform, place: SlotTransform) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
     constraints, name = user.carrier.constraints, _name(place)
     constraint = constraint_of(user, place) or constraints.get(name)
+    if constraint is not None and not (is_ours(constraint) and _is_to_be_had(constraint, user, place)):
+        # This slot gets a constraint of another name when it is written.
+        return
     if constraint is None:
         constraint = constraints.new("ACTION")
         for setting, value in SETTINGS.items():
@@ -219,6 +231,7 @@ def _mount(user: BoneTransform, place: SlotTransform) -> None:
         constraints.move(len(constraints) - 1, 0)
         constraint = constraints[0]
         constraint.show_expanded = False
+    names = [one for one in user.motion.mounted.split("\n") if one not in ("", name, constraint.name)]
     if constraint.name != name:
         constraint.name = name
     action, handle = _slot_of_differences(place)
@@ -226,11 +239,16 @@ def _mount(user: BoneTransform, place: SlotTransform) -> None:
         constraint.action = action
         constraint.action_slot = next(slot for slot in action.slots if slot.handle == handle)
     constraint.frame_start, constraint.frame_end = _span(place)
-    names = user.motion.mounted.split("\n") if user.motion.mounted else []
-    if name not in names:
-        user.motion.mounted = "\n".join((*names, name))
+    if (mounted := "\n".join((*names, name))) != user.motion.mounted:
+        user.motion.mounted = mounted
     if not user.animated.rigid_motion.has_bones:
         user.animated.rigid_motion.has_bones = True
+
+
+def _is_to_be_had(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
+    """Whether a constraint shows a slot already, or one that does not move the rig any more."""
+    shown = _shown_by(constraint)
+    return shown == _slot_of_differences(place) or shown not in _in_use(user.animated)
 
 
 def _dismount(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
