@@ -1,7 +1,7 @@
 """What is kept in the file, on Actions and on objects. Without the extension all of it is inert, and stays in the file.
 
-An Action keeps the modes of what it moves: see `records`. An object shows its own there, to be chosen and to be
-animated, and keeps the delta transforms that it has without in-betweens.
+An Action keeps the modes of what it moves: see `records`. An object or a pose bone shows its own, to be chosen and to
+be animated; an object keeps the delta transforms that it has without in-betweens.
 """
 
 from __future__ import annotations
@@ -45,10 +45,21 @@ class SlotRecord(bpy.types.PropertyGroup):
     mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
     digest: StringProperty(options={"HIDDEN"})
     rows: StringProperty(options={"HIDDEN"})
+    constraint: StringProperty(
+        description="What the constraint of a bone is called, where that is not its usual name", options={"HIDDEN"}
+    )
+
+
+class BoneSlot(bpy.types.PropertyGroup):
+    """A slot with bones in it, and the one that the differences of these are in."""
+
+    handle: IntProperty(options={"HIDDEN"})
+    differences: IntProperty(options={"HIDDEN"})
 
 
 class ActionMotion(bpy.types.PropertyGroup):
     slots: CollectionProperty(type=SlotRecord)
+    bone_slots: CollectionProperty(type=BoneSlot)
     range_is_ours: BoolProperty(
         description="Whether the manual frame range was set for samples that lie behind the keys",
         options={"HIDDEN"},
@@ -75,15 +86,22 @@ class ChangedAction(bpy.types.PropertyGroup):
     )
 
 
-def _on_mode(motion: ObjectMotion, _context: bpy.types.Context) -> None:
-    mode_keys.on_property(transform_of(motion.id_data))
+def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
+    obj = motion.id_data
+    if isinstance(motion, BoneMotion):
+        # Blender has no way from it to its bone.
+        mode_keys.on_property(transform_of(next(bone for bone in obj.pose.bones if bone.rigid_motion == motion)))
+    else:
+        mode_keys.on_property(transform_of(obj))
 
 
 def _on_original(motion: ObjectMotion, _context: bpy.types.Context) -> None:
     live.follow_original(transform_of(motion.id_data))
 
 
-class ObjectMotion(bpy.types.PropertyGroup):
+class _Motion:
+    """What all that is moved has."""
+
     mode: EnumProperty(
         name="Mode",
         description="What happens between the keys. A key of this property decides from its frame on",
@@ -98,6 +116,18 @@ class ObjectMotion(bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},
     )
+    bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
+
+
+class BoneMotion(_Motion, bpy.types.PropertyGroup):
+    mounted: StringProperty(
+        description="The constraints that the bone was given. Who takes one off does so on purpose",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+
+
+class ObjectMotion(_Motion, bpy.types.PropertyGroup):
     filled: BoolVectorProperty(
         description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
         size=4,
@@ -144,21 +174,27 @@ class ObjectMotion(bpy.types.PropertyGroup):
         override={"LIBRARY_OVERRIDABLE"},
         update=_on_original,
     )
-    bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
+    has_bones: BoolProperty(
+        description="Whether bones have modes, or constraints for them",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
 
 
-CLASSES = (SlotRecord, ActionMotion, ChangedAction, ObjectMotion)
+CLASSES = (SlotRecord, BoneSlot, ActionMotion, ChangedAction, BoneMotion, ObjectMotion)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Object.rigid_motion = PointerProperty(type=ObjectMotion, override={"LIBRARY_OVERRIDABLE"})
+    bpy.types.PoseBone.rigid_motion = PointerProperty(type=BoneMotion, override={"LIBRARY_OVERRIDABLE"})
     bpy.types.Action.rigid_motion = PointerProperty(type=ActionMotion)
 
 
 def unregister() -> None:
     del bpy.types.Action.rigid_motion
+    del bpy.types.PoseBone.rigid_motion
     del bpy.types.Object.rigid_motion
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

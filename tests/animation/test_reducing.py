@@ -594,6 +594,10 @@ def tweak(obj):
 
 def moved_by_bones():
     obj = new_object(data=bpy.data.armatures.new("Rig"))
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    obj.data.edit_bones.new("Hand").tail = (0.0, 0.0, 1.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
     write_channel(obj, 'pose.bones["Hand"].location', np.arange(1.0, 9.0), np.zeros((8, 3)))
     return obj
 

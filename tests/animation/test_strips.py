@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from addon.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
-from addon.animation.inbetweens import filling
+from addon.animation.inbetweens.outlets import deltas, sampled
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 
@@ -214,7 +214,8 @@ def test_what_a_strip_holds_is_written_once(live_file, monkeypatch):
     obj, _, actions, _ = two_strips()
     written = []
     # Noted rather than raised: Blender swallows what is raised in a handler.
-    monkeypatch.setattr(filling, "_write", lambda *what: written.append(what))
+    monkeypatch.setattr(sampled, "replace_samples", lambda *what: written.append(what))
+    monkeypatch.setattr(deltas, "replace_samples", lambda *what: written.append(what))
     refresh()
     refresh([obj])
     fcurves_of(actions[1]).find("location", index=0).keyframe_points[1].co_ui.y += 1.0

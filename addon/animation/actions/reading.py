@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
@@ -68,11 +68,14 @@ def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> li
 def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refused]]:
     """What is keyed in each of the places as each of its users has it."""
     found: list[list[_Keyed | Refused]] = []
+    drivers: dict[bpy.types.ID, dict[str, bpy.types.FCurve]] = {}
     for place in places:
         users: list[_Keyed | Refused] = []
         for user in place.users:
+            if user.animated not in drivers:
+                drivers[user.animated] = {one.data_path: one for one in user.animated.animation_data.drivers}
             try:
-                users.append(_keyed_for(user, place))
+                users.append(_keyed_for(user, place, drivers[user.animated]))
             except Refused as problem:
                 users.append(problem)
         found.append(users)
@@ -119,9 +122,9 @@ class _Keyed:
     """The mode channel, if there is one with keys."""
 
 
-def _keyed_for(user: Transform, place: SlotTransform) -> _Keyed:
+def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
-    refuse_what_is_taken(user, place)
+    refuse_what_is_taken(user, place, drivers)
     keyed = {}
     for row, channel in user.channels.items():
         fcurve = place.curves.get(channel)

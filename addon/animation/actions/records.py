@@ -55,7 +55,7 @@ def record_mode(place: SlotTransform, number: int) -> None:
             record.property_unset("mode")
             _tidy(place)
     else:
-        record = record or _new(place)
+        record = ensure_record(place)
         if record.mode != mode:
             record.mode = mode
     for user in place.users:
@@ -67,7 +67,7 @@ def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -
     """Keep what in-betweens were made from, and which components they are in."""
     record = record_of(place)
     if digest:
-        record = record or _new(place)
+        record = ensure_record(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
     elif record is not None and record.digest:
         record.digest = record.rows = ""
@@ -75,22 +75,33 @@ def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -
 
 
 def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
-    for record in place.slot.action.rigid_motion.slots:
-        if record.handle == place.slot.handle and record.prefix == place.prefix:
-            return record
-    return None
+    records = place.slot.action.rigid_motion.slots
+    record = records.get(_key_of(place))
+    if record is None and not place.prefix:
+        # Those of versions without bones have no name to be found by.
+        handle = place.slot.handle
+        record = next((one for one in records if one.handle == handle and not (one.prefix or one.name)), None)
+    return record
 
 
-def _new(place: SlotTransform) -> bpy.types.PropertyGroup:
+def _key_of(place: SlotTransform) -> str:
+    """The name that a record is found by: Blender looks for names quickly."""
+    return f"{place.slot.handle} {place.prefix}"
+
+
+def ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
+    """The record of a transform in a slot, made where there is none yet."""
+    record = record_of(place)
+    if record is not None:
+        return record
     record = place.slot.action.rigid_motion.slots.add()
-    record.handle, record.prefix = place.slot.handle, place.prefix
+    record.name, record.handle, record.prefix = _key_of(place), place.slot.handle, place.prefix
     return record
 
 
 def _tidy(place: SlotTransform) -> None:
     """Take out a record that says nothing."""
-    records = place.slot.action.rigid_motion.slots
-    for number, record in reversed(list(enumerate(records))):
-        here = (record.handle, record.prefix) == (place.slot.handle, place.prefix)
-        if here and not record.digest and not record.is_property_set("mode"):
-            records.remove(number)
+    record = record_of(place)
+    if record is not None and not record.digest and not record.is_property_set("mode"):
+        records = place.slot.action.rigid_motion.slots
+        records.remove(next(number for number, one in enumerate(records) if one == record))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import bpy
 import numpy as np
 
 from ..curves import LARGEST, Keys
-from ..transforms import Refused, Transform
-from .slots import GROUP, SlotTransform, is_filled_in
+from ..transforms import GROUP, Refused, Transform
+from .slots import SlotTransform, is_filled_in
 from .sources import MODE_NAMES, UNKNOWN, Source
 
 MOST_FRAMES = 250_000
@@ -23,18 +24,18 @@ COMPONENTS = (
 """What the rows of a source are called."""
 
 
-def refuse_what_is_taken(user: Transform, place: SlotTransform) -> None:
-    """Raise `Refused` where a user's channels, or what the differences go into, are not to be had."""
-    for block in (user.animated, place.slot.action):
-        if not block.is_editable:
-            raise Refused(
-                f"{block.name} is linked from another file: make it local first (Object > Relations > Make Local)"
-            )
+def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> None:
+    """Raise `Refused` where a user's channels, or what the differences go into, are not to be had.
+
+    `drivers` are those of the user's data-block, by their data paths.
+    """
+    _refuse_linked(user, place)
     differences = user.differences.values()
-    for driver in user.animated.animation_data.drivers:
-        if any(driver.data_path == path for path, _ in (*user.channels.values(), *differences)):
-            raise Refused(f"{user.name}: {_label(driver)} is driven: remove the driver, or bake it to keys")
-    for channel in differences:
+    for path, _ in (*user.channels.values(), *differences) if drivers else ():
+        if path in drivers:
+            raise Refused(f"{user.name}: {_label(drivers[path])} is driven: remove the driver, or bake it to keys")
+    # The differences of bones are in a slot of their own.
+    for channel in () if place.prefix else differences:
         fcurve = place.curves.get(channel)
         if fcurve is not None and not is_filled_in(fcurve):
             if fcurve.group is not None and fcurve.group.name == GROUP:
@@ -47,6 +48,15 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform) -> None:
                 f"{user.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
                 f"{prop.replace('_', ' ')} (Object > Apply > Animated Transforms to Deltas does the reverse)"
             )
+
+
+def _refuse_linked(user: Transform, place: SlotTransform) -> None:
+    for block in (user.animated, place.slot.action):
+        if not block.is_editable:
+            way_out = "make it local first (Object > Relations > Make Local)"
+            if place.prefix and block == user.animated:
+                way_out = "make an override of it first (Object > Library Override > Make)"
+            raise Refused(f"{block.name} is linked from another file: {way_out}")
 
 
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:

@@ -1,22 +1,31 @@
 """Which Action slots move something, and the F-curves in them, transform by transform.
 
-A slot may have several users, and moves one transform of each: the object itself. Pose bones, with a prefix of their
-own in the slot of their armature, are to come in here: `transforms_in` is where a slot is taken apart.
+A slot may have several users, and moves transforms of each: the object itself, and the bones of a rig. `transforms_in`
+is where a slot is taken apart. What the in-betweens of bones differ in is in a second slot of the same Action.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..transforms import MODE_PROPERTY, Channel, ObjectTransform, Transform
-
-GROUP = "Rigid Motion"
-"""The group of F-curves that the mode channel and the differences are in."""
+from ..transforms import (
+    CONSTRAINT,
+    GROUP,
+    MODE_PROPERTY,
+    WIDTHS,
+    BoneTransform,
+    Channel,
+    ObjectTransform,
+    Transform,
+    bone_name,
+    prefix_of,
+    split_path,
+)
 
 Curves = dict[Channel, bpy.types.FCurve]
 
@@ -47,8 +56,15 @@ class Slot:
 
     @property
     def channelbag(self) -> bpy.types.ActionChannelbag | None:
-        slot = next((slot for slot in self.action.slots if slot.handle == self.handle), None)
-        return None if slot is None else action_get_channelbag_for_slot(self.action, slot)
+        return _channelbag(self.action, self.handle)
+
+    @property
+    def bones_channelbag(self) -> bpy.types.ActionChannelbag | None:
+        """Where the differences of bones are: in the slot that goes with this one."""
+        for pair in self.action.rigid_motion.bone_slots:
+            if pair.handle == self.handle:
+                return _channelbag(self.action, pair.differences)
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,21 +89,57 @@ class SlotTransform:
 
     @property
     def filled(self) -> Curves:
-        """Those of its F-curves that in-betweens are in."""
-        group = None if self.channelbag is None else self.channelbag.groups.get(GROUP)
+        """The F-curves that in-betweens are in."""
+        if self.prefix:
+            channelbag = self.slot.bones_channelbag
+            group = None if channelbag is None else channelbag.groups.get(bone_name(self.prefix))
+        else:
+            group = None if self.channelbag is None else self.channelbag.groups.get(GROUP)
         if group is None:
             return {}
         return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels if _is_sampled(fcurve)}
 
     def read_again(self) -> SlotTransform:
         """The same, with the F-curves that there are by now."""
-        return next(one for one in transforms_in(self.slot) if one.prefix == self.prefix)
+        return next(one for one in transforms_in(self.slot, (self.prefix,)) if one.prefix == self.prefix)
 
 
-def transforms_in(slot: Slot) -> list[SlotTransform]:
-    """What a slot moves, transform by transform."""
+def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[SlotTransform]:
+    """What a slot moves, transform by transform: these, or all that it has something of."""
     channelbag = slot.channelbag
-    return [SlotTransform(slot, "", channelbag, tuple(map(ObjectTransform, slot.users)), curves_in(channelbag))]
+    curves: dict[str, Curves] = {"": {}} if prefixes is None else {prefix: {} for prefix in prefixes}
+    for fcurve in () if channelbag is None else channelbag.fcurves:
+        path = fcurve.data_path
+        prefix, prop = split_path(path)
+        if prefixes is not None:
+            if (own := curves.get(prefix)) is not None:
+                own[path, fcurve.array_index] = fcurve
+        elif prefix in curves or prop in WIDTHS or prop == MODE_PROPERTY or prop.startswith(_TIMES):
+            curves.setdefault(prefix, {})[path, fcurve.array_index] = fcurve
+    if prefixes is None:
+        for record in slot.action.rigid_motion.slots:
+            if record.handle == slot.handle:
+                curves.setdefault(record.prefix, {})
+    places = (SlotTransform(slot, prefix, channelbag, _users_of(slot, prefix), own) for prefix, own in curves.items())
+    return [place for place in places if place.users]
+
+
+_TIMES = f'constraints["{CONSTRAINT}'
+"""How the paths of channels begin that say at what time constraints of ours are."""
+
+
+def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
+    """What a prefix stands for in each of the users of a slot that has it."""
+    if not prefix:
+        return tuple(map(ObjectTransform, slot.users))
+    name = bone_name(prefix)
+    bones = (user.pose.bones.get(name) for user in slot.users if user.pose is not None)
+    return tuple(BoneTransform(bone) for bone in bones if bone is not None)
+
+
+def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChannelbag | None:
+    slot = next((slot for slot in action.slots if slot.handle == handle), None)
+    return None if slot is None else action_get_channelbag_for_slot(action, slot)
 
 
 def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
@@ -99,8 +151,7 @@ def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
     return [
         one
         for slot in slots_of(prefixes)
-        for one in transforms_in(slot)
-        if any(one.prefix in prefixes.get(user, ()) for user in slot.users)
+        for one in transforms_in(slot, set().union(*(prefixes.get(user, ()) for user in slot.users)))
     ]
 
 
@@ -115,7 +166,18 @@ def places_of(transform: Transform) -> list[SlotTransform]:
         Slot(action, handle, (transform.animated,), frozenset(strips))
         for action, handle, strips in _uses(transform.animated).values()
     )
-    return [place for slot in slots for place in transforms_in(slot) if place.prefix == transform.prefix]
+    return [place for slot in slots for place in transforms_in(slot, (transform.prefix,))]
+
+
+def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
+    """What is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
+    found = []
+    for action, handle, strips in _uses(obj).values():
+        slot = Slot(action, handle, (obj,), frozenset(strips))
+        channelbag = slot.bones_channelbag
+        bones = () if channelbag is None else map(prefix_of, channelbag.groups.keys())
+        found += [place for place in transforms_in(slot, {"", *bones}) if place.filled]
+    return found
 
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
@@ -189,13 +251,6 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
     # Without an Action it is a strip of strips, and these may be in it.
     strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
     return all(strip.blend_type == "REPLACE" for strip in strips if strip.action in (None, slot.action))
-
-
-def curves_in(channelbag: bpy.types.ActionChannelbag | None) -> Curves:
-    """The F-curves of a slot, by data path and index."""
-    if channelbag is None:
-        return {}
-    return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in channelbag.fcurves}
 
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:

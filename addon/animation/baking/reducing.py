@@ -17,7 +17,7 @@ import numpy as np
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.best_of import least_errors
 from ..actions.channels import replace_keys
-from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.slots import SlotTransform, slot_transforms_of, slots_of, transforms_in
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source, distinct
 from ..curves import CODE, CONSTANT, LINEAR, Keys
 from ..inbetweens.acting import Readings, Targets, act_on, readable
@@ -453,11 +453,8 @@ def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
             f"{has}, constraints or drivers move it: bake them first "
             "(Object > Animation > Bake Action, with Visual Keying)"
         )
-    if any(path.startswith("pose.bones") for place in slot_transforms_of([transform]) for path, _ in place.curves):
-        return (
-            f"{has}, its bones have: let an empty copy the transforms of a bone, bake the empty "
-            "(Object > Animation > Bake Action, with Visual Keying), and reduce that"
-        )
+    if any(place.prefix for slot in slots_of([transform.animated]) for place in transforms_in(slot)):
+        return f"{has}, its bones have: select those in Pose mode, and reduce theirs"
     return f"{has}: there is nothing to reduce"
 
 

@@ -17,8 +17,11 @@ from ..actions.sources import Source
 from ..transforms import Refused, Transform, transform_of
 from . import live
 
-Targets = bpy.types.Object | Transform | Iterable[bpy.types.Object | Transform]
-"""What to act on: one or several."""
+Target = bpy.types.Object | bpy.types.PoseBone | Transform
+"""What to act on."""
+
+Targets = Target | Iterable[Target]
+"""One or several."""
 
 Readings = list[tuple[SlotTransform, Source | Refused]]
 """The places that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
@@ -29,7 +32,7 @@ Result = TypeVar("Result")
 
 def transforms_of(targets: Targets) -> list[Transform]:
     """The transforms of targets, each once."""
-    single = isinstance(targets, bpy.types.Object | Transform)
+    single = isinstance(targets, Target)
     return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
 
 

@@ -18,6 +18,7 @@ from ..curves import cycled
 from ..transforms import PART_OF, WIDTHS, Transform, transform_of
 from .mode_keys import active_place
 from .on_screen import seen_components
+from .outlets import outlet_of
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -149,15 +150,20 @@ def shown_components(transform: Transform) -> np.ndarray | None:
     Refused
         Where it turns by axis and angle.
     """
-    filled = {channel for place in places_of(transform) for channel in place.filled}
-    if not filled:
+    places = [place for place in places_of(transform) if place.filled]
+    if not places:
         return None
-    difference, rows = np.zeros(10), transform.differences
-    for row, (path, index) in rows.items():
-        difference[row] = transform.animated.path_resolve(path)[index]
+    seen = transform.components()
     order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
-    parts = {PART_OF[row] for row, channel in rows.items() if channel in filled}
-    return seen_components(transform.components(), transform.original(), difference, order, parts)
+    rows = transform.differences.items()
+    parts = [{PART_OF[row] for row, channel in rows if channel in place.filled} for place in places]
+    if not transform.prefix:
+        # All slots of an object share its delta transforms; each of a bone has a constraint of its own.
+        places, parts = places[:1], [set().union(*parts)]
+    for place, own in zip(places, parts, strict=True):
+        difference = outlet_of(place).difference(place, transform, None)
+        seen = seen_components(seen, transform.original(), difference, order, own)
+    return seen
 
 
 def has_edited_differences(transform: Transform, frame: float) -> bool:
@@ -166,7 +172,7 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
     So it is once somebody has edited what they are in, until the frame changes.
     """
     place = active_place(transform, places_of(transform))
-    if place is None or place.slot.in_nla:
+    if place is None or place.prefix or place.slot.in_nla:
         # Strips are blended with one another.
         return False
     return any(

@@ -1,13 +1,13 @@
-"""Writing in-betweens: differences as sampled F-curves, in the slot that has the keys.
+"""Writing in-betweens: differences as sampled F-curves, in the Action that has the keys.
 
 A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
-nothing of it. There are samples only where a mode counts, and only of components that it changes. Where some have to
-lie outside of the keys, a manual frame range keeps the Action, its strips and exports from being longer for it.
+nothing of it. There are samples only where a mode counts, and only of components that it changes; which F-curves these
+are is up to the outlet. Where some have to lie outside of the keys, a manual frame range keeps the Action, its strips
+and exports from being longer for it.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -15,15 +15,12 @@ import bpy
 import numpy as np
 
 from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
-from ..actions.slots import GROUP, SlotTransform, is_filled_in, is_replacing, slot_transforms_of
+from ..actions.slots import SlotTransform, is_filled_in
 from ..actions.sources import FULL_TURN, Source
-from ..transforms import ORIGINALS, PART_OF, ROTATION, Channel, Transform, default_of
+from ..transforms import PART_OF, ROTATION, Channel
 from .differences import NOTHING, differences
 from .known_sources import changed_range, recall
-from .layout import Layout
-
-FARTHEST = 1_000_000
-"""Frames from 0 up to which Blender can show any."""
+from .outlets import outlet_of
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -43,9 +40,10 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
     longer = set()
     for (place, source), samples in zip(anew, differences(rounds), strict=True):
-        layout = Layout.of(source)
-        channels = _channels(place, source)
-        _write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
+        outlet = outlet_of(place)
+        layout, channels = outlet.layout(source), _channels(place, source)
+        outlet.write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
+        _tag(place)
         record_in_betweens(place, source.digest, samples)
         if layout.outermost[0] < source.keyed_range[0] or layout.outermost[1] > source.keyed_range[1]:
             longer.add(place.slot.action)
@@ -55,7 +53,7 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
 def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
     """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
     old = recall(recorded_digest(place))
-    if old is None or old is source or Layout.of(source).is_ring or not is_complete(place, source):
+    if old is None or old is source or outlet_of(place).layout(source).is_ring or not is_complete(place, source):
         return None
     return changed_range(old, source)
 
@@ -67,12 +65,12 @@ def _fill_in_changed(
     others = []
     found = differences([source for _, source, _ in readings], [span for *_, span in readings])
     for (place, source, (first, last)), samples in zip(readings, found, strict=True):
-        channels, rows = _channels(place, source), recorded_rows(place)
+        channels, rows, curves = _channels(place, source), recorded_rows(place), place.filled
         begin = source.frame_range[0]
         part = slice(2 * (first - begin) + 1, 2 * (last - begin) + 2, 2)
         written = {}
         for row in rows:
-            points = place.curves[channels[row]].sampled_points
+            points = curves[channels[row]].sampled_points
             written[row] = np.empty(2 * len(points), np.float32)
             points.foreach_get("co", written[row])
         values = {row: points[1::2] for row, points in samples.items()}
@@ -82,10 +80,9 @@ def _fill_in_changed(
             continue
         for row, points in written.items():
             points[part] = values[row]
-            place.curves[channels[row]].sampled_points.foreach_set("co", points)
+            curves[channels[row]].sampled_points.foreach_set("co", points)
         record_in_betweens(place, source.digest, rows)
-        for user in place.users:
-            user.animated.update_tag(refresh={"TIME"})
+        _tag(place)
     return others
 
 
@@ -115,20 +112,32 @@ def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], sour
 
 def is_complete(place: SlotTransform, source: Source) -> bool:
     """Whether all F-curves are as they were written for a source."""
-    layout, channels, curves = Layout.of(source), _channels(place, source), place.curves
-    written = [channels.get(row) for row in recorded_rows(place)]
+    outlet, channels, curves = outlet_of(place), _channels(place, source), place.filled
+    layout, written = outlet.layout(source), [channels.get(row) for row in recorded_rows(place)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
-        and len(place.filled) == len(written)
-        and all(user.is_noted(channel for channel in written if channel) for user in place.users)
+        and len(curves) == len(written)
+        and outlet.is_shown(place, source, written)
     )
 
 
 def clear(place: SlotTransform) -> None:
     """Take the in-betweens out of a slot, and give its users their original differences back."""
-    _write(place, {}, None)
+    outlet_of(place).write(place, {}, None)
+    _tag(place)
     record_in_betweens(place, "", ())
     _limit_ranges({place.slot.action}, set())
+
+
+def hold(place: SlotTransform) -> None:
+    """Have a slot hold what the NLA needs of it beside others that are filled in."""
+    if outlet_of(place).hold(place):
+        _tag(place)
+
+
+def _tag(place: SlotTransform) -> None:
+    for user in place.users:
+        user.animated.update_tag(refresh={"TIME"})
 
 
 def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
@@ -137,83 +146,30 @@ def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
     return place.users[0].differences_for(rotation)
 
 
-def _write(place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
-    """Replace the in-betweens of a transform by these samples, frame and value of each by turns.
-
-    Channels that have none are taken out.
-    """
-    for user in place.users:
-        user.note_original(points)
-    gone = [channel for channel in place.filled if channel not in points]
-    for channel, samples in points.items():
-        fcurve = place.curves.get(channel)
-        if fcurve is None or len(fcurve.sampled_points) != layout.count:
-            if fcurve is not None:
-                _remove(place, channel)
-            fcurve = _new(place, channel, layout.count)
-        fcurve.sampled_points.foreach_set("co", samples)
-        layout.modify(fcurve)
-    for channel in gone:
-        _remove(place, channel)
-    if gone:
-        _tidy(place)
-        restore_originals(place.users)
-    for user in place.users:
-        user.animated.update_tag(refresh={"TIME"})
-
-
-def _remove(place: SlotTransform, channel: Channel) -> None:
-    place.channelbag.fcurves.remove(place.curves.pop(channel))
-
-
-def _tidy(place: SlotTransform) -> None:
-    """Take out the group of the in-betweens where nothing is left in it."""
-    groups = place.channelbag.groups
-    group = groups.get(GROUP)
-    if group is not None and not group.channels:
-        groups.remove(group)
-
-
-def _new(place: SlotTransform, channel: Channel, count: int) -> bpy.types.FCurve:
-    """A sampled F-curve out of the animator's way: locked, and hidden in the Graph Editor."""
-    path, index = channel
-    channelbag = place.channelbag
-    fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
-    fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
-    fcurve.keyframe_points.add(1)
-    fcurve.convert_to_samples(0, count)
-    fcurve.lock = fcurve.hide = True
-    fcurve.select = False
-    return fcurve
-
-
 def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types.Action]) -> None:
     """Have Actions begin and end with their keys where samples lie outside of these, by a manual frame range.
 
     `longer` are those in which samples were just written there. A range that the animator has set stays.
     """
     for action in actions:
-        ours = action.rigid_motion.range_is_ours
-        if (action.use_frame_range and not ours) or not (ours or action in longer):
+        is_ours = action.rigid_motion.range_is_ours
+        if (action.use_frame_range and not is_ours) or not (is_ours or action in longer):
             continue
-        curves = [
-            fcurve
-            for layer in action.layers
-            for strip in layer.strips
-            for bag in strip.channelbags
-            for fcurve in bag.fcurves
-        ]
+        bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+        of_bones = {pair.differences for pair in action.rigid_motion.bone_slots}
         samples, keyed = [], []
-        for fcurve in curves:
-            if not fcurve.is_empty:
-                (samples if is_filled_in(fcurve) else keyed).append(fcurve.range())
+        for bag in bags:
+            for fcurve in bag.fcurves:
+                if not fcurve.is_empty:
+                    ours = bag.slot_handle in of_bones or is_filled_in(fcurve)
+                    (samples if ours else keyed).append(fcurve.range())
         if keyed and samples and not _is_within(samples, keyed):
             begin, end = _union(keyed)
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
             action.rigid_motion.range_is_ours = True
-        elif ours:
+        elif is_ours:
             action.use_frame_range = action.rigid_motion.range_is_ours = False
 
 
@@ -224,70 +180,3 @@ def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:
 def _is_within(inner: Sequence[tuple[float, float]], outer: Sequence[tuple[float, float]]) -> bool:
     (first, last), (begin, end) = _union(inner), _union(outer)
     return begin <= first and last <= end
-
-
-def hold_originals(place: SlotTransform) -> None:
-    """Let a slot that is not filled in hold its users' original differences where another slot of theirs is.
-
-    While a strip plays whose Action lacks a channel that another strip's has, Blender puts that channel to its default.
-    """
-    held = _held(place)
-    present = {
-        channel: next((point.co[1] for point in fcurve.sampled_points), None)
-        for channel, fcurve in place.filled.items()
-    }
-    if held != present:
-        # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
-        starts = [start for fcurve in place.curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
-        first = math.floor(min(starts, default=0.0))
-        layout = Layout(first, first + 1, (first, first + 1))
-        points = {
-            channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()
-        }
-        _write(place, points, layout)
-
-
-def _held(place: SlotTransform) -> dict[Channel, float]:
-    """The channels that a slot which is not filled in has to have, and what they hold."""
-    first, *others = (_held_for(user, place) for user in place.users)
-    if any(held != first for held in others):
-        return {}
-    # What it does not key may be another strip's to move, below it, and then so are the differences of that.
-    animated = {path for (path, _), fcurve in place.curves.items() if not is_filled_in(fcurve)}
-    return {
-        (path, index): value
-        for (path, index), value in first.items()
-        if path not in animated and path.removeprefix("delta_") in animated
-    }
-
-
-def _held_for(user: Transform, place: SlotTransform) -> dict[Channel, float]:
-    if not len(user.animated.animation_data.nla_tracks):
-        return {}
-    originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
-    originals = {
-        path: values
-        for path, values in originals.items()
-        if all(map(math.isfinite, values)) and values != default_of(path)
-    }
-    # All objects of the file are gone through for the rest: only for the few that have delta transforms of their own.
-    if not (originals and is_replacing(user.animated, place.slot)):
-        return {}
-    filled = {path for other in slot_transforms_of([user]) if recorded_digest(other) for path, _ in other.filled}
-    return {
-        (path, index): value
-        for path, values in originals.items()
-        if path in filled
-        for index, value in enumerate(values)
-    }
-
-
-def restore_originals(transforms: Iterable[Transform]) -> None:
-    """Give transforms their original differences back where no in-betweens are in their place any more."""
-    noted = [transform for transform in transforms if any(transform.motion.filled)]
-    if not noted:
-        return
-    places = slot_transforms_of(noted)
-    for transform in noted:
-        filled = [channel for place in places if transform in place.users for channel in place.curves]
-        transform.restore_original(filled)

@@ -8,9 +8,10 @@ which of the two its value is:
 - The property had it when it was last evaluated. Then the animator saw it with the difference on top, be it the
   in-between as it was or a pose made by hand, and the key gets the pose that was to be seen.
 - The property was set and keyed in one go. If one of the operators did it that go by what is on the screen (*Snap*,
-  *Align*, *Move*), or more than one of location, rotation and scale have changed, then a pose was computed for the
-  world, and Blender has taken the difference off: `matrix_world = M` sets all three of them. The key gets that pose. A
-  single property (`location = v`, a value typed with Auto Key) is the value that somebody wanted, and stays as it is.
+  *Align*, *Move*), or more than one of location, rotation and scale of an object have changed, then a pose was computed
+  for the world, and Blender has taken the difference off: `matrix_world = M` sets all three of them. The key gets that
+  pose. A single property (`location = v`, a value typed with Auto Key) is the value that somebody wanted, and stays as
+  it is; so does a pose that is set on a bone (`matrix = M`, *Apply Pose Asset*), which knows nothing of constraints.
 
 Where a key gets a pose, so do all keyed channels of the transform.
 """
@@ -29,9 +30,7 @@ from ..actions.sources import SAME_FRAME, Source
 from ..transforms import PART_OF, Channel, Transform
 from .known_sources import recall
 from .on_screen import seen_components
-
-PLACING = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
-"""How the names of operators begin that set single properties to bring what is on the screen to a certain place."""
+from .outlets import outlet_of
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -70,18 +69,21 @@ def notice_pose(transform: Transform, frame: float) -> None:
     _posed[_identity(transform)] = _Posed(frame, transform.components(), True)
 
 
-def notice_assignment(transform: Transform, evaluated: bpy.types.Object, frame: float, *, placed: bool) -> None:
+def notice_assignment(
+    transform: Transform, depsgraph: bpy.types.Depsgraph, frame: float, *, operator: str = ""
+) -> None:
     """Keep what the properties of a transform were set to, where they have not been evaluated so yet.
 
-    `placed`: an operator did it that goes by what is on the screen, see `PLACING`.
+    `operator` is the name of the one that did it, if any did.
     """
-    carrier = transform.carrier
+    carrier, evaluated = transform.carrier, transform.evaluated(depsgraph)
     changed = sum(
-        tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
+        evaluated is not None and tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
         for prop in ("location", transform.rotation, "scale")
     )
     if changed:
-        _posed[_identity(transform)] = _Posed(frame, transform.components(), placed or changed > 1)
+        on_top = operator.startswith(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
+        _posed[_identity(transform)] = _Posed(frame, transform.components(), on_top)
 
 
 def forget_poses(transforms: Iterable[Transform] | None = None) -> None:
@@ -167,12 +169,8 @@ def _on_screen(
     user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
 ) -> dict[Channel, float]:
     """The values of the channels that, with the original difference alone, look as the screen does."""
-    rows, filled, difference = user.differences, place.filled, np.zeros(10)
-    for row, channel in rows.items():
-        path, index = channel
-        fcurve = filled.get(channel)
-        difference[row] = user.animated.path_resolve(path)[index] if fcurve is None else fcurve.evaluate(frame)
-    parts = {PART_OF[row] for row, channel in rows.items() if channel in filled}
+    filled, difference = place.filled, outlet_of(place).difference(place, user, frame)
+    parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
     seen = seen_components(shown, old.original, difference, old.order, parts)
     return {channel: seen[row] for row, channel in user.channels.items()}
 

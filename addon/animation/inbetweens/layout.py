@@ -38,15 +38,25 @@ class Layout:
 
     is_ring: bool = False
 
+    shift: int = 0
+    """How many frames later than they are seen the samples lie, where they are looked up by a time of their own."""
+
+    is_apart: bool = False
+    """Whether they are: it is that which repeats, then."""
+
     @classmethod
     def of(cls, source: Source) -> Layout:
+        """In an F-curve that is read as the frames pass."""
         first, last = source.frame_range
-        ends = (float(first), float(last))
-        if source.repeats or not source.goes_on:
-            begin, end = source.keyed_range
-            ends = max(first, begin), min(last, end)
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, ends, cycles, first < 0 and cycles is None)
+        return cls(first, last, _ends(source), cycles, first < 0 and cycles is None)
+
+    @classmethod
+    def apart(cls, source: Source) -> Layout:
+        """In an F-curve that is looked up by a time of its own, which goes round where the channels do."""
+        first, last = source.frame_range
+        cycles = source.cyclic.cycles if source.repeats else None
+        return cls(first, last, _ends(source), cycles, shift=max(0, -first), is_apart=True)
 
     @property
     def count(self) -> int:
@@ -56,7 +66,7 @@ class Layout:
     @property
     def outermost(self) -> tuple[float, float]:
         """The frames that the first and the last sample lie on."""
-        return (0.0, float(self.count - 1)) if self.is_ring else self.ends
+        return (0.0, float(self.count - 1)) if self.is_ring else tuple(end + self.shift for end in self.ends)
 
     @cached_property
     def _order(self) -> np.ndarray:
@@ -71,7 +81,9 @@ class Layout:
             points = points[self._order]
             points[:, 0] = np.arange(self.count)
         else:
-            points[0, 0], points[-1, 0] = self.ends
+            if self.shift:
+                points[:, 0] += self.shift
+            points[0, 0], points[-1, 0] = self.outermost
         return points.ravel()
 
     def fits(self, fcurve: bpy.types.FCurve) -> bool:
@@ -107,6 +119,8 @@ class Layout:
     @cached_property
     def _modifiers(self) -> list[tuple[str, dict[str, object]]]:
         """Types and settings. Blender asks the last one first."""
+        if self.is_apart:
+            return []
         if self.cycles is not None:
             # The difference repeats as it is also where the channels go on from where they have come.
             before, after = (mode.removesuffix("_OFFSET") for mode in (self.cycles.before, self.cycles.after))
@@ -121,3 +135,12 @@ class Layout:
             ("STEPPED", {"frame_step": ENDLESS, "frame_offset": first, "use_frame_end": True, "frame_end": first}),
             ("STEPPED", {"frame_step": ENDLESS, "frame_offset": last, "use_frame_start": True, "frame_start": last}),
         ]
+
+
+def _ends(source: Source) -> tuple[float, float]:
+    """Where the outermost samples of a source lie."""
+    first, last = source.frame_range
+    if source.goes_on and not source.repeats:
+        return float(first), float(last)
+    begin, end = source.keyed_range
+    return max(first, begin), min(last, end)

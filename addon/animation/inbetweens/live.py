@@ -20,13 +20,14 @@ from ..actions.mode_property import adopt_from_properties, show_awaited, show_mo
 from ..actions.reading import differing_users, keyed_in, leading, sources_of_users
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import SlotTransform, actions_of, places_of, slot_transforms_in, slot_transforms_of
+from ..actions.slots import SlotTransform, actions_of, filled_places_of, slot_transforms_in, slot_transforms_of
 from ..actions.sources import Source
-from ..transforms import Refused, Transform, transform_of
+from ..transforms import ObjectTransform, Refused, Transform, transform_of
 from . import insertion, known_sources
 from .densification import keep_motion
 from .differences import differences
-from .filling import clear, fill_in, hold_originals, is_complete, restore_originals
+from .filling import clear, fill_in, hold, is_complete
+from .outlets import outlet_of, release
 
 log = logging.getLogger(__package__)
 
@@ -72,7 +73,7 @@ def is_busy() -> bool:
     return _State.busy
 
 
-def refresh(targets: Iterable[bpy.types.Object | Transform] | None = None) -> int:
+def refresh(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform] | None = None) -> int:
     """Bring the in-betweens of these up to date, or of all in the file.
 
     Returns
@@ -80,16 +81,33 @@ def refresh(targets: Iterable[bpy.types.Object | Transform] | None = None) -> in
     int
         How much had to be filled in anew, counted in transforms of slots.
     """
-    transforms = [transform_of(target) for target in (bpy.data.objects if targets is None else targets)]
+    transforms = _all_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
     with _turn() as ours:
         if not ours:
             return 0
         places = slot_transforms_of(transforms)
         moved = {user for place in places for user in place.users}
         unmoved = [transform for transform in transforms if transform not in moved]
-        restore_originals(unmoved)
+        release(unmoved)
         show_awaited(unmoved)
         return _refresh(places)
+
+
+def _all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
+    """These objects, and of rigs all bones that their Actions move, or that have modes or constraints for them."""
+    found: dict[Transform, None] = {}
+    for obj in objects:
+        found[transform_of(obj)] = None
+        if obj.pose is not None and _has_bones(obj):
+            found |= dict.fromkeys(map(transform_of, obj.pose.bones))
+    return list(found)
+
+
+def _has_bones(obj: bpy.types.Object) -> bool:
+    """Whether bones of a rig have anything to do with modes."""
+    return obj.rigid_motion.has_bones or any(
+        record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
+    )
 
 
 def refresh_read(readings: Sequence[tuple[SlotTransform, list[Source | Refused]]]) -> None:
@@ -99,7 +117,7 @@ def refresh_read(readings: Sequence[tuple[SlotTransform, list[Source | Refused]]
             _refresh([place for place, _ in readings], [leading(place, sources) for place, sources in readings])
 
 
-def follow_original(transform: Transform) -> None:
+def follow_original(transform: ObjectTransform) -> None:
     """Follow an edit of what is written down of a transform's original difference."""
     with _turn() as ours:
         if not ours:
@@ -145,16 +163,16 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         sources = keyed_in(places)
     stale, idle = [], []
     for place, source in zip(places, sources, strict=True):
+        outlet_of(place).show(place)
         # What is linked has the in-betweens that its own file was saved with.
         if not place.slot.action.is_editable:
             continue
         before = recorded_digest(place)
-        _note_late_users(place)
         if not _is_wanted(place, source, before):
             if before:
                 clear(place)
             idle.append(place)
-            restore_originals(place.users)
+            release(place.users)
         elif source.digest != before or not is_complete(place, source):
             kept = insertion.keep_pose(place, before, source, _State.frame, again=_State.again)
             if kept or keep_motion(place, before, source):
@@ -173,39 +191,19 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
             except ValueError:
                 clear(place)
                 idle.append(place)
-    for place in (*idle, *_beside([place for place in places if place.slot.action.is_editable])):
-        hold_originals(place)
+    editable = [place for place in places if place.slot.action.is_editable]
+    for place in idle:
+        hold(place)
+    for place in _in_nla_with(editable):
+        hold(place)
     return len(stale)
 
 
-def _beside(places: Sequence[SlotTransform]) -> list[SlotTransform]:
-    """What else than these moves their users in the NLA, and is not filled in."""
+def _in_nla_with(places: Sequence[SlotTransform]) -> list[SlotTransform]:
+    """All that moves the users of these in the NLA, where they have any; as it is by now."""
     tracked = {user for place in places for user in place.users if len(user.animated.animation_data.nla_tracks)}
-    known = {(place.slot.action, place.slot.handle, place.prefix) for place in places}
-    return [
-        place
-        for place in (slot_transforms_of(tracked) if tracked else ())
-        if (place.slot.action, place.slot.handle, place.prefix) not in known
-        and place.slot.action.is_editable
-        and not recorded_digest(place)
-    ]
-
-
-def _note_late_users(place: SlotTransform) -> None:
-    """Note the original differences of users that were evaluated with a slot before they could be."""
-    filled = place.filled
-    if filled:
-        for user in place.users:
-            if not user.is_noted(filled) and user.animated.is_editable:
-                user.note_original(filled, overwritten=_is_overwritten(user, filled))
-
-
-def _is_overwritten(user: Transform, filled: dict) -> bool:
-    """Whether what a user has for a difference is what in-betweens are on the frame that is shown."""
-    return all(
-        abs(user.animated.path_resolve(path)[index] - fcurve.evaluate(_State.frame)) < 1e-6
-        for (path, index), fcurve in filled.items()
-    )
+    found = slot_transforms_of(tracked) if tracked else ()
+    return [place for place in found if place.slot.action.is_editable]
 
 
 def _is_wanted(place: SlotTransform, source: Source | Refused, before: str) -> bool:
@@ -269,13 +267,13 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
             # Only the original has an identity: that of the evaluated scene is 0.
             scene, frames = block.original, (block.frame_start, block.frame_end)
             if _State.ranges.get(scene.session_uid, frames) != frames:
-                edited += map(transform_of, scene.objects)
+                edited += _all_under(scene.objects)
             _State.ranges[scene.session_uid] = frames
         if isinstance(block, bpy.types.Object) and _concerns_us(block):
-            transform = transform_of(block.original)
-            if transform not in seen:
-                insertion.notice_pose(transform, frame)
-                edited.append(transform)
+            for transform in _all_under((block.original,)):
+                if transform not in seen:
+                    insertion.notice_pose(transform, frame)
+                    edited.append(transform)
     if edited:
         refresh(edited)
 
@@ -283,7 +281,7 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
 def _concerns_us(obj: bpy.types.Object) -> bool:
     """Whether an object has, or had, anything to do with modes."""
     motion = obj.rigid_motion
-    if motion.filled_components or motion.mode != "BLENDER" or motion.awaited != "BLENDER":
+    if motion.filled_components or motion.has_bones or motion.mode != "BLENDER" or motion.awaited != "BLENDER":
         return True
     return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
 
@@ -295,22 +293,19 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
     """
     edited = dict(_unevaluated(scene))
     operator = _last_operator()
-    placed = operator != _State.operator and operator[1].startswith(insertion.PLACING)
+    name = operator[1] if operator != _State.operator else ""
     _State.operator = operator
     for obj, depsgraph in edited.items():
         if not (_concerns_us(obj) and obj.is_editable):
             continue
-        transform = transform_of(obj)
-        filled = [channel for place in places_of(transform) for channel in place.filled]
-        if not filled:
-            continue
-        with _turn() as ours:
-            if ours:
-                transform.note_original(filled)
-        if depsgraph is not None:
-            with suppress(Refused):
-                evaluated = transform.carrier.evaluated_get(depsgraph)
-                insertion.notice_assignment(transform, evaluated, frame, placed=placed)
+        for place in filled_places_of(obj):
+            with _turn() as ours:
+                if ours:
+                    outlet_of(place).prepare(place)
+            if depsgraph is not None:
+                for transform in place.users:
+                    with suppress(Refused):
+                        insertion.notice_assignment(transform, depsgraph, frame, operator=name)
     return bool(edited)
 
 
@@ -403,7 +398,7 @@ def _on_load(*arguments: object) -> None:
     _State.graphs.clear()
     with _turn() as ours:
         if ours:
-            transforms = [transform_of(obj) for obj in bpy.data.objects]
+            transforms = _all_under(bpy.data.objects)
             moved = {user for place in slot_transforms_of(transforms) for user in place.users}
             adopt_from_properties(transform for transform in transforms if transform not in moved)
     _on_file(*arguments)

@@ -19,7 +19,7 @@ from ..actions.mode_property import await_mode, is_keyed
 from ..actions.reading import read
 from ..actions.records import record_mode, recorded_mode
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import GROUP, SlotTransform, places_of, slot_transforms_of
+from ..actions.slots import SlotTransform, places_of, slot_transforms_of
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
 from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
 from . import live
@@ -238,5 +238,6 @@ def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
     path, index = channel
     channelbag = place.channelbag
     fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
-    fcurve.group = channelbag.groups.get(GROUP) or channelbag.groups.new(GROUP)
+    group = place.users[0].group
+    fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
     return fcurve

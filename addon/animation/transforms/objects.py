@@ -17,6 +17,9 @@ from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from .components import REST, ROTATION, ROWS
 from .transform import Channel, Transform, channels_under
 
+GROUP = "Rigid Motion"
+"""The group of F-curves that an object's mode channel and its differences are in."""
+
 ORIGINALS = {
     "delta_location": ("own_location", 0),
     "delta_rotation_quaternion": ("own_quaternion", 1),
@@ -38,8 +41,18 @@ _BITS = {
 class ObjectTransform(Transform):
     """An object. The difference goes into its delta transforms."""
 
+    placed_by = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
+    matrix_lacks_difference = True
+
     def __init__(self, obj: bpy.types.Object) -> None:
         self.animated = self.carrier = obj
+
+    @property
+    def group(self) -> str:
+        return GROUP
+
+    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object:
+        return self.carrier.evaluated_get(depsgraph)
 
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("delta_", rotation)
@@ -66,10 +79,15 @@ class ObjectTransform(Transform):
         return np.array((*values("delta_location"), *rotation, *values("delta_scale")))
 
     def is_noted(self, filled: Iterable[Channel]) -> bool:
+        """Whether the original values of these channels are written down."""
         noted = self._noted
         return all(_BITS[channel] & noted for channel in filled if channel in _BITS)
 
     def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
+        """Write the original values of these channels down, which in-betweens are about to take the place of.
+
+        `overwritten`: they have done so already, and it has none.
+        """
         noted = self._noted
         added = [channel for channel in filled if channel in _BITS and not _BITS[channel] & noted]
         for path in {path for path, _ in added}:
@@ -83,6 +101,7 @@ class ObjectTransform(Transform):
         self._keep(noted | sum(_BITS[channel] for channel in set(added)))
 
     def follow_original(self) -> None:
+        """Show an edit of what is written down in all components that in-betweens are not in."""
         noted = self._noted
         for path in _paths_in(noted):
             now, then = getattr(self.carrier, path)[:], getattr(self.motion, ORIGINALS[path][0])[:]
@@ -90,6 +109,7 @@ class ObjectTransform(Transform):
             _set_if_other(self.carrier, path, values)
 
     def restore_original(self, filled: Iterable[Channel]) -> None:
+        """Give the original values back, but for these channels, which are animated still."""
         noted = self._noted
         gone = noted & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS)
         for path in _paths_in(gone):

@@ -1,10 +1,10 @@
-"""What has location, rotation and scale, and is moved: the interface that objects have, and bones can have."""
+"""What has location, rotation and scale, and is moved: the interface that objects and pose bones have."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from functools import cache
+from typing import ClassVar
 
 import bpy
 import numpy as np
@@ -30,11 +30,17 @@ class Transform(ABC):
     animated: bpy.types.Object
     """The data-block whose Action it is."""
 
-    carrier: bpy.types.Object
+    carrier: bpy.types.Object | bpy.types.PoseBone
     """What has the properties."""
 
     prefix: str = ""
     """From the data-block to the carrier, in data paths."""
+
+    placed_by: ClassVar[tuple[str, ...]]
+    """How the names of operators begin that set its properties to bring what is on the screen to a certain place."""
+
+    matrix_lacks_difference: ClassVar[bool]
+    """Whether Blender takes the difference off where the properties are set from a matrix."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Transform) and (self.animated, self.prefix) == (other.animated, other.prefix)
@@ -45,6 +51,15 @@ class Transform(ABC):
     @property
     def name(self) -> str:
         return self.carrier.name
+
+    @property
+    @abstractmethod
+    def group(self) -> str:
+        """The group of F-curves that its mode channel is in."""
+
+    @abstractmethod
+    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | bpy.types.PoseBone | None:
+        """The carrier as it was evaluated last, None where it was not there yet."""
 
     @property
     def motion(self) -> bpy.types.PropertyGroup:
@@ -100,25 +115,6 @@ class Transform(ABC):
     @abstractmethod
     def original(self) -> np.ndarray:
         """What it has for a difference without in-betweens, as components (10,): rotation as a unit quaternion."""
-
-    @abstractmethod
-    def is_noted(self, filled: Iterable[Channel]) -> bool:
-        """Whether the original values of these channels are written down."""
-
-    @abstractmethod
-    def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
-        """Write the original values of these channels down, which in-betweens are about to take the place of.
-
-        `overwritten`: they have done so already, and it has none.
-        """
-
-    @abstractmethod
-    def follow_original(self) -> None:
-        """Show an edit of what is written down in all components that in-betweens are not in."""
-
-    @abstractmethod
-    def restore_original(self, filled: Iterable[Channel]) -> None:
-        """Give the original values back, but for these channels, which are animated still."""
 
 
 def properties_for(rotation: str) -> dict[str, str]:

@@ -1,0 +1,68 @@
+"""Pose bones as transforms. What their in-betweens differ in is put on top of them by a constraint.
+
+A bone has no delta transforms: an Action constraint, first in its stack, adds the difference to the location, the
+rotation and the scale that its channels give it. It has nothing of its own that the difference could overwrite.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+import bpy
+import numpy as np
+
+from .components import REST
+from .transform import Channel, Transform, channels_under
+
+CONSTRAINT = "Rigid Motion"
+"""What the constraint is called, and what its name begins with where Actions of one rig need one each."""
+
+_BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
+
+
+class BoneTransform(Transform):
+    """A pose bone. The difference is put on top of it by a constraint."""
+
+    placed_by = ("TRANSFORM_OT_",)
+    matrix_lacks_difference = False
+
+    def __init__(self, bone: bpy.types.PoseBone) -> None:
+        self.animated, self.carrier, self.prefix = bone.id_data, bone, prefix_of(bone.name)
+
+    @property
+    def name(self) -> str:
+        return f"{self.animated.name}/{self.carrier.name}"
+
+    @property
+    def group(self) -> str:
+        return self.carrier.name
+
+    def differences_for(self, rotation: str) -> dict[int, Channel]:
+        return channels_under(self.prefix, rotation)
+
+    def original(self) -> np.ndarray:
+        return REST.copy()
+
+    def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.PoseBone | None:
+        return self.animated.evaluated_get(depsgraph).pose.bones.get(self.carrier.name)
+
+
+@lru_cache(maxsize=65536)
+def prefix_of(name: str) -> str:
+    """How the data paths of a bone's properties begin, from its object."""
+    return f'pose.bones["{bpy.utils.escape_identifier(name)}"].'
+
+
+@lru_cache(maxsize=65536)
+def split_path(path: str) -> tuple[str, str]:
+    """The prefix of a data path, "" where it is not that of a bone's property, and the rest of it."""
+    found = _BONE.match(path)
+    return (found[0], path[found.end() :]) if found else ("", path)
+
+
+@lru_cache(maxsize=65536)
+def bone_name(prefix: str) -> str:
+    """The name of the bone that data paths which begin so speak of."""
+    found = _BONE.fullmatch(prefix)
+    return "" if found is None else bpy.utils.unescape_identifier(found[1])
