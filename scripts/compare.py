@@ -57,6 +57,8 @@ EPILOG = """
 inputs:
   CSV with named columns (t,x,y,z,qx,qy,qz,qw in any order), TUM, EuRoC, Motive (OptiTrack) CSV,
   A-Frame motion capture JSON, BVH, .blend. FILE:BODY takes one body of several, FILE:* all of them.
+  Of a .blend a body is an object (FILE.blend:OBJECT) or a bone of a rig (FILE.blend:OBJECT/BONE), as Blender shows it
+  in the world, with parents, constraints, drivers and NLA strips. FILE.blend:* is every object that is animated.
 
 examples:
   python scripts/compare.py
@@ -64,6 +66,7 @@ examples:
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
   python scripts/compare.py shot.blend:Camera --no-video
+  python scripts/compare.py shot.blend:Rig/Hand --no-video
   python scripts/compare.py hand_left.csv --modes all,best_of
   python scripts/compare.py take.csv --decimate adaptive --tolerance 5mm
   python scripts/compare.py take.csv --decimate adaptive --budget 5,10 --rates 10

@@ -20,7 +20,7 @@ from bpy.props import (
 )
 
 from ..motion import KEYFRAME_MODES
-from .baking.originals import BAKED, REDUCED
+from .baking.copies import BAKED, REDUCED
 from .inbetweens import live, mode_keys
 from .transforms import transform_of
 

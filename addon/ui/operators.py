@@ -17,7 +17,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 from .. import animation
 from ..animation import Refused
 from ..animation.actions.slots import places_of
-from ..animation.baking.originals import BAKED, REDUCED, WAYS_BACK, entries_in_use
+from ..animation.baking.copies import BAKED, REDUCED, entries_in_use
+from ..animation.baking.originals import WAYS_BACK
 from ..animation.baking.reducing import metres_per_unit
 from ..animation.inbetweens.describing import has_in_betweens, has_mode, has_more_keys_than
 from ..animation.inbetweens.live import paused

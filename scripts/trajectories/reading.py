@@ -46,12 +46,12 @@ def read_trajectories(source: str) -> Recording:
     ----------
     source : str
         A path; with `:BODY` behind it for one body by name, with `:*` for all bodies. A path alone asks for the first
-        body: a BVH's root, the first animated object of a .blend.
+        body: a BVH's root, the first animated object of a .blend. A bone of a .blend is `:OBJECT/BONE`.
 
     Returns
     -------
     Recording
-        The trajectories as recorded, and the names of the bodies that were left.
+        The trajectories as recorded, the names of the bodies that were left, and what there is to say of them.
 
     Raises
     ------

@@ -22,7 +22,7 @@ class Trajectory:
     """One body of one file, exactly as recorded: unrepaired, native axes, units and signs."""
 
     name: str
-    """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object."""
+    """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object, or OBJECT/BONE."""
 
     times: np.ndarray
     """Seconds, shape (n,). Neither rising nor finite unless the recording is sound."""
@@ -32,6 +32,9 @@ class Trajectory:
 
     metres_per_unit: float = 1.0
     """The length of one unit of the positions, where the file tells it; 1 otherwise."""
+
+    remark: str = ""
+    """What whoever asked for this body should know of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +50,8 @@ class Recording:
     """The names of the bodies that were left."""
 
     note: str = ""
-    """For a file of several bodies of which none was named: what was taken, what is left, how to name it."""
+    """For a file of several bodies of which none was named: what was taken, what is left, how to name it. And what
+    there is to say of those that were taken."""
 
 
 class TrajectoryError(ValueError):
@@ -67,7 +71,7 @@ class Selection:
         self.wanted = wanted
         self.names: tuple[str, ...] = ()
 
-    def of(self, names: Sequence[str], unlisted: Sequence[str] = ()) -> list[str]:
+    def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
         """The wanted ones among the bodies of the file.
 
         Parameters
@@ -76,6 +80,8 @@ class Selection:
             The bodies, in the order of the file.
         unlisted : sequence of str
             More bodies, to be had by name only.
+        more : int
+            How many of those there are besides, which an error counts and does not name.
 
         Raises
         ------
@@ -85,26 +91,29 @@ class Selection:
         self.names = tuple(names)
         if self.wanted in (None, ALL):
             if not names:
-                way_out = f"name one with {self.path}:NAME: {listed(unlisted)}" if unlisted else "record at least one"
+                way_out = (
+                    f"name one with {self.path}:NAME: {listed(unlisted, more=more)}"
+                    if unlisted
+                    else "record at least one"
+                )
                 raise TrajectoryError(self.path, "no moving body in this file", way_out)
             return list(names) if self.wanted == ALL else [names[0]]
         if self.wanted not in names and self.wanted not in unlisted:
-            raise TrajectoryError(
-                self.path, f"no body named {shown(self.wanted)}", f"it holds {listed([*names, *unlisted])}"
-            )
+            way_out = f"it holds {listed([*names, *unlisted], more=more)}"
+            raise TrajectoryError(self.path, f"no body named {shown(self.wanted)}", way_out)
         return [self.wanted]
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
-        """The result, with what there is to say about the bodies that were not taken."""
+        """The result, with what there is to say about the bodies that were taken, and those that were not."""
         taken = {trajectory.name for trajectory in trajectories}
         others = tuple(name for name in self.names if name not in taken)
-        note = ""
+        notes = [trajectory.remark for trajectory in trajectories if trajectory.remark]
         if others and self.wanted is None:
-            note = printable(
+            notes.append(
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
                 f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
             )
-        return Recording(self.path, tuple(trajectories), others, note)
+        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)))
 
 
 def unique(names: Sequence[str]) -> list[str]:
@@ -124,10 +133,10 @@ def unique(names: Sequence[str]) -> list[str]:
     return result
 
 
-def listed(names: Sequence[str], limit: int = 30) -> str:
-    """The names with commas, cut off where they become too many to read."""
-    shown_names = ", ".join(names[:limit])
-    return f"{shown_names} and {len(names) - limit} more" if len(names) > limit else shown_names
+def listed(names: Sequence[str], limit: int = 30, more: int = 0) -> str:
+    """The names with commas, cut off where they become too many to read; `more` there are that are not among them."""
+    shown_names, left = ", ".join(names[:limit]), max(len(names) - limit, 0) + more
+    return f"{shown_names} and {left} more" if left else shown_names
 
 
 def shown(text: str, limit: int = 24) -> str:

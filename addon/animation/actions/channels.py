@@ -13,6 +13,19 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from ...motion import Poses
 from ..curves import Cycles
 
+KEY_FIELDS = {
+    "co": (2, np.float32),
+    "handle_left": (2, np.float32),
+    "handle_right": (2, np.float32),
+    **dict.fromkeys(("handle_left_type", "handle_right_type", "interpolation", "easing", "type"), (1, np.int32)),
+    **dict.fromkeys(("back", "amplitude", "period"), (1, np.float32)),
+    **dict.fromkeys(("select_control_point", "select_left_handle", "select_right_handle"), (1, np.bool_)),
+}
+"""All there is to a key: how many numbers, and of which type."""
+
+KeyFields = dict[str, np.ndarray]
+"""All there is to n keys, each field of shape (n, width)."""
+
 
 def channelbag_of(animated: bpy.types.ID) -> bpy.types.ActionChannelbag:
     """The channels of `animated` in its Action. Whatever of Action, slot, layer and strip is missing is made."""
@@ -105,6 +118,57 @@ def replace_keys(
         for part in ("select_control_point", "select_left_handle", "select_right_handle"):
             keys.foreach_set(part, selected)
     fcurve.update()
+
+
+def empty_key_fields(count: int) -> KeyFields:
+    """All there is to so many keys, zero."""
+    return {name: np.zeros((count, width), kind) for name, (width, kind) in KEY_FIELDS.items()}
+
+
+def key_fields(fcurve: bpy.types.FCurve) -> KeyFields:
+    """All there is to the keys of an F-curve."""
+    fields = empty_key_fields(len(fcurve.keyframe_points))
+    for name, numbers in fields.items():
+        fcurve.keyframe_points.foreach_get(name, numbers.ravel())
+    return fields
+
+
+def set_key_fields(fcurve: bpy.types.FCurve, fields: KeyFields) -> None:
+    """Give an F-curve these keys in place of those it has."""
+    keys = fcurve.keyframe_points
+    keys.clear()
+    keys.add(len(fields["co"]))
+    for name, numbers in fields.items():
+        keys.foreach_set(name, numbers.ravel())
+    fcurve.update()
+
+
+def copy_fcurve(fcurve: bpy.types.FCurve, channelbag: bpy.types.ActionChannelbag) -> bpy.types.FCurve:
+    """A copy of an F-curve with keys in another slot or Action, in a group of the same name. It has none there yet."""
+    copy = channelbag.fcurves.new(fcurve.data_path, index=fcurve.array_index)
+    if fcurve.group is not None:
+        name = fcurve.group.name
+        copy.group = channelbag.groups.get(name) or channelbag.groups.new(name)
+    set_key_fields(copy, key_fields(fcurve))
+    for modifier in fcurve.modifiers:
+        _copy_settings(modifier, copied := copy.modifiers.new(modifier.type))
+        if modifier.type == "ENVELOPE":
+            for point in modifier.control_points:
+                _copy_settings(point, copied.control_points.add(point.frame))
+    _copy_settings(fcurve, copy)
+    return copy
+
+
+def _copy_settings(source: bpy.types.bpy_struct, target: bpy.types.bpy_struct) -> None:
+    """Set all plain properties of one as another of the same type has them."""
+    for prop in source.bl_rna.properties:
+        if not prop.is_readonly and prop.type not in ("POINTER", "COLLECTION"):
+            value = getattr(source, prop.identifier)
+            setattr(target, prop.identifier, value if isinstance(value, str) else _plain(value))
+
+
+def _plain(value: object) -> object:
+    return tuple(value) if hasattr(value, "__len__") else value
 
 
 def add_cycles(fcurve: bpy.types.FCurve, cycles: Cycles) -> None:

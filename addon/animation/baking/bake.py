@@ -12,25 +12,23 @@ import numpy as np
 from ...motion import Poses
 from ...motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs
-from ..actions.channels import add_cycles, code_of, write_channel
+from ..actions.channels import (
+    add_cycles,
+    code_of,
+    empty_key_fields,
+    key_fields,
+    set_key_fields,
+    write_channel,
+)
 from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
-from ..inbetweens.acting import Readings, Targets, act_on, readable
+from ..inbetweens.acting import Readings, Target, Targets, act_on, readable
 from ..inbetweens.channel_values import channel_values
 from ..inbetweens.differences import in_betweens
 from ..inbetweens.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of
-from .originals import BAKED, has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
-
-FIELDS = {
-    "co": (2, np.float32),
-    "handle_left": (2, np.float32),
-    "handle_right": (2, np.float32),
-    **dict.fromkeys(("handle_left_type", "handle_right_type", "interpolation", "easing", "type"), (1, np.int32)),
-    **dict.fromkeys(("back", "amplitude", "period"), (1, np.float32)),
-    **dict.fromkeys(("select_control_point", "select_left_handle", "select_right_handle"), (1, np.bool_)),
-}
-"""All there is to a key: how many numbers, and of which type."""
+from .copies import BAKED
+from .originals import has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
 
 
 def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_type: str = "GENERATED") -> None:
@@ -84,11 +82,12 @@ def bake(
     """Put in-betweens on the channels that they are between, as real keys.
 
     The animator's keys stay where they are; the others are of type GENERATED, and straight lines run between all of
-    them. Every target gets a copy of its Action for it. The original stays in the file, for `unbake`.
+    them. Every target gets a copy of its Action for it, one for all bones of a rig. The original stays in the file, for
+    `unbake`.
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
     step : float
         Frames from key to key, counted from the first. The animator's own keys are kept whatever the step.
     first, last : float, optional
@@ -132,11 +131,11 @@ def bake(
 
 
 def unbake(targets: Targets, *, refused: list[Refused] | None = None) -> None:
-    """Give the Actions back that there were before baking, to the last handle.
+    """Give the keys back that there were before baking, to the last handle: of objects the Action, of bones their own.
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
     refused : list, optional
         Takes the refusals, and all other targets are un-baked.
 
@@ -159,7 +158,7 @@ def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
     act_on(targets, plan, lambda transform, _: put_back(transform, kind), refused)
 
 
-def is_baked(target: bpy.types.Object | Transform) -> bool:
+def is_baked(target: Target) -> bool:
     """Whether something moves by an Action with baked keys, and its original is still in the file."""
     return has_original(transform_of(target), BAKED)
 
@@ -212,13 +211,10 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
     """Put keys on these frames, straight lines between them, and leave what is before and behind as it is."""
-    keys = fcurve.keyframe_points
-    old = {name: np.empty((len(keys), width), kind) for name, (width, kind) in FIELDS.items()}
-    for name, numbers in old.items():
-        keys.foreach_get(name, numbers.ravel())
+    old = key_fields(fcurve)
     at = old["co"][:, 0]
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
-    new = {name: np.zeros((len(frames), width), kind) for name, (width, kind) in FIELDS.items()}
+    new = empty_key_fields(len(frames))
     own = np.flatnonzero(~(before | behind))
     places = np.clip(np.searchsorted(frames, at[own]), 1, len(frames) - 1)
     places -= at[own] - frames[places - 1] <= frames[places] - at[own]
@@ -238,10 +234,7 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     new["co"] = points
     for name in ("handle_left_type", "handle_right_type"):
         new[name][[0, -1]] = code_of(name, "FREE")
-    keys.clear()
-    keys.add(int(before.sum() + len(frames) + behind.sum()))
-    for name, numbers in new.items():
-        keys.foreach_set(name, np.concatenate((old[name][before], numbers, old[name][behind])).ravel())
+    parts = {name: np.concatenate((old[name][before], numbers, old[name][behind])) for name, numbers in new.items()}
+    set_key_fields(fcurve, parts)
     for modifier in list(fcurve.modifiers):
         fcurve.modifiers.remove(modifier)
-    fcurve.update()

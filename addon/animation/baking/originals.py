@@ -1,20 +1,17 @@
 """Originals: the Actions that there were before keys were baked or reduced, kept in the file for the way back.
 
-What is to have other keys gets them in a copy of its Action. Which copy stands for which original is noted on what is
-moved, the latest last: what was done last is taken back first.
+What is to have other keys gets them in a copy of its Action; for what there is of a rig, see `rigs`. Which copy stands
+for which original is noted on what is moved, the latest last: what was done last is taken back first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-
 import bpy
 
-from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.slots import SlotTransform, places_of
 from ..transforms import Refused, Transform
-
-BAKED, REDUCED = "BAKED", "REDUCED"
-"""What was done to the keys."""
+from . import rigs
+from .copies import BAKED, REDUCED, copied, entries_in_use, exchange, note
 
 WAYS_BACK = {BAKED: "Un-Bake", REDUCED: "Restore Keys"}
 """What takes it back."""
@@ -43,26 +40,12 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
     SlotTransform
         The copy, in an Action of its own. The original stays in the file, for `put_back`.
     """
-    original, changed = place.slot.action, place.slot.action.copy()
-    changed.name = f"{original.name} {kind.title()}"
-    for other in [other for other in changed.slots if other.handle != place.slot.handle]:
-        changed.slots.remove(other)
-    entry = transform.motion.bakes.add()
-    entry.kind, entry.changed, entry.original = kind, changed, original
-    _exchange(transform.animated, original, changed)
-    copies = slot_transforms_of([transform])
-    return next(copy for copy in copies if copy.slot.action == changed and copy.prefix == place.prefix)
-
-
-def entries_in_use(
-    transform: Transform, places: Iterable[SlotTransform] | None = None
-) -> Iterator[bpy.types.PropertyGroup]:
-    """The notes on copies that something moves by, the latest first. `places` move it, where that is known already."""
-    bakes = transform.motion.bakes
-    if len(bakes):
-        places = slot_transforms_of([transform]) if places is None else places
-        actions = {place.slot.action for place in places}
-        yield from (entry for entry in reversed(bakes) if entry.changed in actions)
+    if transform.animated.pose is not None:
+        return rigs.move_by_copy(transform, place, kind)
+    original, changed = place.slot.action, copied(place.slot, kind)
+    note(transform, kind, changed, original)
+    exchange(transform.animated, original, changed)
+    return next(copy for copy in places_of(transform) if copy.slot.action == changed)
 
 
 def has_original(transform: Transform, kind: str) -> bool:
@@ -85,12 +68,13 @@ def put_back(transform: Transform, kind: str) -> None:
 
     What was done before that stays, and so do notes on copies that it does not move by any more.
     """
+    if transform.animated.pose is not None:
+        rigs.put_back(transform, kind)
+        return
     bakes = transform.motion.bakes
     for number in reversed(range(len(bakes))):
         entry = bakes[number]
-        if entry.original is None or all(
-            place.slot.action != entry.changed for place in slot_transforms_of([transform])
-        ):
+        if entry.original is None or all(place.slot.action != entry.changed for place in places_of(transform)):
             continue
         if entry.kind != kind:
             break
@@ -98,11 +82,11 @@ def put_back(transform: Transform, kind: str) -> None:
         if entry.is_property_set("mode"):
             # From a version that kept modes on objects: the original takes it from there.
             transform.motion.mode = entry.mode
-        _exchange(transform.animated, changed, entry.original)
+        exchange(transform.animated, changed, entry.original)
         bakes.remove(number)
         if not changed.users:
             bpy.data.actions.remove(changed)
-    transform.note_original(channel for place in slot_transforms_of([transform]) for channel in place.filled)
+    transform.note_original(channel for place in places_of(transform) for channel in place.filled)
 
 
 def discard_originals(transform: Transform, kind: str) -> None:
@@ -118,14 +102,3 @@ def discard_originals(transform: Transform, kind: str) -> None:
             entry.original = None
             if not original.users:
                 bpy.data.actions.remove(original)
-
-
-def _exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
-    """Let an object move by another Action, with the slot of the same name in it."""
-    data = obj.animation_data
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
-    for user in (data, *strips):
-        if user.action == old:
-            name = user.action_slot.identifier
-            user.action = new
-            user.action_slot = new.slots[name]

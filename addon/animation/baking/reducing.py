@@ -17,19 +17,18 @@ import numpy as np
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.best_of import least_errors
 from ..actions.channels import replace_keys
-from ..actions.slots import SlotTransform, slot_transforms_of, slots_of, transforms_in
+from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source, distinct
 from ..curves import CODE, CONSTANT, LINEAR, Keys
-from ..inbetweens.acting import Readings, Targets, act_on, readable
+from ..inbetweens.acting import Readings, Target, Targets, act_on, readable
 from ..inbetweens.channel_values import channel_values
 from ..inbetweens.differences import in_betweens
 from ..inbetweens.mode_keys import segment_modes, set_mode_in
-from ..transforms import ROWS, SCALE, Channel, Refused, Transform, transform_of
+from ..transforms import ROWS, SCALE, Channel, Refused, Transform, is_ours, transform_of
 from .bake import go_back
+from .copies import REDUCED, entries_in_use
 from .originals import (
-    REDUCED,
     discard_originals,
-    entries_in_use,
     has_original,
     move_by_copy,
     refuse_tweak_mode,
@@ -97,7 +96,7 @@ def reduce_keys_of(
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
     mode : str
         What fills in between the keys, one of `addon.motion.KEYFRAME_MODES`. It is keyed with them.
     tolerance : float
@@ -151,12 +150,12 @@ def reduce_keys_of(
     return reduction_of(list(done)[-1]) if done else None
 
 
-def reduction_of(target: bpy.types.Object | Transform) -> Reduction | None:
+def reduction_of(target: Target) -> Reduction | None:
     """What became of the keys that something moves by when they were reduced. None where they were not."""
     transform = transform_of(target)
     if not len(transform.motion.bakes):
         return None
-    places = slot_transforms_of([transform])
+    places = places_of(transform)
     entries = [entry for entry in entries_in_use(transform, places) if entry.kind == REDUCED]
     if not entries:
         return None
@@ -170,7 +169,7 @@ def reduction_of(target: bpy.types.Object | Transform) -> Reduction | None:
     )
 
 
-def is_reduced(target: bpy.types.Object | Transform) -> bool:
+def is_reduced(target: Target) -> bool:
     """Whether something moves by an Action with reduced keys, and its original is still in the file."""
     return has_original(transform_of(target), REDUCED)
 
@@ -180,7 +179,7 @@ def restore_keys(targets: Targets, *, refused: list[Refused] | None = None) -> N
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
     refused : list, optional
         Takes the refusals, and all other targets get their keys back.
 
@@ -197,7 +196,7 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
 
     Parameters
     ----------
-    targets : bpy.types.Object, or several of them
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
     refused : list, optional
         Takes the refusals, and the dense keys of all other targets are removed.
 
@@ -214,12 +213,16 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
     )
 
 
-def radius_of(obj: bpy.types.Object) -> float:
-    """How far an object reaches from its origin as it is now, in the scene's units.
+def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
+    """How far an object or a pose bone reaches from its origin as it is now, in the scene's units.
 
-    That is the farthest corner of its bounding box. Empties and cameras are as large as they are drawn; what has no
-    size at all counts as ten centimetres.
+    That is the farthest corner of its bounding box, and the length of a bone. Empties and cameras are as large as they
+    are drawn; what has no size at all counts as ten centimetres.
     """
+    if isinstance(obj, bpy.types.PoseBone):
+        return obj.length * _size(_evaluated(obj.id_data).matrix_world) or SOME_SIZE / metres_per_unit(
+            bpy.context.scene
+        )
     evaluated = _evaluated(obj)
     corners = np.array(evaluated.bound_box)
     size = 0.0
@@ -262,7 +265,7 @@ def _fewer_keys(
     around = around[(around < frames[0]) | (around > frames[-1])]
     seen = np.concatenate((around[around < frames[0]], frames, around[around > frames[-1]]))
     truth, own = _poses(source, seen), np.isin(seen, frames)
-    unit, radius = _in_channels(transform.carrier, radius, truth.scales is not None)
+    unit, radius = _in_channels(transform, radius, truth.scales is not None)
     tolerance /= unit
     rounding = SMALLEST * (float(np.abs(truth.positions).max()) + radius)
     allowed = tolerance + rounding
@@ -300,10 +303,11 @@ def _fewer_keys(
     )
 
 
-def _in_channels(obj: bpy.types.Object, radius: float, scaled: bool) -> tuple[float, float]:
+def _in_channels(transform: Transform, radius: float, scaled: bool) -> tuple[float, float]:
     """The length of a unit of the channels in the scene, and a radius in it, before the pose itself scales it."""
-    evaluated = _evaluated(obj)
-    own, world = _size(evaluated.matrix_basis), _size(evaluated.matrix_world)
+    own, world = _size(transform.carrier.matrix_basis), _size(_evaluated(transform.animated).matrix_world)
+    if transform.prefix:
+        world *= _size(transform.carrier.matrix)
     if not (own > 0.0 and world > 0.0):
         return 1.0, radius
     return world / own, radius / (world if scaled else world / own)
@@ -439,25 +443,30 @@ def _why_no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> str
 def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
     """What moves something that has hardly a key, and how that becomes keys."""
     obj = transform.carrier
-    has = f"{obj.name} has {count or 'no'} key{'s' * (count != 1)} of location, rotation or scale"
-    constraints = {constraint.type for constraint in obj.constraints if constraint.enabled}
-    if obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
+    has = f"{transform.name} has {count or 'no'} key{'s' * (count != 1)} of location, rotation or scale"
+    constraints = {constraint.type for constraint in obj.constraints if constraint.enabled and not is_ours(constraint)}
+    if not transform.prefix and obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
         return f"{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)"
     if constraints & SOLVED:
         return (
             f"{has}, a camera solution moves it: turn that into keys first "
             "(Object Constraint Properties, Constraint to F-Curve)"
         )
-    if constraints or _is_driven(obj):
+    if constraints or _is_driven(transform):
+        menu = "Pose" if transform.prefix else "Object"
         return (
             f"{has}, constraints or drivers move it: bake them first "
-            "(Object > Animation > Bake Action, with Visual Keying)"
+            f"({menu} > Animation > Bake Action, with Visual Keying)"
         )
-    if any(place.prefix for slot in slots_of([transform.animated]) for place in transforms_in(slot)):
+    if not transform.prefix and any(
+        place.prefix for slot in slots_of([transform.animated]) for place in transforms_in(slot)
+    ):
         return f"{has}, its bones have: select those in Pose mode, and reduce theirs"
     return f"{has}: there is nothing to reduce"
 
 
-def _is_driven(obj: bpy.types.Object) -> bool:
-    drivers = obj.animation_data.drivers if obj.animation_data else ()
-    return any(driver.data_path.startswith(("location", "rotation", "scale")) for driver in drivers)
+def _is_driven(transform: Transform) -> bool:
+    data = transform.animated.animation_data
+    paths = [driver.data_path for driver in (data.drivers if data else ())]
+    begins = tuple(transform.prefix + name for name in ("location", "rotation", "scale"))
+    return any(path.startswith(begins) for path in paths)

@@ -48,6 +48,11 @@ class BoneTransform(Transform):
         return self.animated.evaluated_get(depsgraph).pose.bones.get(self.carrier.name)
 
 
+def is_ours(constraint: bpy.types.Constraint) -> bool:
+    """Whether a constraint is one that differences are shown by."""
+    return constraint.type == "ACTION" and constraint.name.startswith(CONSTRAINT) and constraint.use_eval_time
+
+
 @lru_cache(maxsize=65536)
 def prefix_of(name: str) -> str:
     """How the data paths of a bone's properties begin, from its object."""

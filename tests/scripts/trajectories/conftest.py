@@ -1,9 +1,9 @@
-"""Small recordings made on the spot, and the check that an error is the one line that was promised."""
+"""Small recordings and scenes made on the spot, and the check that an error is the one line that was promised."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -37,3 +37,30 @@ def refusal() -> Callable[[str], tuple[int | None, str]]:
         return (int(parts["line"]) if parts["line"] else None), message[parts.start("problem") :]
 
     return _refusal
+
+
+@pytest.fixture
+def scene() -> Iterator[object]:
+    """An empty scene to fill, and nothing of it left afterwards."""
+    bpy = pytest.importorskip("bpy")
+    from tests.scripts.trajectories.blends import FPS
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.render.fps = FPS
+    bpy.context.scene.frame_end = 30
+    yield bpy.context.scene
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.fixture
+def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
+    """Save the scene, leave it, and return the path."""
+    bpy = pytest.importorskip("bpy")
+
+    def _saved(name: str = "scene.blend") -> str:
+        path = str(tmp_path / name)
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        return path
+
+    return _saved

@@ -2,55 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scripts.trajectories import read_trajectories
+from tests.scripts.trajectories.blends import FPS, empty, key
 
 bpy = pytest.importorskip("bpy")
 anim_utils = pytest.importorskip("bpy_extras.anim_utils")
-
-FPS = 50
-
-
-def empty(name: str, **settings: object) -> bpy.types.Object:
-    obj = bpy.data.objects.new(name, None)
-    bpy.context.scene.collection.objects.link(obj)
-    for setting, value in settings.items():
-        setattr(obj, setting, value)
-    return obj
-
-
-def key(obj: bpy.types.Object, frame: float, **channels: object) -> None:
-    for channel, value in channels.items():
-        setattr(obj, channel, value)
-        obj.keyframe_insert(channel, frame=frame)
-
-
-@pytest.fixture
-def scene() -> Iterator[bpy.types.Scene]:
-    """An empty scene to fill, and nothing of it left afterwards."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.context.scene.render.fps = FPS
-    bpy.context.scene.frame_end = 30
-    yield bpy.context.scene
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-
-
-@pytest.fixture
-def saved(scene: bpy.types.Scene, tmp_path: Path):
-    """Save the scene, leave it, and return the path."""
-
-    def _saved() -> str:
-        path = str(tmp_path / "scene.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        return path
-
-    return _saved
 
 
 def test_an_object_is_sampled_on_every_frame_of_its_action(saved) -> None:

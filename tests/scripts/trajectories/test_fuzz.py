@@ -42,7 +42,10 @@ PATIENCE = 20.0
 LONGEST_ERROR = 2000
 """Characters, beside those of the path."""
 
-WHAT_IS_WRONG = re.compile(r"(:\d+|:\*)?: .+; .+")
+BONE = ":Rig/Hand"
+"""Asks for a bone."""
+
+WHAT_IS_WRONG = re.compile(rf"(:\d+|:\*|{BONE})?: .+; .+")
 """Behind the path."""
 
 ROOT = Path(__file__).parents[3]
@@ -74,7 +77,7 @@ def read_and_fill_in(source: str, number: int) -> bool:
 
 
 def assert_is_one_line(message: str, source: str) -> None:
-    path = source.removesuffix(":*")
+    path = source.removesuffix(":*").removesuffix(BONE)
     assert message.startswith(path)
     assert WHAT_IS_WRONG.fullmatch(message, len(path)), f"not of the form FILE:LINE: problem; way out: {message!r}"
     assert message.isprintable()
@@ -194,14 +197,16 @@ def reader() -> Iterator[Reader]:
 
 @pytest.fixture
 def animated_blend(tmp_path: Path) -> Path:
-    """A file with an object that moves, not compressed."""
+    """A file with an object and a bone that move, not compressed."""
     bpy = pytest.importorskip("bpy")
+    from tests.scripts.trajectories.blends import empty, key, rig
+
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    obj = bpy.data.objects.new("Drill", None)
-    bpy.context.scene.collection.objects.link(obj)
+    drill = empty("Drill")
+    arm = rig("Rig", {"Arm": ((0, 0, 0), (0, 1, 0), None), "Hand": ((0, 1, 0), (0, 2, 0), "Arm")})
     for frame in (1, 5, 9):
-        obj.location = frame, 0.5, 1.0
-        obj.keyframe_insert("location", frame=frame)
+        key(drill, frame, location=(frame, 0.5, 1.0))
+        key(arm.pose.bones["Arm"], frame, rotation_euler=(0.1 * frame, 0.5, 1.0))
     path = tmp_path / "sound.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -216,10 +221,11 @@ def test_a_damaged_blend_is_refused_or_read_or_the_end_of_a_process_but_never_an
     for number in range(FIRST, FIRST + BLENDS):
         chance = Random(f".blend {number}")
         path.write_bytes((mutated if number % 5 == 0 else in_place)(content, chance))
-        answer = reader.read(f"{path}:*", number)
+        answer = reader.read(f"{path}{':*' if number % 2 else BONE}", number)
         assert answer in (True, False, "crash"), f"case {number} of .blend: {answer}"
         answers.append(answer)
     # How many are crashes is Blender's affair: about 1 in 100 with 5.2, 1 in 6 with 5.0.
     assert True in answers
     assert False in answers
     assert reader.read(f"{animated_blend}:*", 0) is True
+    assert reader.read(f"{animated_blend}{BONE}", 0) is True

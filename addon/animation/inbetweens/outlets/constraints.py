@@ -34,6 +34,7 @@ from ...transforms import (
     Channel,
     Transform,
     bone_name,
+    is_ours,
 )
 from ..layout import Layout
 from .outlet import Outlet
@@ -131,11 +132,6 @@ def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionCons
     """The constraint that shows the differences of a slot on a bone."""
     wanted = _slot_of_differences(place)
     return next((one for one in user.carrier.constraints if is_ours(one) and _shown_by(one) == wanted), None)
-
-
-def is_ours(constraint: bpy.types.Constraint) -> bool:
-    """Whether a constraint is one that differences are shown by."""
-    return constraint.type == "ACTION" and constraint.name.startswith(CONSTRAINT) and constraint.use_eval_time
 
 
 def _shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:

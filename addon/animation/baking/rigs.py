@@ -1,0 +1,144 @@
+"""Originals of rigs: one Action moves many bones, and each of them has a way back of its own.
+
+The first bone that is given other keys has its rig move by a copy of the Action. So long as a bone is in that copy as
+it is in the original, it can be given others there too; otherwise there is a copy of the copy. On the way back a bone
+gets its own channels from its original, and all others stay as they are. The rig goes back to an original once that is
+what its Action has come to be again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+
+from ..actions.channels import copy_fcurve, key_fields
+from ..actions.records import record_mode, recorded_mode
+from ..actions.slots import Slot, SlotTransform, places_of, slots_of, transforms_in
+from ..curves import read_keys
+from ..transforms import MODE_PROPERTY, WIDTHS, Transform
+from .copies import copied, exchange, note
+
+
+def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
+    """Let something of a rig be moved by a copy of what moves it, see `originals.move_by_copy`."""
+    rig, original = transform.animated, place.slot.action
+    places = places_of(transform)
+    changed = _copy_of(rig, original)
+    if changed is None or all(other.slot.action != changed for other in places):
+        # Not in this go, but before: it may be in a copy by now itself.
+        before = next(iter(_originals_of(rig, original)), None)
+        changed = original
+        if before is None or _is_shared(rig, place.slot) or not _is_as_in(before, place):
+            changed = copied(place.slot, kind)
+            exchange(rig, original, changed)
+            _rename_in_notes(rig, original, changed)
+        else:
+            original = before
+    note(transform, kind, changed, original)
+    return next(other for other in places_of(transform) if other.slot.action == changed)
+
+
+def put_back(transform: Transform, kind: str) -> None:
+    """Give something of a rig its own channels back, see `originals.put_back`."""
+    bakes = transform.motion.bakes
+    for number in reversed(range(len(bakes))):
+        entry = bakes[number]
+        place = next((place for place in places_of(transform) if place.slot.action == entry.changed), None)
+        if place is None or entry.original is None:
+            continue
+        if entry.kind != kind:
+            break
+        changed, original = entry.changed, entry.original
+        _copy_channels(_in(original, place), place)
+        bakes.remove(number)
+        _go_back_to(transform.animated, changed, original, place.slot)
+
+
+def _copy_of(rig: bpy.types.Object, original: bpy.types.Action) -> bpy.types.Action | None:
+    """The Action that has other keys for parts of a rig, which this one has from before."""
+    found = (entry.changed for entry in _entries(rig) if entry.original == original)
+    return next((changed for changed in found if changed is not None), None)
+
+
+def _originals_of(rig: bpy.types.Object, changed: bpy.types.Action) -> Iterator[bpy.types.Action]:
+    return (entry.original for entry in _entries(rig) if entry.changed == changed and entry.original is not None)
+
+
+def _entries(rig: bpy.types.Object) -> Iterator[bpy.types.PropertyGroup]:
+    """The notes on all that there is of a rig."""
+    yield from rig.rigid_motion.bakes
+    for bone in rig.pose.bones:
+        yield from bone.rigid_motion.bakes
+
+
+def _rename_in_notes(rig: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
+    for entry in _entries(rig):
+        if entry.changed == old:
+            entry.changed = new
+
+
+def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
+    """Whether something else moves by a slot of a rig as well."""
+    return any(one.users != (rig,) for one in slots_of([rig]) if (one.action, one.handle) == (slot.action, slot.handle))
+
+
+def _in(action: bpy.types.Action, place: SlotTransform) -> SlotTransform:
+    """The same transform in the slot of the same name in another Action."""
+    name = next(slot.identifier for slot in place.slot.action.slots if slot.handle == place.slot.handle)
+    slot = Slot(action, action.slots[name].handle, place.slot.users, place.slot.strips)
+    return transforms_in(slot, (place.prefix,))[0]
+
+
+def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
+    """Whether a transform has the same keys and modes in another Action."""
+    other = _in(action, place)
+    return _summary(other) == _summary(place) and recorded_mode(other) == recorded_mode(place)
+
+
+def _animators(place: SlotTransform) -> dict[tuple[str, int], bpy.types.FCurve]:
+    """The channels that the animator has keyed, that of modes among them."""
+    names = (*WIDTHS, MODE_PROPERTY)
+    return {channel: curve for channel, curve in place.curves.items() if channel[0].removeprefix(place.prefix) in names}
+
+
+def _summary(place: SlotTransform) -> dict:
+    """What tells whether channels are the same."""
+    return {channel: _summary_of(fcurve) for channel, fcurve in _animators(place).items()}
+
+
+def _summary_of(fcurve: bpy.types.FCurve) -> tuple:
+    fields = {name: numbers for name, numbers in key_fields(fcurve).items() if not name.startswith("select")}
+    modifiers = tuple((modifier.type, modifier.mute) for modifier in fcurve.modifiers)
+    ((_, keys),) = read_keys([[fcurve]])[0] if len(fcurve.keyframe_points) else ((0, None),)
+    cycles = None if keys is None else keys.cycles
+    return b"".join(np.ascontiguousarray(numbers).tobytes() for numbers in fields.values()), (
+        fcurve.extrapolation,
+        fcurve.mute,
+        modifiers,
+        cycles,
+    )
+
+
+def _copy_channels(source: SlotTransform, target: SlotTransform) -> None:
+    """Give a transform the keys and modes that it has in another Action."""
+    fcurves = target.channelbag.fcurves
+    for channel in _animators(target):
+        fcurves.remove(target.curves.pop(channel))
+    for channel, fcurve in _animators(source).items():
+        target.curves[channel] = copy_fcurve(fcurve, target.channelbag)
+    record_mode(target, recorded_mode(source))
+
+
+def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.types.Action, slot: Slot) -> None:
+    """Let a rig move by an original again, if all of its keys are what it has by now."""
+    if any(entry.changed == changed and entry.original == original for entry in _entries(rig)):
+        return
+    here = transforms_in(slot)
+    there = {place.prefix for place in transforms_in(_in(original, here[0]).slot)}
+    if {place.prefix for place in here} == there and all(_is_as_in(original, place) for place in here):
+        exchange(rig, changed, original)
+        _rename_in_notes(rig, changed, original)
+        if not changed.users:
+            bpy.data.actions.remove(changed)
