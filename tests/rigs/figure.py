@@ -125,7 +125,9 @@ def ball(name: str, material: bpy.types.Material, radius: float) -> bpy.types.Ob
     return obj
 
 
-def trail(name: str, material: bpy.types.Material, points: Iterable[Sequence[float]], radius: float) -> bpy.types.Object:
+def trail(
+    name: str, material: bpy.types.Material, points: Iterable[Sequence[float]], radius: float
+) -> bpy.types.Object:
     """A line through points."""
     points = [Vector(point) for point in points]
     curve = bpy.data.curves.new(name, "CURVE")

@@ -22,6 +22,9 @@ HANDSHAKE = Matrix(((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)))
 CURL = {"01": 70.0, "02": 85.0, "03": 55.0}
 """Degrees that the three parts of a finger are bent in a fist."""
 
+PIVOT, LEVER = Vector((0.27, -0.20, 0.80)), 0.50
+"""What a lever turns about, and how far from there the middle of a fist holds it."""
+
 ARM, WRIST = 0.985, 35.0
 """How far an arm is stretched, and the degrees by which a fist is bent forward on it."""
 
@@ -50,37 +53,27 @@ class Scene:
         return max(self.strays(frame) for frame in range(FRAMES[0], FRAMES[-1] + 1))
 
 
-@dataclass(frozen=True)
-class Lever:
-    """A lever that turns about an axis along X, and the fist on it."""
-
-    pivot: Vector = Vector((0.27, -0.20, 0.80))
-    length: float = 0.50
-    ends: tuple[float, float] = (50.0, -45.0)
-    """Degrees from upright, forward, at frame 1 and half-way."""
-
-
-def pull_a_lever(rig: bpy.types.Object, lever: bpy.types.Object, data: Lever = Lever()) -> Scene:  # noqa: B008
+def pull_a_lever(rig: bpy.types.Object, lever: bpy.types.Object) -> Scene:
     """The left hand takes a lever from one end to the other and back. `lever` turns about its origin.
 
     The fist has to stay on the handle.
     """
     make_fist(rig, "L")
     hand, chest, torso = (rig.pose.bones[name] for name in ("hand_ik.L", "chest", "torso"))
-    lever.parent, lever.location, lever.rotation_mode = rig, data.pivot, "XYZ"
+    lever.parent, lever.location, lever.rotation_mode = rig, PIVOT, "XYZ"
     upright, leaning = chest.matrix.copy(), torso.matrix.copy()
-    for frame, degrees, lean in zip(FRAMES, (*data.ends, data.ends[0]), (22.0, -4.0, 22.0), strict=True):
+    for frame, degrees, lean in zip(FRAMES, (50.0, -45.0, 50.0), (22.0, -4.0, 22.0), strict=True):
         turn = turned(degrees, "X")
         lever.rotation_euler.x = math.radians(degrees)
         lever.keyframe_insert("rotation_euler", index=0, frame=frame)
         key(torso, frame, Matrix.Translation((0.0, -0.0015 * lean, 0.0)) @ leaning)
         key(chest, frame, about(torso.head.copy(), turned(lean, "X")) @ upright)
-        fist = data.pivot + turn.to_3x3() @ Vector((0.0, 0.0, data.length))
+        fist = PIVOT + turn.to_3x3() @ Vector((0.0, 0.0, LEVER))
         key(hand, frame, grasp(fist, turn.to_3x3() @ HANDSHAKE))
 
     def strays(frame: int) -> float:
         bones = shown(rig, frame)
-        handle = Matrix.Rotation(lever.rotation_euler.x, 3, "X") @ Vector((0.0, 0.0, data.length)) + data.pivot
+        handle = Matrix.Rotation(lever.rotation_euler.x, 3, "X") @ Vector((0.0, 0.0, LEVER)) + PIVOT
         return (bones["DEF-hand.L"].matrix @ GRIP - handle).length
 
     return Scene(rig, [hand], strays)
