@@ -32,6 +32,9 @@ RADII = {
 }
 """Half of the width and depth of a body part in metres, by what the name of its bone begins with, after DEF-."""
 
+HEAD = "DEF-spine.006"
+"""The one that is no longer than its bone."""
+
 SIDES, RINGS = 16, 5
 """Corners around a capsule, and rings of each of its ends."""
 
@@ -48,7 +51,7 @@ def clothe(rig: bpy.types.Object, material: bpy.types.Material) -> bpy.types.Obj
         size = _size(bone)
         if size:
             first = sum(map(len, corners))
-            points, around = _capsule(bone.length, size)
+            points, around = _capsule(bone.length, size, 0.7 if bone.name == HEAD else 0.0)
             corners.append(points @ np.array(bone.matrix_local.to_3x3()).T + np.array(bone.head_local))
             faces += [tuple(first + corner for corner in face) for face in around]
             owners[bone.name] = range(first, first + len(points))
@@ -72,8 +75,11 @@ def _size(bone: bpy.types.Bone) -> tuple[float, float] | None:
     return next((size for start, size in RADII.items() if name.startswith(start)), None)
 
 
-def _capsule(length: float, size: tuple[float, float]) -> tuple[np.ndarray, list[tuple[int, ...]]]:
-    """Corners and faces of a capsule along Y, from the origin to `length`, round at both ends."""
+def _capsule(length: float, size: tuple[float, float], inset: float = 0.0) -> tuple[np.ndarray, list[tuple[int, ...]]]:
+    """Corners and faces of a capsule along Y, from the origin to `length`, round beyond both ends.
+
+    `inset` is how much of that roundness is to be within its length.
+    """
     reach = min(size)
     angles = np.linspace(0.0, 0.5 * math.pi, RINGS + 1)[1:]
     start = [(-reach * math.cos(angle), math.sin(angle)) for angle in angles]
@@ -84,6 +90,9 @@ def _capsule(length: float, size: tuple[float, float]) -> tuple[np.ndarray, list
         (share * size[0] * math.cos(a), along, share * size[1] * math.sin(a)) for along, share in rings for a in turn
     ]
     points.append((0.0, length + reach, 0.0))
+    corners = np.array(points)
+    corners[:, 1] += inset * reach
+    corners[len(corners) // 2 :, 1] -= 2.0 * inset * reach
     last = len(points) - 1
     faces: list[tuple[int, ...]] = []
     for side, beside in ((i, (i + 1) % SIDES) for i in range(SIDES)):
@@ -92,7 +101,7 @@ def _capsule(length: float, size: tuple[float, float]) -> tuple[np.ndarray, list
         for ring in range(len(rings) - 1):
             here, there = 1 + ring * SIDES, 1 + (ring + 1) * SIDES
             faces.append((here + side, there + side, there + beside, here + beside))
-    return np.array(points), faces
+    return corners, faces
 
 
 def boxes(name: str, material: bpy.types.Material, *parts: Box) -> bpy.types.Object:
