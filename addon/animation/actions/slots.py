@@ -164,7 +164,7 @@ def places_of(transform: Transform) -> list[SlotTransform]:
     """What moves a transform, as if nothing else used the same slots: without a look at other objects."""
     slots = (
         Slot(action, handle, (transform.animated,), frozenset(strips))
-        for action, handle, strips in _uses(transform.animated).values()
+        for action, handle, strips in uses_of(transform.animated).values()
     )
     return [place for slot in slots for place in transforms_in(slot, (transform.prefix,))]
 
@@ -172,7 +172,7 @@ def places_of(transform: Transform) -> list[SlotTransform]:
 def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
     """What is filled in of all that an object's Actions move of it, as if nothing else used the same slots."""
     found = []
-    for action, handle, strips in _uses(obj).values():
+    for action, handle, strips in uses_of(obj).values():
         slot = Slot(action, handle, (obj,), frozenset(strips))
         channelbag = slot.bones_channelbag
         bones = () if channelbag is None else map(prefix_of, channelbag.groups.keys())
@@ -182,7 +182,7 @@ def filled_places_of(obj: bpy.types.Object) -> list[SlotTransform]:
 
 def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
     """The slots that move these objects, in Actions of their own and in NLA strips; each once."""
-    known = {obj: _uses(obj) for obj in objects}
+    known = {obj: uses_of(obj) for obj in objects}
     wanted = {key for uses in known.values() for key in uses}
     return _slots(lambda key: key in wanted, known) if wanted else []
 
@@ -197,7 +197,7 @@ def _slots(is_wanted: Callable[[tuple[int, int]], bool], known: Mapping[bpy.type
     users: dict[tuple[int, int], list[bpy.types.Object]] = {}
     places = {}
     for obj in bpy.data.objects:
-        for key, (action, handle, strips) in (known[obj] if obj in known else _uses(obj)).items():
+        for key, (action, handle, strips) in (known[obj] if obj in known else uses_of(obj)).items():
             if is_wanted(key):
                 users.setdefault(key, []).append(obj)
                 places.setdefault(key, (action, handle, set()))[2].update(strips)
@@ -221,7 +221,7 @@ def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
             yield from (strip.action for strip in strips if strip.action is not None)
 
 
-def _uses(obj: bpy.types.Object) -> Uses:
+def uses_of(obj: bpy.types.Object) -> Uses:
     data = obj.animation_data
     if data is None:
         return {}

@@ -20,10 +20,17 @@ from ..actions.mode_property import adopt_from_properties, show_awaited, show_mo
 from ..actions.reading import differing_users, keyed_in, leading, sources_of_users
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
-from ..actions.slots import SlotTransform, actions_of, filled_places_of, slot_transforms_in, slot_transforms_of
+from ..actions.slots import (
+    SlotTransform,
+    actions_of,
+    filled_places_of,
+    slot_transforms_of,
+    slots_in,
+    transforms_in,
+)
 from ..actions.sources import Source
 from ..transforms import ObjectTransform, Refused, Transform, transform_of
-from . import insertion, known_sources
+from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .differences import differences
 from .filling import clear, fill_in, hold, is_complete
@@ -101,6 +108,14 @@ def _all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
         if obj.pose is not None and _has_bones(obj):
             found |= dict.fromkeys(map(transform_of, obj.pose.bones))
     return list(found)
+
+
+def _edited_in(obj: bpy.types.Object) -> list[Transform]:
+    """An object that was edited, and of a rig the bones that were."""
+    if obj.pose is None or not _has_bones(obj):
+        return [transform_of(obj)]
+    itself = (obj,) if _has_mode(obj) else ()
+    return [transform_of(carrier) for carrier in (*itself, *glances.changed_bones(obj))]
 
 
 def _has_bones(obj: bpy.types.Object) -> bool:
@@ -249,9 +264,8 @@ def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[Transform]:
         _look_through()
     if not edited:
         return set()
-    places = slot_transforms_in(
-        update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)
-    )
+    actions = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+    places = [place for slot in slots_in(actions) for place in transforms_in(slot, glances.changed_in(slot))]
     with _turn() as ours:
         if ours:
             _refresh(places)
@@ -270,7 +284,7 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
                 edited += _all_under(scene.objects)
             _State.ranges[scene.session_uid] = frames
         if isinstance(block, bpy.types.Object) and _concerns_us(block):
-            for transform in _all_under((block.original,)):
+            for transform in _edited_in(block.original):
                 if transform not in seen:
                     insertion.notice_pose(transform, frame)
                     edited.append(transform)
@@ -279,11 +293,22 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
 
 
 def _concerns_us(obj: bpy.types.Object) -> bool:
-    """Whether an object has, or had, anything to do with modes."""
-    motion = obj.rigid_motion
-    if motion.filled_components or motion.has_bones or motion.mode != "BLENDER" or motion.awaited != "BLENDER":
+    """Whether an object or its bones have, or had, anything to do with modes."""
+    if obj.rigid_motion.has_bones or _has_properties(obj):
         return True
     return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
+
+
+def _has_mode(obj: bpy.types.Object) -> bool:
+    """Whether an object itself has, or had, anything to do with modes."""
+    return _has_properties(obj) or any(
+        not record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
+    )
+
+
+def _has_properties(obj: bpy.types.Object) -> bool:
+    motion = obj.rigid_motion
+    return bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
 
 
 def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
@@ -395,6 +420,7 @@ def _on_file(*_: object) -> None:
 def _on_load(*arguments: object) -> None:
     insertion.forget_file()
     known_sources.forget_all()
+    glances.forget_all()
     _State.graphs.clear()
     with _turn() as ours:
         if ours:
@@ -407,6 +433,7 @@ def _on_load(*arguments: object) -> None:
 @_careful
 def _on_undo(*arguments: object) -> None:
     _State.again = True
+    glances.forget_all()
     try:
         _on_file(*arguments)
     finally:
