@@ -75,3 +75,6 @@ def _generate() -> bpy.types.Object:
             raise NoRigify(f"Rigify makes no human: {error}\n{said.getvalue()[-2000:]}") from error
         finally:
             addon_utils.disable("rigify", default_set=True)
+            # It leaves this behind, to fail in every file with a rig that is opened from now on.
+            for handler in [one for one in bpy.app.handlers.load_post if one.__module__.startswith("rigify.")]:
+                bpy.app.handlers.load_post.remove(handler)

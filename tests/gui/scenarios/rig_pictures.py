@@ -89,7 +89,9 @@ def at_a_lever(name: str) -> bpy.types.Object:
     rod = figure.boxes("Lever", skin, ((0.0, 0.0, 0.27), (0.03, 0.03, 0.66)))
     stand = figure.boxes("Stand", skin, ((0.0, 0.0, -0.4), (0.10, 0.16, 0.8)))
     stand.parent, stand.location = rig, scenes.PIVOT
-    for obj, color in ((body, (0.58, 0.62, 0.68)), (rod, WOOD), (stand, STAND)):
+    grip = figure.boxes("Grip", skin, ((0.0, 0.0, scenes.LEVER), (0.045, 0.045, 0.12)))
+    grip.parent = rod
+    for obj, color in ((body, (0.58, 0.62, 0.68)), (rod, WOOD), (grip, (1.0, 0.62, 0.2)), (stand, STAND)):
         obj.color, obj.hide_select = (*linear(color), 1.0), True
     scenes.pull_a_lever(rig, rod)
     for bone in rig.pose.bones:
