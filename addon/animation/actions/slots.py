@@ -217,8 +217,7 @@ def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
         if data.action is not None:
             yield data.action
         if len(data.nla_tracks):
-            strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
-            yield from (strip.action for strip in strips if strip.action is not None)
+            yield from (strip.action for strip in strips_of(animated) if strip.action is not None)
 
 
 def uses_of(obj: bpy.types.Object) -> Uses:
@@ -230,11 +229,16 @@ def uses_of(obj: bpy.types.Object) -> Uses:
     if action is not None and (handle := data.action_slot_handle):
         found[action.as_pointer(), handle] = (action, handle, {None})
     if len(data.nla_tracks):
-        for strip in _strips(strip for track in data.nla_tracks for strip in track.strips):
+        for strip in strips_of(obj):
             if (action := strip.action) is not None and (handle := strip.action_slot_handle):
                 span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
                 found.setdefault((action.as_pointer(), handle), (action, handle, set()))[2].add(span)
     return found
+
+
+def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
+    """The strips in the NLA of an object, those in strips of strips among them."""
+    return _strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
 
 
 def _strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
@@ -249,8 +253,7 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
     if data.action == slot.action and data.action_blend_type != "REPLACE":
         return False
     # Without an Action it is a strip of strips, and these may be in it.
-    strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
-    return all(strip.blend_type == "REPLACE" for strip in strips if strip.action in (None, slot.action))
+    return all(strip.blend_type == "REPLACE" for strip in strips_of(obj) if strip.action in (None, slot.action))
 
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
