@@ -231,6 +231,8 @@ def cut_together(folders: Sequence[Path]) -> bpy.types.Scene:
         frame += 1 + len(others)
     set_up_render(scene, SETTINGS, frame - 1)
     scene.render.use_sequencer = True
+    video = scene.render.ffmpeg
+    video.constant_rate_factor, video.ffmpeg_preset, video.gopsize = "MEDIUM", "BEST", len(FRAMES)
     return scene
 
 

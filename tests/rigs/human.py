@@ -63,7 +63,7 @@ def _library() -> Path:
 def _generate() -> bpy.types.Object:
     # Rigify looks for its own preferences while it registers: without `default_set` there are none, and its register()
     # ends half-way, before the rig types have their parameters.
-    said = io.StringIO()
+    said, known = io.StringIO(), set(dir(bpy.types))
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         try:
             if addon_utils.enable("rigify", default_set=True) is None:
@@ -75,6 +75,8 @@ def _generate() -> bpy.types.Object:
             raise NoRigify(f"Rigify makes no human: {error}\n{said.getvalue()[-2000:]}") from error
         finally:
             addon_utils.disable("rigify", default_set=True)
-            # It leaves this behind, to fail in every file with a rig that is opened from now on.
+            # It leaves panels and operators of the rig behind, which need it, and a handler that fails where it is not.
+            for name in set(dir(bpy.types)) - known:
+                bpy.utils.unregister_class(getattr(bpy.types, name))
             for handler in [one for one in bpy.app.handlers.load_post if one.__module__.startswith("rigify.")]:
                 bpy.app.handlers.load_post.remove(handler)

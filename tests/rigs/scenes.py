@@ -66,8 +66,9 @@ def pull_a_lever(rig: bpy.types.Object, lever: bpy.types.Object) -> Scene:
         turn = turned(degrees, "X")
         lever.rotation_euler.x = math.radians(degrees)
         lever.keyframe_insert("rotation_euler", index=0, frame=frame)
-        key(torso, frame, Matrix.Translation((0.0, -0.0015 * lean, 0.0)) @ leaning)
-        key(chest, frame, about(torso.head.copy(), turned(lean, "X")) @ upright)
+        moved = Matrix.Translation((0.0, -0.0015 * lean, 0.0)) @ leaning
+        key(torso, frame, moved)
+        key(chest, frame, about(moved.translation, turned(lean, "X")) @ upright)
         fist = PIVOT + turn.to_3x3() @ Vector((0.0, 0.0, LEVER))
         key(hand, frame, grasp(fist, turn.to_3x3() @ HANDSHAKE))
 
@@ -88,7 +89,7 @@ def twist(rig: bpy.types.Object, degrees: float = 50.0) -> Scene:
     for frame, angle in zip(FRAMES, (degrees, -degrees, degrees), strict=True):
         for foot, ball in zip(feet, balls, strict=True):
             key(foot, frame, about(ball, turned(angle, "Z")) @ rest[foot.name])
-        hips = about(torso.head.copy(), turned(0.5 * angle, "Z")) @ rest[torso.name]
+        hips = about(rest[torso.name].translation, turned(0.5 * angle, "Z")) @ rest[torso.name]
         key(torso, frame, Matrix.Translation((0.0, -0.03, -0.05)) @ hips)
 
     def strays(frame: int) -> float:
@@ -151,6 +152,7 @@ def cut_by_joints(rig: bpy.types.Object, rotation_mode: str = "QUATERNION") -> S
 
 def key(bone: bpy.types.PoseBone, frame: int, pose: Matrix) -> None:
     """Key location and rotation so that a bone stands like this in its armature."""
+    bpy.context.scene.frame_set(frame)
     path = "rotation_quaternion" if bone.rotation_mode == "QUATERNION" else "rotation_euler"
     before = getattr(bone, path).copy()
     bone.matrix = pose
