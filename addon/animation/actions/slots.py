@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -87,9 +88,9 @@ class SlotTransform:
         """What messages call it: the name of its first user."""
         return self.users[0].name
 
-    @property
+    @cached_property
     def filled(self) -> Curves:
-        """The F-curves that in-betweens are in."""
+        """The F-curves that in-betweens are in. Who writes them sets it anew."""
         if self.prefix:
             channelbag = self.slot.bones_channelbag
             group = None if channelbag is None else channelbag.groups.get(bone_name(self.prefix))
@@ -98,6 +99,10 @@ class SlotTransform:
         if group is None:
             return {}
         return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels if _is_sampled(fcurve)}
+
+    def has_filled(self, curves: Curves) -> None:
+        """Take note of the F-curves that in-betweens are in by now."""
+        self.__dict__["filled"] = curves
 
     def read_again(self) -> SlotTransform:
         """The same, with the F-curves that there are by now."""

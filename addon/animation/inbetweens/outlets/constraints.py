@@ -65,24 +65,22 @@ class Constraints(Outlet):
         present = place.filled
         if points:
             _avoid_names(place)
-            replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            place.has_filled(curves)
             _write_time(place, layout)
             self.show(place)
         elif present:
             _remove_time(place)
             replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
+            place.has_filled({})
             _remove_slot_if_empty(place.slot)
             self.release(place.users)
 
-    def is_shown(self, place: SlotTransform, source: Source, channels: Collection[Channel]) -> bool:
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
         if not channels:
             return True
         time = _time(place)
-        return (
-            time is not None
-            and _says(time, self.layout(source))
-            and all(_is_mounted(user, place) for user in place.users)
-        )
+        return time is not None and _says(time, layout) and all(_is_mounted(user, place) for user in place.users)
 
     def show(self, place: SlotTransform) -> None:
         for user in place.users if place.filled else ():
