@@ -6,4 +6,5 @@ live         refreshing after every edit                known_sources   what an 
 insertion    a key inserted in between                  densification   keys inserted all along
 mode_keys    choosing modes                             acting      many targets at once
 describing   what there is to tell of a segment        on_screen       what is seen, as properties
+bodies       channels as poses of a body
 """

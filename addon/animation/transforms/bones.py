@@ -38,6 +38,15 @@ class BoneTransform(Transform):
     def group(self) -> str:
         return self.carrier.name
 
+    @property
+    def location_axes(self) -> np.ndarray | None:
+        """Without *Local Location* a bone is moved along the axes of its parent, and still turns about its own."""
+        bone = self.carrier.bone
+        if bone.use_local_location:
+            return None
+        axes = bone.matrix_local.to_3x3().transposed()
+        return np.array(axes @ bone.parent.matrix_local.to_3x3() if bone.parent else axes)
+
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under(self.prefix, rotation)
 
