@@ -1,28 +1,20 @@
-"""Whatever is edited, in whatever order, in-betweens are what a fresh computation gives, and keys are the animator's.
-
-Every edit is an operator with undo, as in a window: Blender pushes its undo step before handlers get to see the edit.
-"""
+"""Whatever is edited of objects, in whatever order, in-betweens are what a fresh computation gives, keys as keyed."""
 
 from __future__ import annotations
 
-import logging
-import tempfile
-from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
-from typing import ClassVar
 
 import bpy
 import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from hypothesis.stateful import initialize, invariant, precondition, rule
 from mathutils import Euler, Matrix
 
 from addon import animation
+from tests.animation.editing import LAST, ORDERS, Editing, frames_in, goes_on, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
-    WIDTHS,
     Own,
     as_quaternion,
     assert_shown,
@@ -41,100 +33,16 @@ from tests.animation.oracle import (
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
 from tests.thoroughness import tried
 
-LAST = 40
-ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]
-EASINGS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items]
-HANDLES = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items]
 
-seeds = st.integers(0, 2**16)
-frames_in = st.integers(-4, 4 * (LAST + 5)).map(lambda quarter: quarter / 4)
-SAME_FRAME = 0.005
+class EditingObjects(Editing):
+    """An animator at work on a few objects, by their names."""
 
-shares = st.floats(0.0, 1.0, exclude_max=True)
-periods = st.just(0.0) | st.floats(0.1, 10.0)
-"""Of ELASTIC, in frames. Of many thousand swings in a segment, single precision makes noise, also in Blender itself."""
-
-
-class Edit(bpy.types.Operator):
-    """Any change, as an operator with undo."""
-
-    bl_idname = "test.edit"
-    bl_label = "Edit"
-    bl_options: ClassVar = {"REGISTER", "UNDO"}
-    change: ClassVar[Callable[[], None]]
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        Edit.change()
-        return {"FINISHED"}
-
-
-class Complaints(logging.Handler):
-    """Errors that handlers wrote down instead of raising them into Blender."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.ERROR)
-        self.found: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.found.append(self.format(record))
-
-
-def goes_on(obj: bpy.types.Object) -> bool:
-    """Whether any of its channels goes on at its slope outside of its keys."""
-    curves = curves_of(obj).items()
-    return any(
-        fcurve.extrapolation == "LINEAR"
-        for (path, _), fcurve in curves
-        if path in WIDTHS and len(fcurve.keyframe_points)
-    )
-
-
-def assert_only_a_key_more(made: dict, after: dict, frame: float) -> None:
-    """Between these snapshots no key changed but on this frame; and handles, as Blender has them follow a key."""
-    assert set(made) == set(after)
-    for channel, (*rest, points) in after.items():
-        *rest_made, points_made = made[channel]
-        assert rest == rest_made
-        others, others_made = (
-            [point for point in keys if abs(point[0] - frame) >= SAME_FRAME] for keys in (points, points_made)
-        )
-        assert len(points) - len(others) <= 1
-        assert [(*point[:2], *point[6:]) for point in others] == [(*point[:2], *point[6:]) for point in others_made]
-        behind = sum(point[0] < frame for point in others)
-        for number, (point, point_made) in enumerate(zip(others, others_made, strict=True)):
-            # Handles that are free are the animator's; only those beside the new key are shortened with their segment.
-            if point[-2:] == ("FREE", "FREE") and number not in (behind - 1, behind):
-                assert point == point_made
-
-
-class Editing(RuleBasedStateMachine):
-    """An animator at work on a few objects."""
+    KEPT = (*Editing.KEPT, "turned")
 
     def __init__(self) -> None:
         super().__init__()
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        bpy.utils.register_class(Edit)
-        animation.register()
-        self.on = True
-        self.complaints = Complaints()
-        logging.getLogger("addon.animation").addHandler(self.complaints)
-        self.folder = tempfile.TemporaryDirectory()
-        self.owns: dict[str, Own] = {}
         self.turned: dict[str, tuple] = {}
         """The delta rotations of their own, as quaternions and Euler angles."""
-        self.shift = 0.0
-        self.fresh = 0
-        self.before_bake: dict[str, tuple] = {}
-        self.history: list[tuple] = []
-        self.place = -1
-
-    def teardown(self) -> None:
-        if self.on:
-            animation.unregister()
-        bpy.utils.unregister_class(Edit)
-        logging.getLogger("addon.animation").removeHandler(self.complaints)
-        self.folder.cleanup()
 
     @initialize(
         orders=st.lists(st.sampled_from(ORDERS), min_size=1, max_size=3),
@@ -162,252 +70,14 @@ class Editing(RuleBasedStateMachine):
         self.names = [obj.name for obj in bpy.data.objects]
         self._start_history()
 
-    # What the machine does with an edit
-
-    def _start_history(self) -> None:
-        bpy.ops.ed.undo_push(message="Begin")
-        self.history = [self._remembered()]
-        self.place = 0
-
-    def _remembered(self) -> tuple:
-        keyed = {name: snapshot(bpy.data.objects[name]) for name in self.names}
-        return keyed, dict(self.owns), dict(self.before_bake), list(self.names), dict(self.turned)
-
-    def _edit(self, change: Callable[[], None], settle: Callable[[dict, dict], None] | None = None) -> None:
-        """Do it, and let the handlers see it: they leave keys as the edit made them, unless `settle` says otherwise."""
-        made: dict[str, dict] = {}
-
-        def noted() -> None:
-            change()
-            made.update({name: snapshot(bpy.data.objects[name]) for name in self.names})
-
-        Edit.change = noted
-        bpy.ops.test.edit("EXEC_DEFAULT", True)
-        after = {name: snapshot(bpy.data.objects[name]) for name in self.names}
-        if settle is None:
-            for name in self.names:
-                assert after[name] == made[name], f"the keys of {name} were changed"
-        else:
-            settle(made, after)
-        if self.on:
-            self.history[self.place + 1 :] = [self._remembered()]
-            self.place += 1
+    def _found(self, name: str) -> bpy.types.Object:
+        return bpy.data.objects[name]
 
     def _object(self, share: float) -> bpy.types.Object:
-        return bpy.data.objects[self.names[int(share * len(self.names))]]
-
-    def _curve(self, obj: bpy.types.Object, share: float) -> bpy.types.FCurve | None:
-        curves = [c for (path, _), c in curves_of(obj).items() if path in WIDTHS and len(c.keyframe_points)]
-        return curves[int(share * len(curves))] if curves else None
-
-    def _frame(self, obj: bpy.types.Object, share: float) -> float | None:
-        keys = key_frames(obj)
-        return float(keys[int(share * len(keys))]) if len(keys) else None
-
-    def _keys_on(self, obj: bpy.types.Object, frame: float, with_mode: bool = True):
-        for (path, _), fcurve in curves_of(obj).items():
-            if path in WIDTHS or (with_mode and path == "rigid_motion.mode"):
-                for point in fcurve.keyframe_points:
-                    if abs(point.co[0] - frame) < SAME_FRAME:
-                        yield fcurve, point
-
-    # Edits
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, what=st.sampled_from(("location", "rotation", "scale", "all")), posed=st.booleans(), seed=seeds)
-    def insert_a_key_at_the_current_frame(self, who, what, posed, seed):
-        obj, scene = self._object(who), bpy.context.scene
-        frame, name = scene.frame_current_final, obj.name
-        keys = key_frames(obj)
-        held = self._holds_pose(obj, frame)
-        if posed:
-            self._pose(obj, seed)
-        seen = self._basis(obj)
-        places = {"location": 0, "rotation": 1, "scale": 2}
-        everything = transform_paths(obj)
-        paths = everything if what == "all" else (everything[places[what]],)
-
-        def insert() -> None:
-            for path in paths:
-                bpy.data.objects[name].keyframe_insert(path, frame=frame)
-
-        def settle(made: dict, after: dict) -> None:
-            obj = bpy.data.objects[name]
-            sharing = self._sharing(name) if held else set()
-            for other in self.names:
-                if other not in sharing:
-                    assert after[other] == made[other], f"the keys of {other} were changed"
-            if held:
-                assert_only_a_key_more(made[name], after[name], frame)
-                # Off whole frames a key shows as the samples beside it have it, but it has the pose all the same.
-                now = expected_bases(obj, [frame], self.owns[name])[0]
-                size = max(1.0, np.abs(seen).max())
-                assert np.abs(now - seen).max() < 2e-5 * size, f"{name} jumped from\n{seen}\nto\n{now}\nkeys {keys}"
-
-        self._edit(insert, settle)
+        return self._found(self._named(share))
 
     def _basis(self, obj: bpy.types.Object) -> np.ndarray:
-        """How the object is shown now, in its parent's space."""
         return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_basis)
-
-    def _holds_pose(self, obj: bpy.types.Object, frame: float) -> bool:
-        """Whether a key inserted now falls into a segment that is filled in."""
-        keys = key_frames(obj)
-        if len(keys) < 2 or not keys[0] < frame < keys[-1] or np.abs(keys - frame).min() < 0.01:
-            return False
-        return mode_at(obj, keys[keys < frame][-1]) != "BLENDER"
-
-    def _pose(self, obj: bpy.types.Object, seed: int) -> None:
-        for path in transform_paths(obj)[:2]:
-            setattr(obj, path, random_values(obj, path, 1, seed)[0])
-        bpy.context.view_layer.update()
-
-    @rule(who=shares, seed=seeds, frame=frames_in)
-    def pose_it_without_a_key_and_go_elsewhere(self, who, seed, frame):
-        back = bpy.context.scene.frame_current
-        self._pose(self._object(who), seed)
-        bpy.context.scene.frame_set(int(frame + self.shift))
-        bpy.context.scene.frame_set(back)
-
-    @rule(who=shares, frame=frames_in, seed=seeds, partly=st.booleans())
-    def insert_keys_of_any_value_anywhere(self, who, frame, seed, partly):
-        name, frame = self._object(who).name, frame + self.shift
-
-        def insert() -> None:
-            obj = bpy.data.objects[name]
-            for (path, index), fcurve in curves_of(obj).items():
-                if path in WIDTHS and not (partly and (index + seed) % 2):
-                    value = random_values(obj, path, 1, seed)[0, index]
-                    fcurve.keyframe_points.insert(frame, value)
-
-        self._edit(insert)
-
-    @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans(), with_mode=st.booleans())
-    def move_keys(self, who, which, to, one_channel, with_mode):
-        name, to = self._object(who).name, to + self.shift
-
-        def move() -> None:
-            obj = bpy.data.objects[name]
-            frame = self._frame(obj, which)
-            if frame is None or any(True for _ in self._keys_on(obj, to)):
-                return
-            moved = []
-            for fcurve, point in list(self._keys_on(obj, frame, with_mode))[: 1 if one_channel else None]:
-                point.co_ui.x = to
-                moved.append(fcurve)
-            for fcurve in moved:
-                fcurve.update()
-
-        self._edit(move)
-
-    @rule(who=shares, which=shares, one_channel=st.booleans())
-    def delete_keys(self, who, which, one_channel):
-        name = self._object(who).name
-
-        def delete() -> None:
-            obj = bpy.data.objects[name]
-            frame = self._frame(obj, which)
-            if frame is not None:
-                for fcurve, point in list(self._keys_on(obj, frame))[: 1 if one_channel else None]:
-                    fcurve.keyframe_points.remove(point)
-
-        self._edit(delete)
-
-    @rule(who=shares, which=shares, at=shares, seed=seeds)
-    def change_a_value(self, who, which, at, seed):
-        name = self._object(who).name
-
-        def change() -> None:
-            fcurve = self._curve(bpy.data.objects[name], which)
-            if fcurve is not None:
-                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-                point.co_ui.y = np.exp(np.random.default_rng(seed).normal())
-                fcurve.update()
-
-        self._edit(change)
-
-    @rule(
-        who=shares,
-        which=shares,
-        interpolation=st.sampled_from(INTERPOLATIONS),
-        easing=st.sampled_from(EASINGS),
-        one_channel=st.booleans(),
-        shape=st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 2.0), periods),
-    )
-    def ease(self, who, which, interpolation, easing, one_channel, shape):
-        name = self._object(who).name
-
-        def change() -> None:
-            obj = bpy.data.objects[name]
-            frame = self._frame(obj, which)
-            if frame is not None:
-                for fcurve, point in list(self._keys_on(obj, frame, False))[: 1 if one_channel else None]:
-                    point.interpolation, point.easing = interpolation, easing
-                    point.back, point.amplitude, point.period = shape
-                    fcurve.update()
-
-        self._edit(change)
-
-    @rule(who=shares, which=shares, at=shares, kind=st.sampled_from(HANDLES), seed=seeds)
-    def shape_handles(self, who, which, at, kind, seed):
-        name = self._object(who).name
-
-        def change() -> None:
-            fcurve = self._curve(bpy.data.objects[name], which)
-            if fcurve is not None:
-                point = fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))]
-                point.interpolation = "BEZIER"
-                point.handle_left_type = point.handle_right_type = kind
-                by = np.random.default_rng(seed).normal(size=4) * (5.0, 1.0, 5.0, 1.0)
-                point.handle_left = point.co[0] - abs(by[0]), point.co[1] + by[1]
-                point.handle_right = point.co[0] + abs(by[2]), point.co[1] + by[3]
-                fcurve.update()
-
-        self._edit(change)
-
-    @rule(who=shares, which=shares, linear=st.booleans())
-    def extrapolate(self, who, which, linear):
-        name = self._object(who).name
-
-        def change() -> None:
-            fcurve = self._curve(bpy.data.objects[name], which)
-            if fcurve is not None:
-                fcurve.extrapolation = "LINEAR" if linear else "CONSTANT"
-                fcurve.update()
-
-        self._edit(change)
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, which=st.sets(st.integers(0, 5), min_size=1), mode=st.sampled_from(MODE_IDS))
-    def set_the_mode_of_keys(self, who, which, mode):
-        name = self._object(who).name
-        obj = bpy.data.objects[name]
-        keys = key_frames(obj)
-        if not len(keys):
-            return
-        chosen = sorted({float(keys[number % len(keys)]) for number in which})
-        wanted = [mode if frame in chosen else mode_at(obj, frame) for frame in keys]
-        transforms = {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS}
-
-        def change() -> None:
-            animation.set_mode(bpy.data.objects[name], mode, chosen)
-
-        self._edit(change)
-        obj = bpy.data.objects[name]
-        assert [mode_at(obj, frame) for frame in keys] == wanted == animation.modes_of(obj, keys)
-        assert {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS} == transforms
-
-    @precondition(lambda self: self.on)
-    @rule(who=shares, mode=st.sampled_from(MODE_IDS))
-    def set_the_mode_of_the_object(self, who, mode):
-        name = self._object(who).name
-
-        def change() -> None:
-            animation.set_mode(bpy.data.objects[name], mode)
-
-        self._edit(change)
-        assert {mode_at(bpy.data.objects[name], frame) for frame in (1.0, 20.0)} == {mode}
-        assert bpy.data.objects[name].rigid_motion.mode == mode
 
     @precondition(lambda self: self.on)
     @rule(who=shares, seed=seeds)
@@ -429,42 +99,6 @@ class Editing(RuleBasedStateMachine):
             tuple(np.float32(location).tolist()), self.owns[name].quaternion, tuple(np.float32(scale).tolist())
         )
         self._edit(change)
-
-    @rule(frame=frames_in)
-    def go_to_a_frame(self, frame):
-        frame += self.shift
-        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
-
-    @precondition(lambda self: self.on)
-    @rule(end=st.integers(5, LAST + 20))
-    def change_the_frame_range(self, end):
-        def change() -> None:
-            bpy.context.scene.frame_end = end
-
-        self._edit(change)
-
-    # Undo, redo, bake, un-bake, files, on and off
-
-    @precondition(lambda self: self.on and self.place > 0)
-    @rule(steps=st.integers(1, 3))
-    def undo(self, steps):
-        for _ in range(min(steps, self.place)):
-            assert bpy.ops.ed.undo() == {"FINISHED"}
-            self.place -= 1
-        self._is_as_remembered()
-
-    @precondition(lambda self: self.on and self.place < len(self.history) - 1)
-    @rule(steps=st.integers(1, 3))
-    def redo(self, steps):
-        for _ in range(min(steps, len(self.history) - 1 - self.place)):
-            assert bpy.ops.ed.redo() == {"FINISHED"}
-            self.place += 1
-        self._is_as_remembered()
-
-    def _is_as_remembered(self) -> None:
-        keyed, self.owns, self.before_bake, self.names, self.turned = (part.copy() for part in self.history[self.place])
-        for name in self.names:
-            assert snapshot(bpy.data.objects[name]) == keyed[name], f"the keys of {name} are not what they were"
 
     @precondition(lambda self: self.on)
     @rule(who=shares, step=st.sampled_from((1.0, 0.5, 3.0)), ends=st.none() | st.tuples(frames_in, frames_in))
@@ -503,45 +137,6 @@ class Editing(RuleBasedStateMachine):
             assert np.abs(now - then).max() < 2e-5 * size, (
                 f"{name} is baked otherwise on frame {frame} (keys on {keys}, step {step}):\n{now}\ninstead of\n{then}"
             )
-
-    @precondition(lambda self: self.on and self.before_bake)
-    @rule(who=shares)
-    def unbake(self, who):
-        name = sorted(self.before_bake)[int(who * len(self.before_bake))]
-        keyed = self.before_bake.pop(name)
-
-        def change() -> None:
-            animation.unbake(bpy.data.objects[name])
-
-        self._edit(change)
-        assert snapshot(bpy.data.objects[name]) == keyed
-        assert not animation.is_baked(bpy.data.objects[name])
-
-    @rule()
-    def save_and_reload(self):
-        keyed = self._remembered()[0]
-        path = str(Path(self.folder.name) / "scene.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path, compress=False)
-        bpy.ops.wm.open_mainfile(filepath=path)
-        assert self._remembered()[0] == keyed
-        self._start_history()
-
-    @precondition(lambda self: self.on)
-    @rule()
-    def switch_the_extension_off(self):
-        animation.unregister()
-        self.on = False
-
-    @precondition(lambda self: not self.on)
-    @rule()
-    def switch_the_extension_on(self):
-        keyed = self._remembered()[0]
-        animation.register()
-        bpy.context.view_layer.update()
-        bpy.context.scene.frame_set(bpy.context.scene.frame_current)
-        self.on = True
-        assert self._remembered()[0] == keyed
-        self._start_history()
 
     # Actions that go and come
 
@@ -768,20 +363,7 @@ class Editing(RuleBasedStateMachine):
             self._link(obj, None, None)
             bpy.context.view_layer.update()
 
-    def _frames_that_are_seen(self, objects: list[bpy.types.Object]) -> range:
-        """Where curves go on outside of their keys, in-betweens do so from there to the frame range of the scene."""
-        first, last = int(self.shift) - 1, int(self.shift) + LAST + 5
-        for obj in filter(goes_on, objects):
-            keys = key_frames(obj)
-            first = max(first, min(bpy.context.scene.frame_start, int(np.floor(keys[0]))))
-            last = min(last, max(bpy.context.scene.frame_end, int(np.ceil(keys[-1]))))
-        return range(first, last + 1)
-
     # What holds all the time
-
-    @invariant()
-    def nothing_failed_in_a_handler(self):
-        assert self.complaints.found == []
 
     @precondition(lambda self: self.on and self.history)
     @invariant()
@@ -821,7 +403,7 @@ class Editing(RuleBasedStateMachine):
         assert [animation.problem_of(bpy.data.objects[name]) for name in self.names] == [""] * len(self.names)
 
 
-Editing.TestCase.settings = settings(
+EditingObjects.TestCase.settings = settings(
     max_examples=tried(40),
     stateful_step_count=25,
     deadline=None,
@@ -829,4 +411,4 @@ Editing.TestCase.settings = settings(
     database=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
-TestEdits = Editing.TestCase
+TestEdits = EditingObjects.TestCase

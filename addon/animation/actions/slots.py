@@ -267,6 +267,11 @@ def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     return group is not None and group.name == GROUP and _is_sampled(fcurve)
 
 
+def is_time(fcurve: bpy.types.FCurve) -> bool:
+    """Whether an F-curve says at what time a constraint of ours is."""
+    return split_path(fcurve.data_path)[1].startswith(_TIMES)
+
+
 def _is_sampled(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve of the group of in-betweens is one of these, and no mode channel without keys."""
     return not fcurve.keyframe_points and not fcurve.data_path.endswith(MODE_PROPERTY)

@@ -196,8 +196,9 @@ class Source:
     @property
     def is_live(self) -> bool:
         """Whether there is a segment that is to be filled in otherwise than Blender does."""
-        moved = bool(np.any(self.modes)) if isinstance(self.mode, Keys) else self.mode != 0
-        return moved and len(self.curves) > 0 and len(self.key_frames) > 1
+        if not self.curves or len(self.key_frames) < 2:
+            return False
+        return bool(np.any(self.modes)) if isinstance(self.mode, Keys) else self.mode != 0
 
     @cached_property
     def frame_range(self) -> tuple[int, int]:

@@ -198,7 +198,12 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
     cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
     for path, values in channel_values(transform, source, motion).items():
         for index, column in enumerate(values.T):
-            fcurve = copy.curves.get((path, index)) or fcurves.new(path, index=index)
+            fcurve = copy.curves.get((path, index))
+            if fcurve is not None and fcurve.mute:
+                # Its keys have had no say, and what there was in their place is baked.
+                fcurves.remove(copy.curves.pop((path, index)))
+                fcurve = None
+            fcurve = fcurve or fcurves.new(path, index=index)
             _bake_channel(fcurve, frames, column)
             if cycles is not None:
                 add_cycles(fcurve, cycles)

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
-from ..actions.slots import SlotTransform, is_filled_in
+from ..actions.slots import SlotTransform, is_filled_in, is_time
 from ..actions.sources import FULL_TURN, Source
 from ..transforms import PART_OF, ROTATION, Channel
 from .differences import NOTHING, differences
@@ -129,6 +129,11 @@ def clear(place: SlotTransform) -> None:
     _limit_ranges({place.slot.action}, set())
 
 
+def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
+    """Have the manual frame ranges that were set for samples follow the keys of Actions that were edited."""
+    _limit_ranges(actions, set())
+
+
 def hold(place: SlotTransform) -> None:
     """Have a slot hold what the NLA needs of it beside others that are filled in."""
     if outlet_of(place).hold(place):
@@ -160,8 +165,9 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         samples, keyed = [], []
         for bag in bags:
             for fcurve in bag.fcurves:
-                if not fcurve.is_empty:
-                    ours = bag.slot_handle in of_bones or is_filled_in(fcurve)
+                # A modifier alone makes no range, be it the time of a constraint.
+                if len(fcurve.keyframe_points) or len(fcurve.sampled_points):
+                    ours = bag.slot_handle in of_bones or is_filled_in(fcurve) or is_time(fcurve)
                     (samples if ours else keyed).append(fcurve.range())
         if keyed and samples and not _is_within(samples, keyed):
             begin, end = _union(keyed)

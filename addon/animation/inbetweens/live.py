@@ -33,7 +33,7 @@ from ..transforms import ObjectTransform, Refused, Transform, transform_of
 from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .differences import differences
-from .filling import clear, fill_in, hold, is_complete
+from .filling import clear, fill_in, follow_ranges, hold, is_complete
 from .outlets import outlet_of, release, remove_orphans
 
 log = logging.getLogger(__package__)
@@ -213,6 +213,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
                 clear(place)
                 idle.append(place)
     editable = [place for place in places if place.slot.action.is_editable]
+    # Keys of what has no mode count in the frame range of an Action as well.
+    follow_ranges({place.slot.action for place in editable} - {place.slot.action for place, _ in stale})
     for place in idle:
         hold(place)
     for place in _in_nla_with(editable):

@@ -1,0 +1,79 @@
+"""Small cases of everyday edits of bones, each of which went wrong once."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import bake, problem_of, set_mode
+from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig
+from tests.animation.oracle import curves_of, expected_bases
+from tests.animation.scenes import key, new_object
+
+
+def keyed_body(frames: tuple[float, ...]) -> bpy.types.PoseBone:
+    """The only bone of a rig, with keys on these frames."""
+    return key_bone(new_rig("Rig", ARM[:1]).pose.bones[0], frames)
+
+
+def frame_range(bone: bpy.types.PoseBone) -> tuple[float, float]:
+    return tuple(bone.id_data.animation_data.action.frame_range)
+
+
+def test_an_action_that_ends_before_frame_0_ends_with_its_keys(live_file):
+    bone = keyed_body((-59.0, -47.0, -23.0))
+    set_mode(bone, "dq_sclerp")
+    assert frame_range(bone) == (-59.0, -23.0)
+
+
+def test_an_action_that_goes_on_behind_its_keys_begins_and_ends_with_them(live_file):
+    bone = keyed_body((11.0, 20.0, 30.0))
+    live_file.scene.frame_end = 50
+    curves_of(bone)["location", 0].extrapolation = "LINEAR"
+    set_mode(bone, "dq_sclerp")
+    assert frame_range(bone) == (11.0, 30.0)
+
+
+def test_the_frame_range_of_an_action_follows_keys_of_a_bone_without_a_mode(live_file):
+    rig = new_rig("Rig", ARM[:2])
+    for bone in rig.pose.bones:
+        key_bone(bone, (-19.0, -7.0, 17.0))
+    body, upper = rig.pose.bones
+    set_mode(upper, "dq_sclerp")
+    fcurve = curves_of(body)["location", 0]
+    fcurve.keyframe_points[-1].co_ui.x = 23.0
+    fcurve.update()
+    bpy.context.view_layer.update()
+    assert frame_range(body) == (-19.0, 23.0)
+
+
+@pytest.mark.parametrize("carrier", ["object", "bone"])
+def test_a_mode_that_is_keyed_before_anything_else_changes_nothing(live_file, carrier):
+    owner = new_object() if carrier == "object" else new_rig("Rig", ARM[:1])
+    moved = owner if carrier == "object" else owner.pose.bones[0]
+    path = f"{moved.path_from_id()}." if carrier == "bone" else ""
+    moved.rigid_motion.mode = "dq_sclerp"
+    owner.keyframe_insert(f"{path}rigid_motion.mode", frame=1)
+    bpy.context.view_layer.update()
+    assert problem_of(moved) == ""
+    moved.keyframe_insert("location", frame=1)
+    moved.keyframe_insert("rotation_euler", frame=1)
+    bpy.context.view_layer.update()
+    assert problem_of(moved) == ""
+
+
+@pytest.mark.parametrize("carrier", ["object", "bone"])
+def test_what_is_baked_in_place_of_a_muted_channel_is_to_be_seen(live_file, carrier):
+    if carrier == "object":
+        moved = key(new_object())
+        set_mode(moved, "dq_sclerp")
+    else:
+        moved = moving_rig("dq_sclerp").pose.bones["Hand"]
+    muted = curves_of(moved)["location", 1]
+    muted.mute = True
+    bpy.context.view_layer.update()
+    wanted = expected_bases(moved, PLAYED)
+    bake(moved)
+    bpy.context.view_layer.update()
+    assert np.abs(expected_bases(moved, PLAYED) - wanted).max() < 1e-5
