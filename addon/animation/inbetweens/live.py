@@ -29,7 +29,7 @@ from ..actions.slots import (
     transforms_in,
 )
 from ..actions.sources import Source
-from ..transforms import ObjectTransform, Refused, Transform, transform_of
+from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, transform_of
 from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .differences import differences
@@ -316,9 +316,8 @@ def _concerns_us(obj: bpy.types.Object) -> bool:
 
 def _has_mode(obj: bpy.types.Object) -> bool:
     """Whether an object itself has, or had, anything to do with modes."""
-    return _has_properties(obj) or any(
-        not record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
-    )
+    records = (record for action in actions_of(obj) for record in action.rigid_motion.slots)
+    return _has_properties(obj) or any(not record.prefix for record in records)
 
 
 def _has_properties(obj: bpy.types.Object) -> bool:
@@ -446,6 +445,14 @@ def _on_file(*_: object) -> None:
 
 
 @_careful
+def _before_saving(*arguments: object) -> None:
+    _on_file(*arguments)
+    for obj in bpy.data.objects:
+        if obj.rigid_motion.has_bones:
+            let_override_be_read(obj)
+
+
+@_careful
 def _on_load(*arguments: object) -> None:
     insertion.forget_file()
     known_sources.forget_all()
@@ -477,7 +484,7 @@ HANDLERS = {
     "undo_post": _on_undo,
     "redo_post": _on_undo,
     "load_post": _on_load,
-    "save_pre": _on_file,
+    "save_pre": _before_saving,
     "render_init": _on_file,
 }
 

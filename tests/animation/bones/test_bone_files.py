@@ -244,6 +244,32 @@ bpy.ops.wm.save_as_mainfile(filepath=found)
     assert_posed(rig, PLAYED)
 
 
+def test_what_an_overridden_rig_keeps_on_bones_is_read_again_from_a_library_that_knows_nothing_of_modes(
+    library, tmp_path
+):
+    on_a_farm(
+        "rig = bpy.data.objects['Puppet']\n[bone.pop('rigid_motion', None) for bone in rig.pose.bones]\n" + SAVE_AS,
+        library,
+        library,
+    )
+    rig = key_all(overridden(library, "Puppet"))
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    hand = rig.pose.bones["Hand"]
+    bake(hand)
+    hand.constraints.new("LIMIT_SCALE")
+    lower = rig.pose.bones["Lower"]
+    lower.constraints.remove(lower.constraints["Rigid Motion"])
+    bpy.context.view_layer.update()
+    rig = reopened(save(tmp_path / "shot.blend"), "Puppet")
+    assert [bool(bone.rigid_motion.mounted) for bone in rig.pose.bones] == [
+        bone.name != "Hand" for bone in rig.pose.bones
+    ]
+    assert "Rigid Motion" not in rig.pose.bones["Lower"].constraints
+    assert is_baked(rig.pose.bones["Hand"])
+    unbake(rig.pose.bones["Hand"])
+    assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == ["dq_sclerp"]
+
+
 def test_an_overridden_rig_gives_its_modes_up_again(library, tmp_path):
     rig = key_all(overridden(library, "Puppet"))
     set_mode(list(rig.pose.bones), "dq_sclerp")
