@@ -22,6 +22,7 @@ from .baking.reducing import (
 )
 from .inbetweens import live
 from .inbetweens.live import problem_of, refresh, set_enabled
+from .inbetweens.mending import constraint_trouble, mend
 from .inbetweens.mode_keys import key_frames, modes_of, set_mode
 from .transforms import Refused
 
@@ -32,10 +33,12 @@ __all__ = [
     "bake",
     "bake_poses",
     "channelbag_of",
+    "constraint_trouble",
     "discard_dense_keys",
     "is_baked",
     "is_reduced",
     "key_frames",
+    "mend",
     "modes_of",
     "problem_of",
     "radius_of",
