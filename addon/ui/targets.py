@@ -59,9 +59,13 @@ def targets_of(context: bpy.types.Context) -> list[Transform]:
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
     """The selected objects, without any the active one; or the selected bones alone, as Blender's operators have it."""
-    if is_posing(context):
-        return list(context.selected_pose_bones or ())
-    return list(context.selected_objects) or [obj for obj in (context.object,) if obj is not None]
+    found = selected_in_view(context)
+    return found if found or is_posing(context) or context.object is None else [context.object]
+
+
+def selected_in_view(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
+    """The selected bones of all rigs in Pose Mode while these are posed, else the selected objects."""
+    return list((context.selected_pose_bones if is_posing(context) else context.selected_objects) or ())
 
 
 def scope_for(context: bpy.types.Context) -> str:

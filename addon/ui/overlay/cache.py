@@ -8,15 +8,19 @@ that is merely played, or looked at from elsewhere, costs no more than looking p
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
-from ...animation import key_frames
-from ...animation.inbetweens.mode_keys import source_of
-from ...animation.transforms import Transform, transform_of
+from ...animation.actions.slots import SlotTransform
+from ...animation.actions.sources import Source
+from ...animation.inbetweens.mode_keys import active_places_of, frames_in, sources_of
+from ...animation.transforms import BoneTransform, Transform, transform_of
+from .bones import axis_length_of_bone, followed
 from .points import Path, axis_length_of, trace
 
 SPARE = 64
@@ -30,7 +34,7 @@ class _Entry:
     """Of all that the path depends on."""
 
     settings: tuple
-    """The part of it that is the scene's."""
+    """The part of it that is the scene's, and what stands between a bone's rotation and its location, as bytes."""
 
     action: int
     """Session id of the Action that the path was read from, 0 for none."""
@@ -45,20 +49,39 @@ _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
 """By the identity of what is moved; those drawn last come last."""
 
 
-def path_of(target: bpy.types.Object | Transform, scene: bpy.types.Scene) -> Path | None:
+def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bpy.types.Scene) -> Path | None:
     """The path of a target, as the overlay of the scene is set.
 
     None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
     """
-    target = transform_of(target)
+    return paths_of([transform_of(target)], scene)[0]
+
+
+def paths_of(
+    targets: Sequence[Transform], scene: bpy.types.Scene, turned: Mapping[Transform, np.ndarray | None] | None = None
+) -> list[Path | None]:
+    """The paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
     overlay = scene.rigid_motion_overlay
     settings = (overlay.mode, overlay.tick_step, overlay.axes_size, scene.frame_start, scene.frame_end)
-    identity = _identity(target)
-    entry = _entries.get(identity)
-    if entry is None or entry.stale or entry.settings != settings:
-        entry = _entries[identity] = _read(target, settings, entry)
-    _entries.move_to_end(identity)
-    return entry.path
+    stale: dict[Transform, np.ndarray | None] = {}
+    for target in targets:
+        entry, turn = _entries.get(_identity(target)), (turned or {}).get(target)
+        if entry is None or entry.stale or entry.settings != (*settings, _bytes(turn)):
+            stale[target] = turn
+    if stale:
+        places = active_places_of(list(stale))
+        sources = dict(zip(places, sources_of(list(places.values())), strict=True))
+        for target, turn in stale.items():
+            selected = _selected(places.get(target))
+            before = _entries.get(_identity(target))
+            _entries[_identity(target)] = _read(target, sources.get(target), selected, settings, turn, before)
+    for target in targets:
+        _entries.move_to_end(_identity(target))
+    return [_entries[_identity(target)].path for target in targets]
+
+
+def _bytes(turn: np.ndarray | None) -> bytes:
+    return b"" if turn is None else turn.astype(np.float32).tobytes()
 
 
 def keep_only(drawn: int) -> None:
@@ -72,12 +95,11 @@ def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
 
     Selecting is no edit, so Blender's handlers are silent about it.
     """
-    targets = map(transform_of, targets)
-    entries = [(entry, target) for target in targets if (entry := _entries.get(_identity(target))) is not None]
+    entries = {target: entry for target in map(transform_of, targets) if (entry := _entries.get(_identity(target)))}
+    drawn = [target for target, entry in entries.items() if entry.path]
+    places = active_places_of(drawn) if drawn else {}
     changed = [
-        entry
-        for entry, target in entries
-        if entry.path and entry.selected != key_frames(target, selected=True).tobytes()
+        entries[target] for target in drawn if entries[target].selected != _selected(places.get(target)).tobytes()
     ]
     for entry in changed:
         entry.stale = True
@@ -88,26 +110,40 @@ def _identity(target: Transform) -> tuple[int, str]:
     return target.animated.session_uid, target.prefix
 
 
-def _read(target: Transform, settings: tuple, before: _Entry | None) -> _Entry:
+def _selected(place: SlotTransform | None) -> np.ndarray:
+    return np.empty(0) if place is None else frames_in(place, selected=True)
+
+
+def _read(
+    target: Transform,
+    source: Source | None,
+    selected: np.ndarray,
+    settings: tuple,
+    turn: np.ndarray | None,
+    before: _Entry | None,
+) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
-    entry = _Entry(None, (), settings, action.session_uid if action else 0)
-    try:
-        source = source_of(target)
-        if source is not None:
-            mode, tick_step, axes_size, *_ = settings
-            selected = key_frames(target, selected=True)
-            axis_length = axes_size * axis_length_of(target.carrier, source)
-            entry.selected = selected.tobytes()
-            # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
-            entry.digest = (source.digest, tuple(source.rest.items()), entry.selected, axis_length, settings)
-            if before is not None and before.digest == entry.digest:
-                entry.path = before.path
-            else:
-                entry.path = trace(source, None if mode == "CHOSEN" else mode, tick_step, axis_length, selected)
-    except ValueError:
-        # Refused. The panel says why.
-        pass
+    entry = _Entry(None, (), (*settings, _bytes(turn)), action.session_uid if action else 0)
+    if source is None:
+        # Where it was refused, the panel says why.
+        return entry
+    mode, tick_step, axes_size, *_ = settings
+    point = None
+    if isinstance(target, BoneTransform):
+        point, size = followed(target.carrier, source, turn), axis_length_of_bone(target.carrier, source)
+    else:
+        size = axis_length_of(target.carrier, source)
+    entry.selected = selected.tobytes()
+    # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
+    place = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
+    entry.digest = (source.digest, tuple(source.rest.items()), place, entry.selected, size, entry.settings)
+    if before is not None and before.digest == entry.digest:
+        entry.path = before.path
+    else:
+        with suppress(ValueError):  # numbers that make no motion
+            chosen = None if mode == "CHOSEN" else mode
+            entry.path = trace(source, chosen, tick_step, axes_size * size, selected, point)
     return entry
 
 
