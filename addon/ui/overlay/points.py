@@ -65,7 +65,7 @@ class Followed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The path of an object's origin or of a point of a bone: as Blender's own in-betweens have it, and as a mode does."""
+    """The path of an object's origin or of a point of a bone: as Blender's in-betweens have it, and as a mode does."""
 
     frames: np.ndarray
     """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
