@@ -7,14 +7,14 @@ undo step.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import bpy
 
 from ..animation import Refused
 from ..animation.transforms import Transform
-from .targets import each_target, is_key_editor, is_posing, targets_of
+from .targets import each_target, is_key_editor, is_posing
 from .wording import kind_of, names_of, spoken_of
 
 NO_TARGETS = "Select an object with keys first"
@@ -40,9 +40,16 @@ class OnTargets:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if any(True for _ in cls.with_work(each_target(context))):
+        seen: list[Transform] = []
+
+        def noted() -> Iterator[Transform]:
+            for target in each_target(context):
+                seen.append(target)
+                yield target
+
+        if any(True for _ in cls.with_work(noted())):
             return True
-        cls.poll_message_set(cls.reason(targets_of(context), context))
+        cls.poll_message_set(cls.reason(seen, context))
         return False
 
     @classmethod

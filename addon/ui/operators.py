@@ -207,10 +207,10 @@ class _OnChanged(OnTargets):
     summary: ClassVar[str]
 
     @classmethod
-    def last_changes(cls, context: bpy.types.Context) -> dict[Transform, str]:
+    def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
         """What was done last to the keys of each target that something was done to."""
         found, places = {}, {}
-        for target in each_target(context):
+        for target in targets:
             if len(target.motion.bakes):
                 animated = target.animated
                 if animated not in places:
@@ -222,10 +222,11 @@ class _OnChanged(OnTargets):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        changes = cls.last_changes(context)
+        targets = targets_of(context)
+        changes = cls.last_changes(targets)
         if cls.kind in changes.values():
             return True
-        reason = cls.reason(targets_of(context), context)
+        reason = cls.reason(targets, context)
         for target, later in changes.items():
             if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
                 reason = f"These keys were {later.lower()} since: {WAYS_BACK[later]} first"
@@ -233,7 +234,7 @@ class _OnChanged(OnTargets):
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = [target for target, kind in self.last_changes(context).items() if kind == self.kind]
+        targets = [target for target, kind in self.last_changes(each_target(context)).items() if kind == self.kind]
 
         def go_back(refused: list[Refused]) -> str:
             type(self).verb(targets, refused=refused)

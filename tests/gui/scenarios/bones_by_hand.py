@@ -1,4 +1,4 @@
-"""Two bones in Pose Mode, by hand: pies, keys, Auto Key between keys, undo, the constraint in its tab, bake and un-bake.
+"""Two bones in Pose Mode, by hand: pies, keys, Auto Key between keys, undo, the constraint, bake and un-bake.
 
 Where the bones are seen is held against `tests.animation.oracle`, which is given their channels as those of an object.
 """
