@@ -19,6 +19,9 @@ from mathutils import Euler, Quaternion
 from addon.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate
 from addon.motion.quaternions import multiply, normalise
 
+Carrier = bpy.types.Object | bpy.types.PoseBone
+"""What has location, rotation and scale. Pose bones have no delta transforms of their own."""
+
 MODE_IDS = ("BLENDER", *KEYFRAME_MODES)
 SMOOTH = {name for name, mode in KEYFRAME_MODES.items() if mode.is_smooth}
 WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
@@ -37,24 +40,33 @@ class Own:
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
-def curves_of(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:
-    """The F-curves of an object's slot."""
-    data = obj.animation_data
+def curves_of(carrier: Carrier) -> dict[tuple[str, int], bpy.types.FCurve]:
+    """The F-curves of an object's slot, or those of a pose bone in it. Data paths are from object or bone on."""
+    data = carrier.id_data.animation_data
     if data is None or data.action is None or data.action_slot is None:
         return {}
     channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
-    return {(c.data_path, c.array_index): c for c in channelbag.fcurves} if channelbag else {}
+    if channelbag is None:
+        return {}
+    if isinstance(carrier, bpy.types.Object):
+        return {(c.data_path, c.array_index): c for c in channelbag.fcurves}
+    prefix = f"{carrier.path_from_id()}."
+    return {
+        (c.data_path.removeprefix(prefix), c.array_index): c
+        for c in channelbag.fcurves
+        if c.data_path.startswith(prefix)
+    }
 
 
-def rotation_path(obj: bpy.types.Object) -> str:
+def rotation_path(obj: Carrier) -> str:
     return "rotation_quaternion" if obj.rotation_mode == "QUATERNION" else "rotation_euler"
 
 
-def transform_paths(obj: bpy.types.Object) -> tuple[str, str, str]:
+def transform_paths(obj: Carrier) -> tuple[str, str, str]:
     return "location", rotation_path(obj), "scale"
 
 
-def snapshot(obj: bpy.types.Object) -> dict[tuple[str, int], tuple]:
+def snapshot(obj: Carrier) -> dict[tuple[str, int], tuple]:
     """All that the animator keyed, to the last handle: every channel but the in-betweens."""
     return {
         name: (
@@ -67,11 +79,11 @@ def snapshot(obj: bpy.types.Object) -> dict[tuple[str, int], tuple]:
             ),
         )
         for name, fcurve in curves_of(obj).items()
-        if not name[0].startswith("delta_")
+        if not name[0].startswith("delta_") and 'constraints["Rigid Motion' not in name[0]
     }
 
 
-def key_frames(obj: bpy.types.Object) -> np.ndarray:
+def key_frames(obj: Carrier) -> np.ndarray:
     """Where any transform channel has a key; keys less than a hundredth of a frame apart are one."""
     curves = curves_of(obj)
     frames = sorted(
@@ -86,7 +98,7 @@ def key_frames(obj: bpy.types.Object) -> np.ndarray:
     return np.array([frame for i, frame in enumerate(frames) if i == 0 or frame - frames[i - 1] > 0.01])
 
 
-def mode_at(obj: bpy.types.Object, frame: float) -> str:
+def mode_at(obj: Carrier, frame: float) -> str:
     """The mode of the segment that begins on this frame."""
     fcurve = curves_of(obj).get(("rigid_motion.mode", 0))
     if fcurve is None or fcurve.mute or not len(fcurve.keyframe_points):
@@ -95,7 +107,7 @@ def mode_at(obj: bpy.types.Object, frame: float) -> str:
 
 
 def expected_bases(
-    obj: bpy.types.Object, frames: Sequence[float], own: Own | None = None, keys: np.ndarray | None = None
+    obj: Carrier, frames: Sequence[float], own: Own | None = None, keys: np.ndarray | None = None
 ) -> np.ndarray:
     """What moves the object in its parent's space. `FCurve.evaluate` is asked on each frame, extrapolation included.
 
@@ -104,7 +116,7 @@ def expected_bases(
     return matrices(*_components(obj, frames, own, keys))
 
 
-def expected_off_whole_frames(obj: bpy.types.Object, frames: Sequence[float], own: Own | None = None) -> np.ndarray:
+def expected_off_whole_frames(obj: Carrier, frames: Sequence[float], own: Own | None = None) -> np.ndarray:
     """The same between whole frames, where Blender goes straight from one difference to the next.
 
     For objects that turn by quaternions.
@@ -128,7 +140,7 @@ def expected_off_whole_frames(obj: bpy.types.Object, frames: Sequence[float], ow
 
 
 def _components(
-    obj: bpy.types.Object, frames: Sequence[float], own: Own | None, keys: np.ndarray | None = None
+    obj: Carrier, frames: Sequence[float], own: Own | None, keys: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     own = own or Own()
     frames = np.asarray(frames, dtype=np.float64)
@@ -159,7 +171,7 @@ def _components(
     return location, quaternion, scale
 
 
-def _key_poses(obj: bpy.types.Object, frames: np.ndarray, own: Own, scaled: bool) -> Poses:
+def _key_poses(obj: Carrier, frames: np.ndarray, own: Own, scaled: bool) -> Poses:
     positions, quaternions, scales = _native(obj, frames)
     return Poses(
         positions + own.location, multiply(np.array(own.quaternion), quaternions), scales[:, 0] if scaled else None
@@ -167,7 +179,7 @@ def _key_poses(obj: bpy.types.Object, frames: np.ndarray, own: Own, scaled: bool
 
 
 def _smooth(
-    obj: bpy.types.Object, keys: np.ndarray, first: float, share: np.ndarray, mode: str, own: Own, scaled: bool
+    obj: Carrier, keys: np.ndarray, first: float, share: np.ndarray, mode: str, own: Own, scaled: bool
 ) -> Poses:
     """A segment of a smooth mode with the keys next to it; beside a segment that holds, the object rests."""
     place = int(np.flatnonzero(keys == first)[0])
@@ -183,7 +195,7 @@ def _smooth(
     return in_betweens(around, _key_poses(obj, shown, own, scaled), counts, share, mode)
 
 
-def _codes(obj: bpy.types.Object, frame: float) -> set[str]:
+def _codes(obj: Carrier, frame: float) -> set[str]:
     """The interpolations of all channels in the segment that begins on this frame."""
     found = set()
     for path in transform_paths(obj):
@@ -207,7 +219,7 @@ def expected_worlds(
     return expected_worlds(obj.parent, frames, owns) @ np.array(obj.matrix_parent_inverse) @ bases
 
 
-def progress(obj: bpy.types.Object, first: float, last: float, frames: np.ndarray) -> np.ndarray:
+def progress(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
     """How far the channels have come between two keys: the share of the chord that they make up together."""
     done, whole = np.zeros(len(frames)), 0.0
     curves = curves_of(obj)
@@ -269,21 +281,21 @@ def assert_shown(
         )
 
 
-def _reach(obj: bpy.types.Object, frames: Sequence[float]) -> float:
+def _reach(obj: Carrier, frames: Sequence[float]) -> float:
     """How large Blender's own in-betweens get, which single precision has to hold beside their difference."""
     location, _, scale = _native(obj, np.asarray(frames))
     own = max(np.abs(location).max(initial=0.0), np.abs(scale).max(initial=0.0))
     return own if obj.parent is None else own * max(1.0, _reach(obj.parent, frames))
 
 
-def shortest_quaternion(obj: bpy.types.Object, frames: Sequence[float]) -> np.ndarray:
+def shortest_quaternion(obj: Carrier, frames: Sequence[float]) -> np.ndarray:
     """How long Blender's own quaternion is on each frame, the shortest of the object and its parents, at most 1."""
     values = _channels(obj, rotation_path(obj), np.asarray(frames))
     own = np.minimum(np.linalg.norm(values, axis=1), 1.0) if obj.rotation_mode == "QUATERNION" else 1.0
     return own if obj.parent is None else own * shortest_quaternion(obj.parent, frames)
 
 
-def _native(obj: bpy.types.Object, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _native(obj: Carrier, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Location, unit quaternion and scale from the object's channels alone."""
     turned = _channels(obj, rotation_path(obj), frames)
     if obj.rotation_mode == "QUATERNION":
@@ -307,7 +319,7 @@ def _from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
     return turned
 
 
-def _channels(obj: bpy.types.Object, path: str, frames: np.ndarray) -> np.ndarray:
+def _channels(obj: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
     curves = curves_of(obj)
     values = np.empty((len(frames), WIDTHS[path]))
     for index, rest in enumerate(getattr(obj, path)):
@@ -349,7 +361,7 @@ def _elastic(key: bpy.types.Keyframe, end: float, frames: Sequence[float]) -> li
     return share
 
 
-def _scales_evenly(obj: bpy.types.Object, keys: np.ndarray) -> bool:
+def _scales_evenly(obj: Carrier, keys: np.ndarray) -> bool:
     """Whether scale is animated, and on every key the same along all axes and positive."""
     curves = curves_of(obj)
     if len(keys) < 2 or not any(len(c.keyframe_points) for (path, _), c in curves.items() if path == "scale"):

@@ -62,3 +62,27 @@ def own_deltas(obj: bpy.types.Object) -> Own:
     else:
         turned = as_quaternion(obj.delta_rotation_euler, obj.rotation_mode)
     return Own(tuple(obj.delta_location), turned, tuple(obj.delta_scale))
+
+
+def push_down(obj: bpy.types.Object, start: int = 1, **settings: float) -> bpy.types.NlaStrip:
+    """Put the object's Action into a strip of a new track."""
+    data = obj.animation_data
+    action, slot = data.action, data.action_slot
+    data.action = None
+    strip = data.nla_tracks.new().strips.new(action.name, start, action)
+    strip.action_slot = slot
+    for name, value in settings.items():
+        setattr(strip, name, value)
+    bpy.context.view_layer.update()
+    return strip
+
+
+def tweak(obj: bpy.types.Object, strip: bpy.types.NlaStrip) -> None:
+    """Edit the Action of a strip, as Tab does in the NLA Editor."""
+    data = obj.animation_data
+    track = next(track for track in data.nla_tracks if strip.name in track.strips)
+    data.nla_tracks.active = track
+    track.select = strip.select = True
+    data.use_tweak_mode = True
+    bpy.context.view_layer.update()
+    assert data.use_tweak_mode

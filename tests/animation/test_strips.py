@@ -12,34 +12,10 @@ import pytest
 from addon.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
 from addon.animation.inbetweens.outlets import deltas, sampled
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
-from tests.animation.scenes import give_own_deltas, key, new_object
+from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
-
-
-def push_down(obj: bpy.types.Object, start: int = 1, **settings: float) -> bpy.types.NlaStrip:
-    """Put the object's Action into a strip of a new track."""
-    data = obj.animation_data
-    action, slot = data.action, data.action_slot
-    data.action = None
-    strip = data.nla_tracks.new().strips.new(action.name, start, action)
-    strip.action_slot = slot
-    for name, value in settings.items():
-        setattr(strip, name, value)
-    bpy.context.view_layer.update()
-    return strip
-
-
-def tweak(obj: bpy.types.Object, strip: bpy.types.NlaStrip) -> None:
-    """Edit the Action of a strip, as Tab does in the NLA Editor."""
-    data = obj.animation_data
-    track = next(track for track in data.nla_tracks if strip.name in track.strips)
-    data.nla_tracks.active = track
-    track.select = strip.select = True
-    data.use_tweak_mode = True
-    bpy.context.view_layer.update()
-    assert data.use_tweak_mode
 
 
 def assert_at(obj: bpy.types.Object, scene_frames: np.ndarray, wanted: np.ndarray) -> None:

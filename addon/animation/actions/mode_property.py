@@ -16,7 +16,11 @@ from .sources import MODE_NAMES, MODE_NUMBERS
 
 def await_mode(transform: Transform, mode: str) -> None:
     """Keep a mode until there is an Action to keep it."""
-    transform.motion.awaited = transform.motion.mode = mode
+    motion = transform.motion
+    motion.awaited = mode
+    # To set the property is to choose a mode, which leads here.
+    if motion.mode != mode:
+        motion.mode = mode
 
 
 def is_keyed(place: SlotTransform) -> bool:

@@ -75,17 +75,25 @@ def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -
 
 
 def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
-    records = place.slot.action.rigid_motion.slots
-    record = records.get(_key_of(place))
-    if record is None and not place.prefix:
-        # Those of versions without bones have no name to be found by.
-        handle = place.slot.handle
-        record = next((one for one in records if one.handle == handle and not (one.prefix or one.name)), None)
-    return record
+    records, key = place.slot.action.rigid_motion.slots, _key_of(place)
+    number = _numbers.get(key, -1)
+    if not (0 <= number < len(records) and records[number].name == key):
+        number = records.find(key)
+        if number < 0 and not place.prefix:
+            # Those of versions without bones have no name to be found by.
+            handle = place.slot.handle
+            old = (n for n, one in enumerate(records) if one.handle == handle and not (one.prefix or one.name))
+            number = next(old, -1)
+        _numbers[key] = number
+    return records[number] if number >= 0 else None
+
+
+_numbers: dict[str, int] = {}
+"""Where records were found last, by their names: a rig has many, and Blender goes through all of them for a name."""
 
 
 def _key_of(place: SlotTransform) -> str:
-    """The name that a record is found by: Blender looks for names quickly."""
+    """The name that a record is found by."""
     return f"{place.slot.handle} {place.prefix}"
 
 

@@ -29,7 +29,7 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
 
     `drivers` are those of the user's data-block, by their data paths.
     """
-    _refuse_linked(user, place)
+    refuse_linked(user, place)
     differences = user.differences.values()
     for path, _ in (*user.channels.values(), *differences) if drivers else ():
         if path in drivers:
@@ -50,13 +50,18 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
             )
 
 
-def _refuse_linked(user: Transform, place: SlotTransform) -> None:
-    for block in (user.animated, place.slot.action):
-        if not block.is_editable:
-            way_out = "make it local first (Object > Relations > Make Local)"
-            if place.prefix and block == user.animated:
-                way_out = "make an override of it first (Object > Library Override > Make)"
-            raise Refused(f"{block.name} is linked from another file: {way_out}")
+def refuse_linked(user: Transform, place: SlotTransform | None = None) -> None:
+    """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
+    if not user.animated.is_editable:
+        way_out = "make it local first (Object > Relations > Make Local)"
+        if user.prefix:
+            way_out = "make an override of it first (Object > Library Override > Make)"
+        raise Refused(f"{user.animated.name} is linked from another file: {way_out}")
+    if place is not None and not place.slot.action.is_editable:
+        raise Refused(
+            f"{place.slot.action.name} is linked from another file: "
+            "make it local first (Object > Relations > Make Local)"
+        )
 
 
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:

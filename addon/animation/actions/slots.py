@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -87,9 +88,9 @@ class SlotTransform:
         """What messages call it: the name of its first user."""
         return self.users[0].name
 
-    @property
+    @cached_property
     def filled(self) -> Curves:
-        """The F-curves that in-betweens are in."""
+        """The F-curves that in-betweens are in. Who writes them sets it anew."""
         if self.prefix:
             channelbag = self.slot.bones_channelbag
             group = None if channelbag is None else channelbag.groups.get(bone_name(self.prefix))
@@ -98,6 +99,10 @@ class SlotTransform:
         if group is None:
             return {}
         return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels if _is_sampled(fcurve)}
+
+    def has_filled(self, curves: Curves) -> None:
+        """Take note of the F-curves that in-betweens are in by now."""
+        self.__dict__["filled"] = curves
 
     def read_again(self) -> SlotTransform:
         """The same, with the F-curves that there are by now."""
@@ -217,8 +222,7 @@ def actions_of(animated: bpy.types.ID) -> Iterator[bpy.types.Action]:
         if data.action is not None:
             yield data.action
         if len(data.nla_tracks):
-            strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
-            yield from (strip.action for strip in strips if strip.action is not None)
+            yield from (strip.action for strip in strips_of(animated) if strip.action is not None)
 
 
 def uses_of(obj: bpy.types.Object) -> Uses:
@@ -230,11 +234,16 @@ def uses_of(obj: bpy.types.Object) -> Uses:
     if action is not None and (handle := data.action_slot_handle):
         found[action.as_pointer(), handle] = (action, handle, {None})
     if len(data.nla_tracks):
-        for strip in _strips(strip for track in data.nla_tracks for strip in track.strips):
+        for strip in strips_of(obj):
             if (action := strip.action) is not None and (handle := strip.action_slot_handle):
                 span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
                 found.setdefault((action.as_pointer(), handle), (action, handle, set()))[2].add(span)
     return found
+
+
+def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
+    """The strips in the NLA of an object, those in strips of strips among them."""
+    return _strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)
 
 
 def _strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
@@ -249,8 +258,7 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
     if data.action == slot.action and data.action_blend_type != "REPLACE":
         return False
     # Without an Action it is a strip of strips, and these may be in it.
-    strips = _strips(strip for track in data.nla_tracks for strip in track.strips)
-    return all(strip.blend_type == "REPLACE" for strip in strips if strip.action in (None, slot.action))
+    return all(strip.blend_type == "REPLACE" for strip in strips_of(obj) if strip.action in (None, slot.action))
 
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:

@@ -117,7 +117,7 @@ def is_complete(place: SlotTransform, source: Source) -> bool:
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
-        and outlet.is_shown(place, source, written)
+        and outlet.is_shown(place, layout, written)
     )
 
 

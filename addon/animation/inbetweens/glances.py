@@ -7,7 +7,6 @@ that means nothing, of what is selected for example, counts too: whether in-betw
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Iterator
 
 import bpy
@@ -61,8 +60,15 @@ def _keys_of(fcurve: bpy.types.FCurve) -> object:
         if fcurve.modifiers and split_path(fcurve.data_path)[1] in WIDTHS:
             return _MODIFIED
         first = keys[0].as_pointer()
-        return ctypes.string_at(first, count * (keys[1].as_pointer() - first))
+        return np.asarray(_Memory(first, count * (keys[1].as_pointer() - first))).tobytes()
     return _MODIFIED if count else None
+
+
+class _Memory:
+    """A stretch of memory that NumPy can read. Property by property the same takes four times as long."""
+
+    def __init__(self, address: int, size: int) -> None:
+        self.__array_interface__ = {"data": (address, True), "shape": (size,), "typestr": "|V1", "version": 3}
 
 
 def changed_bones(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:

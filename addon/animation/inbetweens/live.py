@@ -34,7 +34,7 @@ from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .differences import differences
 from .filling import clear, fill_in, hold, is_complete
-from .outlets import outlet_of, release
+from .outlets import outlet_of, release, remove_orphans
 
 log = logging.getLogger(__package__)
 
@@ -211,6 +211,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         hold(place)
     for place in _in_nla_with(editable):
         hold(place)
+    for slot in {place.slot: None for place in editable if place.prefix}:
+        remove_orphans(slot)
     return len(stale)
 
 

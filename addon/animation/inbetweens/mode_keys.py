@@ -18,7 +18,7 @@ from ..actions.channels import replace_keys
 from ..actions.mode_property import await_mode, is_keyed
 from ..actions.reading import keyed_in, read
 from ..actions.records import record_mode, recorded_mode
-from ..actions.refusals import refuse_numbers
+from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.slots import SlotTransform, places_of, slot_transforms_of
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
 from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
@@ -243,10 +243,7 @@ def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
 def check(transform: Transform, readings: Readings) -> None:
     """Raise `Refused` where a transform, which is keyed so, cannot have any mode but Blender's own."""
     transform.rotation  # noqa: B018 - raises where it turns by axis and angle
-    if not transform.animated.is_editable:
-        raise Refused(
-            f"{transform.name} is linked from another file: make it local first (Object > Relations > Make Local)"
-        )
+    refuse_linked(transform)
     for _, source in readings:
         if isinstance(source, Refused):
             raise source

@@ -10,9 +10,11 @@ from collections.abc import Iterable
 
 from ...actions.slots import SlotTransform
 from ...transforms import BoneTransform, Transform
-from .constraints import Constraints
+from .constraints import Constraints, remove_orphans
 from .deltas import Deltas
 from .outlet import Outlet
+
+__all__ = ["Outlet", "outlet_of", "release", "remove_orphans"]
 
 _DELTAS, _CONSTRAINTS = Deltas(), Constraints()
 

@@ -1,17 +1,19 @@
 """Pose bones: differences are put on top of a bone by an Action constraint, first in its stack.
 
 The differences are in a second slot of the Action that has the keys. Nothing but constraints uses it. Which frame of it
-a constraint takes, its evaluation time says, from 0 for the first sample to 1 for the last: that is animated beside the
-bone's own channels, by an F-curve without keys, and so it goes through strips as they do.
+a constraint takes, its evaluation time says, from 0 for frame 0, which no sample is before, to 1 for a power of two: so
+Blender comes to whole frames again without an error, in single precision. That is animated beside the bone's own
+channels, by an F-curve without keys, and so it goes through strips as they do.
 
-Where several Actions of a rig fill in the same bone, each has a constraint of its own, of another name, and holds those
-of the others at 0: there is no difference on the first key.
+Where several Actions of a rig fill in the same bone, in strips of the NLA, each has a constraint of its own, of another
+name, that has no influence while another Action plays. From one strip to the next both influences blend, as Blender
+blends what is keyed, and so that the times do not, each Action has the time of the others as well.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 
 import bpy
 import numpy as np
@@ -19,7 +21,7 @@ from mathutils import Euler, Quaternion
 
 from ...actions.channels import add_cycles, replace_keys
 from ...actions.records import ensure_record, record_of, recorded_digest
-from ...actions.slots import SlotTransform, slot_transforms_of
+from ...actions.slots import Slot, SlotTransform, actions_of, slot_transforms_of, strips_of
 from ...actions.sources import Source
 from ...curves import Cycles
 from ...transforms import (
@@ -35,10 +37,12 @@ from ...transforms import (
     Transform,
     bone_name,
     is_ours,
+    prefix_of,
+    split_path,
 )
 from ..layout import Layout
 from .outlet import Outlet
-from .sampled import hold_constants, put_away, remove_if_empty, replace_samples
+from .sampled import put_away, remove_if_empty, replace_samples
 
 SETTINGS = {
     "use_eval_time": True,
@@ -53,6 +57,10 @@ REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", 
 muted, has other settings, comes behind another constraint, or has an influence below 1."""
 
 
+MOST_FRAMES = 1_048_574
+"""The last frame that Blender lets a constraint have."""
+
+
 class Constraints(Outlet):
     def layout(self, source: Source) -> Layout:
         return Layout.apart(source)
@@ -61,30 +69,30 @@ class Constraints(Outlet):
         present = place.filled
         if points:
             _avoid_names(place)
-            replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            place.has_filled(curves)
             _write_time(place, layout)
             self.show(place)
-        elif present or _time(place) is not None:
-            replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
+        elif present:
             _remove_time(place)
-            _remove_slot_if_empty(place)
+            replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
+            place.has_filled({})
+            _remove_slot_if_empty(place.slot)
             self.release(place.users)
 
-    def is_shown(self, place: SlotTransform, source: Source, channels: Collection[Channel]) -> bool:
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
         if not channels:
             return True
         time = _time(place)
-        return (
-            time is not None
-            and _says(time, self.layout(source))
-            and all(_is_mounted(user, place) for user in place.users)
-        )
+        return time is not None and _says(time, layout) and all(_is_mounted(user, place) for user in place.users)
 
     def show(self, place: SlotTransform) -> None:
-        if place.filled:
-            for user in place.users:
-                if user.animated.is_editable and not _is_mounted(user, place):
+        for user in place.users if place.filled else ():
+            if user.animated.is_editable:
+                if not _is_mounted(user, place):
                     _mount(user, place)
+                if _has_stale(user):
+                    self.release([user])
 
     def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
         difference = REST.copy()
@@ -103,20 +111,21 @@ class Constraints(Outlet):
         return _weighted(difference, constraint.influence, user)
 
     def hold(self, place: SlotTransform) -> bool:
-        """While another Action plays that keys the bone, and takes the place of this one, the difference of this one
-        has to go: each of them has the constraints of the others at the frame where there is none."""
-        held = {}
-        if any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves):
-            tracked = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
-            others = slot_transforms_of(tracked) if tracked else ()
-            held = {
-                (_time_path(other), 0): 0.0
-                for other in others
-                if recorded_digest(other) and other.filled and not _is_same(other, place)
-            }
-            held.pop((_time_path(place), 0), None)
-        present = {channel: fcurve for channel, fcurve in _times(place) if len(fcurve.sampled_points)}
-        return hold_constants(place, bone_name(place.prefix), present, held)
+        held = _held(place)
+        present = {
+            channel: fcurve
+            for channel, fcurve in place.curves.items()
+            if channel[0].startswith(_constraint_path(place, CONSTRAINT)[:-2]) and fcurve != _time(place)
+        }
+        for channel, fcurve in present.items():
+            if channel not in held or not _is_line(fcurve, held[channel]):
+                place.channelbag.fcurves.remove(place.curves.pop(channel))
+        missing = [channel for channel in held if channel not in place.curves]
+        for path, index in missing:
+            _write_line(place, path, held[path, index])
+        if len(present) > len(held):
+            remove_if_empty(place.channelbag, bone_name(place.prefix))
+        return bool(missing) or len(present) > len(held)
 
     def release(self, transforms: Iterable[Transform]) -> None:
         bones = [bone for bone in transforms if bone.motion.mounted or any(map(is_ours, bone.carrier.constraints))]
@@ -130,6 +139,38 @@ class Constraints(Outlet):
         for bone in bones:
             if bone.animated.is_editable:
                 _dismount(bone, shown.get(bone, set()))
+
+
+def remove_orphans(slot: Slot) -> None:
+    """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
+
+    So it is left of a bone that was renamed. What was deleted, keys and all, may come back.
+    """
+    action, channelbag, differences = slot.action, slot.channelbag, slot.bones_channelbag
+    records = action.rigid_motion.slots
+    prefixes = {record.prefix for record in records if record.handle == slot.handle and record.prefix}
+    groups = () if differences is None else differences.groups
+    prefixes |= {prefix_of(group.name) for group in groups}
+    gone = {
+        prefix
+        for prefix in prefixes
+        if all(user.pose is None or bone_name(prefix) not in user.pose.bones for user in slot.users)
+    }
+    if gone and channelbag is not None:
+        gone -= {prefix for prefix, prop in (split_path(one.data_path) for one in channelbag.fcurves) if prop in WIDTHS}
+    if not gone:
+        return
+    for bag in (channelbag, differences):
+        for fcurve in list(bag.fcurves) if bag is not None else ():
+            prefix, prop = split_path(fcurve.data_path)
+            if prefix in gone and (bag is differences or prop.startswith(f'constraints["{CONSTRAINT}')):
+                bag.fcurves.remove(fcurve)
+    for number, record in reversed(list(enumerate(records))):
+        if record.handle == slot.handle and record.prefix in gone:
+            records.remove(number)
+    for group in [group for group in groups if not group.channels]:
+        differences.groups.remove(group)
+    _remove_slot_if_empty(slot)
 
 
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
@@ -209,6 +250,13 @@ def _is_mounted(user: Transform, place: SlotTransform) -> bool:
     return (constraint.name, constraint.frame_start, constraint.frame_end) == (_name(place), *_span(place))
 
 
+def _has_stale(user: BoneTransform) -> bool:
+    """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
+    shown = [_shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
+    actions = set(actions_of(user.animated))
+    return len(set(shown)) < len(shown) or any(action not in actions for action, _ in shown)
+
+
 def _is_free_to_mount(user: Transform, place: SlotTransform) -> bool:
     """Whether a bone lacks a constraint that nobody took off it."""
     name = _name(place)
@@ -257,10 +305,14 @@ def _dismount(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> 
 
 
 def _span(place: SlotTransform) -> tuple[int, int]:
-    """The frames of the first and the last sample."""
+    """The frames that an evaluation time of 0 and one of 1 stand for."""
     points = next(iter(place.filled.values())).sampled_points
-    first = math.floor(points[0].co[0])
-    return first, first + len(points) - 1
+    return 0, _duration(math.ceil(points[len(points) - 1].co[0]))
+
+
+def _duration(last: int) -> int:
+    """The power of two that this frame of the samples is not behind."""
+    return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
 
 
 def _name(place: SlotTransform) -> str:
@@ -268,19 +320,76 @@ def _name(place: SlotTransform) -> str:
     return (record is not None and record.constraint) or CONSTRAINT
 
 
+def _constraint_path(place: SlotTransform, name: str) -> str:
+    return f'{place.prefix}constraints["{name}"]'
+
+
 def _time_path(place: SlotTransform) -> str:
-    return f'{place.prefix}constraints["{_name(place)}"].eval_time'
+    return f"{_constraint_path(place, _name(place))}.eval_time"
 
 
-def _times(place: SlotTransform) -> Iterator[tuple[Channel, bpy.types.FCurve]]:
-    """The channels of evaluation times: of its own constraint, and of those that it holds."""
-    begin = f'{place.prefix}constraints["{CONSTRAINT}'
-    return ((channel, fcurve) for channel, fcurve in list(place.curves.items()) if channel[0].startswith(begin))
+def _influence_path(place: SlotTransform) -> str:
+    return f"{_constraint_path(place, _name(place))}.influence"
 
 
 def _time(place: SlotTransform) -> bpy.types.FCurve | None:
     """The channel of its own constraint's evaluation time."""
-    return place.curves.get((_time_path(place), 0))
+    return place.curves.get((_time_path(place), 0)) if place.filled else None
+
+
+Line = tuple[float, float]
+"""What a channel is at frame 0, and by how much it grows in a frame."""
+
+
+def _held(place: SlotTransform) -> dict[Channel, Line]:
+    """What an Action has of constraints in the NLA of a rig: of its own the influence, of the others the time too."""
+    user = place.users[0]
+    if not (len(user.animated.animation_data.nla_tracks) and _moves_bone(place)):
+        return {}
+    held: dict[Channel, Line] = {}
+    others = [other for other in slot_transforms_of([user]) if not _is_same(other, place) and _moves_bone(other)]
+    for other in others:
+        if other.filled:
+            held[_influence_path(other), 0] = (0.0, 0.0)
+            held[_time_path(other), 0] = _time_seen_from(place, other, user.animated)
+    if others and place.filled:
+        held[_influence_path(place), 0] = (1.0, 0.0)
+    return held
+
+
+def _moves_bone(place: SlotTransform) -> bool:
+    return any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves)
+
+
+def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.Object) -> Line:
+    """The time of another Action's constraint at frames of this one; of its first frame, where there is no one time."""
+    line = next((_line_of(fcurve) for fcurve in (_time(other),) if fcurve is not None), None)
+    own, others = (_frames_of(rig, one.slot) for one in (place, other))
+    if line is None or own is None or others is None:
+        return 0.0, 0.0
+    # From this Action's frames to the scene's, on to the other's, and on to its time.
+    (begin, speed), (other_begin, other_speed), (time, rate) = own, others, line
+    return (
+        time + rate * (begin - other_begin) / other_speed,
+        rate * speed / other_speed,
+    )
+
+
+def _frames_of(rig: bpy.types.Object, slot: Slot) -> Line | None:
+    """The scene's frames by those of an Action, where it plays once."""
+    data = rig.animation_data
+    lines: list[Line | None] = []
+    if (data.action, data.action_slot_handle) == (slot.action, slot.handle):
+        lines.append((0.0, 1.0))
+    for strip in strips_of(rig):
+        if (strip.action, strip.action_slot_handle) == (slot.action, slot.handle) and not strip.mute:
+            if strip.repeat > 1.0 or strip.use_animated_time:
+                lines.append(None)
+            elif strip.use_reverse:
+                lines.append((strip.frame_start + strip.action_frame_end * strip.scale, -strip.scale))
+            else:
+                lines.append((strip.frame_start - strip.action_frame_start * strip.scale, strip.scale))
+    return lines[0] if len(lines) == 1 else None
 
 
 def _write_time(place: SlotTransform, layout: Layout) -> None:
@@ -289,41 +398,62 @@ def _write_time(place: SlotTransform, layout: Layout) -> None:
             return
         _remove_time(place)
     path = _time_path(place)
-    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
     if layout.cycles is None:
-        generator = fcurve.modifiers.new("GENERATOR")
-        generator.poly_order = 1
-        generator.coefficients = _line(layout)
-    else:
-        replace_keys(fcurve, np.array((layout.first, layout.last)), np.array((0.0, 1.0)))
-        add_cycles(fcurve, _without_offset(layout.cycles))
+        _write_line(place, path, _line(layout))
+        return
+    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+    frames, times = np.array(_seams(layout)).T
+    replace_keys(fcurve, frames, times)
+    add_cycles(fcurve, _without_offset(layout.cycles))
     put_away(place.channelbag, bone_name(place.prefix), fcurve)
+
+
+def _write_line(place: SlotTransform, path: str, line: Line) -> None:
+    """An F-curve that is a line, without keys."""
+    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+    generator = fcurve.modifiers.new("GENERATOR")
+    generator.poly_order = 1
+    generator.coefficients = line
+    put_away(place.channelbag, bone_name(place.prefix), fcurve)
+
+
+def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
+    """The line that an F-curve is, None where it is none, or has been changed."""
+    modifiers = list(fcurve.modifiers)
+    plain = len(modifiers) == 1 and not (fcurve.mute or len(fcurve.keyframe_points) or len(fcurve.sampled_points))
+    if not plain or modifiers[0].type != "GENERATOR" or modifiers[0].mute or modifiers[0].poly_order != 1:
+        return None
+    return tuple(modifiers[0].coefficients)
+
+
+def _is_line(fcurve: bpy.types.FCurve, line: Line) -> bool:
+    return _line_of(fcurve) == tuple(np.float32(line).tolist())
 
 
 def _says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
     """Whether an evaluation time goes through the samples as they lie."""
-    if fcurve.mute or len(fcurve.modifiers) != 1 or len(fcurve.sampled_points):
-        return False
-    (modifier,) = fcurve.modifiers
     if layout.cycles is None:
-        return (
-            modifier.type == "GENERATOR"
-            and not modifier.mute
-            and not fcurve.keyframe_points
-            and tuple(modifier.coefficients) == tuple(np.float32(_line(layout)).tolist())
-        )
-    cycles = _without_offset(layout.cycles)
-    return (
-        modifier.type == "CYCLES"
-        and [tuple(key.co) for key in fcurve.keyframe_points] == [(layout.first, 0.0), (layout.last, 1.0)]
-        and cycles == Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
+        return _is_line(fcurve, _line(layout))
+    modifiers = list(fcurve.modifiers)
+    if fcurve.mute or [modifier.type for modifier in modifiers] != ["CYCLES"]:
+        return False
+    (modifier,) = modifiers
+    cycles = Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
+    return cycles == _without_offset(layout.cycles) and np.array_equal(
+        [key.co for key in fcurve.keyframe_points], np.float32(_seams(layout))
     )
 
 
-def _line(layout: Layout) -> tuple[float, float]:
-    """The coefficients of the line from 0 on the first frame to 1 on the last."""
-    duration = max(layout.last - layout.first, 1)
-    return -layout.first / duration, 1.0 / duration
+def _line(layout: Layout) -> Line:
+    """From frames to the evaluation times of their samples."""
+    duration = _duration(layout.last + layout.shift)
+    return layout.shift / duration, 1.0 / duration
+
+
+def _seams(layout: Layout) -> list[tuple[float, float]]:
+    """The outermost frames, and the evaluation times of their samples."""
+    start, step = _line(layout)
+    return [(frame, start + step * frame) for frame in (layout.first, layout.last)]
 
 
 def _without_offset(cycles: Cycles) -> Cycles:
@@ -373,13 +503,13 @@ def _channelbag(place: SlotTransform) -> bpy.types.ActionChannelbag:
     return action.layers[0].strips[0].channelbag(slot, ensure=True)
 
 
-def _remove_slot_if_empty(place: SlotTransform) -> None:
-    channelbag = place.slot.bones_channelbag
+def _remove_slot_if_empty(slot: Slot) -> None:
+    channelbag = slot.bones_channelbag
     if channelbag is not None and not len(channelbag.fcurves):
-        action, handle = _slot_of_differences(place)
-        action.slots.remove(next(slot for slot in action.slots if slot.handle == handle))
-        pairs = action.rigid_motion.bone_slots
-        pairs.remove(next(number for number, pair in enumerate(pairs) if pair.handle == place.slot.handle))
+        pairs = slot.action.rigid_motion.bone_slots
+        number, pair = next((number, pair) for number, pair in enumerate(pairs) if pair.handle == slot.handle)
+        slot.action.slots.remove(next(one for one in slot.action.slots if one.handle == pair.differences))
+        pairs.remove(number)
 
 
 def _weighted(difference: np.ndarray, influence: float, user: Transform) -> np.ndarray:

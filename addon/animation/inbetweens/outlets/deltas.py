@@ -28,10 +28,11 @@ class Deltas(Outlet):
         for channel in gone:
             del place.curves[channel]
         place.curves.update(curves)
+        place.has_filled(curves)
         if gone:
             self.release(place.users)
 
-    def is_shown(self, place: SlotTransform, source: Source, channels: Collection[Channel]) -> bool:
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
         return all(user.is_noted(channels) for user in place.users)
 
     def prepare(self, place: SlotTransform) -> None:

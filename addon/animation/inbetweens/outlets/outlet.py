@@ -28,8 +28,8 @@ class Outlet(ABC):
         """
 
     @abstractmethod
-    def is_shown(self, place: SlotTransform, source: Source, channels: Collection[Channel]) -> bool:
-        """Whether what is written in these channels, for a source, is to be seen on all users."""
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
+        """Whether what is written in these channels, lying so, is to be seen on all users."""
 
     def prepare(self, place: SlotTransform) -> None:
         """Get users ready that were edited, before Blender evaluates them with what is written."""

@@ -72,6 +72,7 @@ def hold_constants(place: SlotTransform, group: str, present: Curves, held: Mapp
         place.curves.pop(channel, None)
     curves, _ = replace_samples(place.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)))
     place.curves.update(curves)
+    place.has_filled(curves)
     return True
 
 

@@ -1,0 +1,343 @@
+"""Every mode on pose bones and every frame, against matrices worked out apart and the same rig with real keys."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import modes_of, problem_of, set_mode
+from addon.motion import KEYFRAME_MODES
+from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, shown_poses
+from tests.animation.bones.rigs import (
+    FRAMES,
+    INHERIT_SCALES,
+    ORDERS,
+    PLAYED,
+    Rest,
+    in_turn,
+    key_all,
+    key_bone,
+    key_wanted,
+    moving_rig,
+    new_rig,
+    twin_of,
+    wanted_bases,
+    with_edit_bones,
+)
+from tests.animation.oracle import (
+    SMOOTH,
+    assert_shown,
+    curves_of,
+    expected_off_whole_frames,
+    key_frames,
+    shown_worlds,
+    snapshot,
+)
+from tests.animation.scenes import key, new_object
+from tests.thoroughness import sample
+
+MODES = tuple(KEYFRAME_MODES)
+
+SETTINGS: dict[str, dict[str, object]] = {
+    "plain": {},
+    "connected": {"use_connect": True},
+    "no local location": {"use_local_location": False},
+    "no inherited rotation": {"use_inherit_rotation": False},
+    "neither": {"use_local_location": False, "use_inherit_rotation": False},
+    "B-bone": {"bbone_segments": 8, "bbone_rollin": 0.4, "bbone_curveinx": 0.05},
+    **{f"inherits scale {name}": {"inherit_scale": name} for name in INHERIT_SCALES[1:]},
+    **{
+        f"inherits scale {name}, no rotation": {"inherit_scale": name, "use_inherit_rotation": False}
+        for name in INHERIT_SCALES[1:]
+    },
+}
+"""Properties of `bpy.types.Bone` that say how it hangs on its parent."""
+
+
+def pairs(order: str, scale: str | None, setting: str) -> bpy.types.Object:
+    """For each mode a bone of that mode with these settings, whose parent moves in another mode."""
+    settings = tuple(SETTINGS[setting].items())
+    bones = []
+    for place, mode in enumerate(MODES):
+        x = 0.2 * place
+        parent = Rest(f"{mode} parent", (x, 0.1, 0.8), (x + 0.1, 0.2, 1.1), roll=0.3 * place)
+        head = parent.tail if "use_connect" in SETTINGS[setting] else (x, 0.3, 1.0)
+        bones += [parent, Rest(mode, head, (x, 0.4, 1.2), parent.name, roll=1.0 - place, settings=settings)]
+    rig = new_rig("Rig", bones, order)
+    for pose_bone in rig.pose.bones:
+        key_bone(pose_bone, scale=scale, location="use_connect" not in SETTINGS[setting] or pose_bone.parent is None)
+    for place, mode in enumerate(MODES):
+        set_mode(rig.pose.bones[mode], mode)
+        set_mode(rig.pose.bones[f"{mode} parent"], MODES[place - 3])
+    return rig
+
+
+@pytest.mark.parametrize(("setting", "order"), in_turn(SETTINGS, ORDERS))
+def test_every_mode_is_exact_in_every_setting_on_every_frame(live_file, order, setting):
+    rig = pairs(order, "even", setting)
+    keys = [snapshot(pose_bone) for pose_bone in rig.pose.bones]
+    assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
+    bases, twin = wanted_bases(rig, PLAYED), twin_of(rig)
+    key_wanted(twin, rig, PLAYED, bases)
+    shown, real = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, expected_poses(rig, PLAYED, bases))
+    assert_same_poses(rig, PLAYED, shown, real)
+    assert [snapshot(pose_bone) for pose_bone in rig.pose.bones] == keys, "keys of the animator are left alone"
+
+
+@pytest.mark.parametrize(
+    ("setting", "order"), in_turn(["plain", *(name for name in SETTINGS if "inherits scale" in name)], ORDERS)
+)
+def test_below_parents_that_are_scaled_unevenly_bones_move_as_with_real_keys(live_file, order, setting):
+    rig = pairs(order, "uneven", setting)
+    twin = twin_of(rig)
+    key_wanted(twin, rig, PLAYED)
+    shown, wanted = shown_poses([rig, twin], PLAYED)
+    assert_same_poses(rig, PLAYED, shown, wanted)
+
+
+@pytest.mark.parametrize("order", sample(ORDERS))
+def test_the_modes_are_to_be_seen(live_file, order):
+    rig = pairs(order, None, "plain")
+    (shown,) = shown_poses([rig], PLAYED)
+    set_mode(list(rig.pose.bones), "BLENDER")
+    (native,) = shown_poses([rig], PLAYED)
+    assert all(np.abs(shown[name] - native[name]).max() > 1e-2 for name in shown), "or these tests say nothing"
+    assert_posed(rig, PLAYED)
+
+
+def test_what_is_only_drawn_or_locked_makes_no_difference(live_file):
+    rig = key_all(new_rig(), scale="even")
+    shape = new_object("Shape", data=bpy.data.meshes.new("Shape"))
+    hand = rig.pose.bones["Hand"]
+    hand.custom_shape, hand.custom_shape_transform = shape, rig.pose.bones["Upper"]
+    for name in ("use_transform_at_custom_shape", "use_transform_around_custom_shape"):
+        if hasattr(hand, name):
+            setattr(hand, name, True)
+    lower = rig.pose.bones["Lower"]
+    lower.lock_location, lower.lock_rotation, lower.lock_scale = [(True, False, True)] * 3
+    lower.lock_rotation_w, lower.lock_rotations_4d = True, True
+    rig.data.display_type = "BBONE"
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
+    assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "mode"), in_turn(["BEZIER", "LINEAR", "CONSTANT", "SINE", "BOUNCE", "ELASTIC", "BACK"], MODES)
+)
+def test_easings_time_the_motion_of_bones(live_file, mode, interpolation):
+    assert_posed(moving_rig(mode, interpolation=interpolation, scale="even"), PLAYED)
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(MODES, ORDERS))
+def test_keys_may_be_anywhere(live_file, mode, order):
+    frames = (-31.0, -30.0, -12.25, -0.5, 0.75, 1.5, 22.0, 22.125, 61.9)
+    rig = moving_rig(mode, order, frames=frames)
+    hand = rig.pose.bones["Hand"]
+    curve = curves_of(hand)["location", 1]
+    for point in list(curve.keyframe_points)[2:5]:
+        point.co_ui.x += 0.4
+    curve.update()
+    bpy.context.view_layer.update()
+    played = np.arange(-36.0, 70.0)
+    assert len(key_frames(hand)) == len(frames) + 3
+    assert_posed(rig, played)
+
+
+@pytest.mark.parametrize("mode", [mode for mode in MODES if mode not in SMOOTH])
+def test_between_whole_frames_differences_run_straight(live_file, mode):
+    rig, frames = moving_rig(mode), np.arange(-1.0, 42.0, 0.375)
+    bases = {bone.name: expected_off_whole_frames(bone, frames) for bone in rig.pose.bones}
+    (shown,) = shown_poses([rig], frames)
+    assert_same_poses(rig, frames, shown, expected_poses(rig, frames, bases))
+
+
+KEYED = {
+    "no location": lambda path, index: path != "location",
+    "no rotation": lambda path, index: not path.startswith("rotation"),
+    "one of location": lambda path, index: path != "location" or index == 1,
+    "one angle": lambda path, index: not path.startswith("rotation") or index == 2,
+    "no scale along Z": lambda path, index: (path, index) != ("scale", 2),
+}
+"""Which channels have keys."""
+
+
+@pytest.mark.parametrize(("kept", "mode"), in_turn(KEYED, MODES))
+@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+def test_channels_without_keys_count_as_they_are(live_file, mode, kept, order):
+    rig = key_all(new_rig(rotation_mode=order), scale="even")
+    for pose_bone in rig.pose.bones:
+        pose_bone.location, pose_bone.rotation_euler, pose_bone.scale = (0.1, -0.2, 0.3), (0.4, 0.5, -0.6), (1.2,) * 3
+        pose_bone.rotation_quaternion = (0.8, 0.0, 0.36, 0.48)
+        for (path, index), fcurve in curves_of(pose_bone).items():
+            if not KEYED[kept](path, index):
+                rig.animation_data.action.layers[0].strips[0].channelbags[0].fcurves.remove(fcurve)
+    set_mode(list(rig.pose.bones), mode)
+    assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize("order", sample(ORDERS))
+def test_every_key_may_have_a_mode_of_its_own(live_file, order):
+    rig = key_all(new_rig(rotation_mode=order), frames := (1.0, 9.0, 17.0, 25.0, 33.0, 41.0, 49.0, 57.0, 65.0))
+    for place, pose_bone in enumerate(rig.pose.bones):
+        for number, frame in enumerate(frames[:-1]):
+            set_mode(pose_bone, (*MODES, "BLENDER")[(number + 3 * place) % 8], [frame])
+    hand = rig.pose.bones["Hand"]
+    assert modes_of(hand, np.array(frames[:-1])) == [(*MODES, "BLENDER")[(number + 9) % 8] for number in range(8)]
+    assert_posed(rig, np.arange(-2.0, 70.0))
+
+
+def test_the_mode_of_a_bone_can_be_keyed_as_any_property(live_file):
+    rig = moving_rig("dq_sclerp")
+    hand = rig.pose.bones["Hand"]
+    for frame, mode in ((1, "pga_lerp"), (24, "BLENDER")):
+        hand.rigid_motion.mode = mode
+        assert rig.keyframe_insert('pose.bones["Hand"].rigid_motion.mode', frame=frame)
+    bpy.context.view_layer.update()
+    assert modes_of(hand, np.array(FRAMES)) == ["pga_lerp", "pga_lerp", "BLENDER", "BLENDER"]
+    assert_posed(rig, PLAYED)
+
+
+def test_the_mode_of_a_bone_is_chosen_by_its_property(live_file):
+    rig = key_all(new_rig())
+    for pose_bone, mode in zip(rig.pose.bones, MODES, strict=False):
+        pose_bone.rigid_motion.mode = mode
+    bpy.context.view_layer.update()
+    assert [modes_of(bone, np.array(FRAMES[:1])) for bone in rig.pose.bones] == [[mode] for mode in MODES[:4]]
+    assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_linear_extrapolation_goes_on(live_file, mode):
+    rig = key_all(new_rig(), (21.0, 31.0, 44.0, 60.0), interpolation="LINEAR")
+    for fcurve in curves_of(rig).values():
+        fcurve.extrapolation = "LINEAR"
+    live_file.scene.frame_start, live_file.scene.frame_end = 0, 80
+    set_mode(list(rig.pose.bones), mode)
+    assert_posed(rig, np.arange(81.0))
+
+
+def cyclic(order: str, kind: str, interpolation: str) -> bpy.types.Object:
+    """The arm with keys on frames 31 to 42, which all channels repeat on both sides."""
+    rig = key_all(new_rig(rotation_mode=order), (31.0, 35.0, 42.0), interpolation=interpolation)
+    for fcurve in curves_of(rig).values():
+        modifier = fcurve.modifiers.new("CYCLES")
+        modifier.mode_before = modifier.mode_after = kind
+        fcurve.update()
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 75
+    return rig
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn([mode for mode in MODES if mode not in SMOOTH], ORDERS))
+def test_a_cycle_repeats_the_motion_of_its_first_round(live_file, mode, order):
+    rig = cyclic(order, "REPEAT", "BEZIER")
+    around = np.arange(76.0)
+    set_mode(list(rig.pose.bones), mode)
+    # On a seam the last pose of one round and the first pose of the next are one frame.
+    around = around[(around - 31.0) % 11.0 != 0.0]
+    first = 31.0 + (around - 31.0) % 11.0
+    (shown,) = shown_poses([rig], around)
+    assert_same_poses(rig, around, shown, expected_poses(rig, first))
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "YXZ"])
+@pytest.mark.parametrize("kind", ["REPEAT", "REPEAT_OFFSET", "MIRROR"])
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+def test_cycles_of_bones_are_those_of_objects(live_file, mode, kind, order):
+    rig = cyclic(order, kind, "LINEAR")
+    set_mode(list(rig.pose.bones), mode)
+    around, objects = np.arange(76.0), []
+    for pose_bone in rig.pose.bones:
+        obj = key(new_object(pose_bone.name, order), (31.0, 35.0, 42.0), interpolation="LINEAR")
+        for channel, fcurve in curves_of(obj).items():
+            own = curves_of(pose_bone)[channel]
+            for point, keyed in zip(fcurve.keyframe_points, own.keyframe_points, strict=True):
+                point.co_ui = keyed.co_ui
+            modifier = fcurve.modifiers.new("CYCLES")
+            modifier.mode_before = modifier.mode_after = kind
+            fcurve.update()
+        set_mode(obj, mode)
+        objects.append(obj)
+    bases = dict(zip(rig.pose.bones.keys(), shown_worlds(objects, around), strict=True))
+    (shown,) = shown_poses([rig], around)
+    assert_same_poses(rig, around, shown, expected_poses(rig, around, bases))
+
+
+def test_bones_are_as_exact_where_the_armature_is_scaled_unevenly_moved_and_parented(live_file):
+    parent = key(new_object("Ship", "XYZ"))
+    set_mode(parent, "pga_slerp")
+    rig = key(moving_rig("cga_slerp", scale="even"), scale="uneven")
+    rig.parent = parent
+    rig.scale, rig.location, rig.delta_scale = (0.3, 2.0, 1.1), (100.0, -20.0, 3.0), (1.5, 1.0, 0.2)
+    set_mode(rig, "dq_sclerp")
+    assert_posed(rig, PLAYED)
+    assert problem_of(rig) == ""
+
+
+def test_an_armature_and_its_bones_have_modes_in_one_action(live_file):
+    rig = moving_rig("dq_sclerp", "XYZ")
+    rig.rotation_mode = "QUATERNION"
+    key(rig)
+    set_mode([rig, rig.pose.bones["Hand"]], "pga_lerp")
+    assert_posed(rig, PLAYED)
+    assert_shown([rig], PLAYED)
+    set_mode(rig, "BLENDER")
+    assert_posed(rig, PLAYED)
+    assert_shown([rig], PLAYED)
+
+
+def test_objects_and_bones_of_several_rigs_take_a_mode_at_once(live_file):
+    rigs, obj = (
+        [key_all(new_rig(name, rotation_mode=order)) for name, order in zip("AB", ORDERS[:2], strict=True)],
+        key(new_object()),
+    )
+    set_mode([obj, *(bone for rig in rigs for bone in rig.pose.bones)], "dq_sclerp")
+    for rig in rigs:
+        assert_posed(rig, PLAYED)
+    assert_shown([obj], PLAYED)
+
+
+@pytest.mark.parametrize("order", sample(ORDERS))
+def test_blenders_own_mode_leaves_nothing_behind(live_file, order):
+    rig = key_all(new_rig(rotation_mode=order))
+    (native,), keys = shown_poses([rig], PLAYED), snapshot(rig)
+    action = rig.animation_data.action
+    slots = [slot.identifier for slot in action.slots]
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    set_mode(list(rig.pose.bones), "BLENDER")
+    assert snapshot(rig) == keys
+    assert [slot.identifier for slot in action.slots] == slots
+    assert not any(len(bone.constraints) for bone in rig.pose.bones)
+    (shown,) = shown_poses([rig], PLAYED)
+    assert all(np.array_equal(shown[name], native[name]) for name in native)
+
+
+def test_bone_names_may_hold_any_sign(live_file):
+    names = ('Hand "left"', "a\\b", "hand.L", "pose.bones[0]", "Ärmel", '"]')
+    rest = [Rest(name, (0.2 * i, 0, 1), (0.2 * i, 0.1, 1.2), names[i - 1] if i else "") for i, name in enumerate(names)]
+    rig = key_all(new_rig("Rig", rest))
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    assert_posed(rig, PLAYED)
+    assert {bone.name for bone in rig.pose.bones} == set(names)
+
+
+def test_a_bone_of_a_mode_below_and_above_bones_without(live_file):
+    rig = key_all(new_rig())
+    for bone in rig.pose.bones[1], rig.pose.bones[3]:
+        set_mode(bone, "pga_slerp")
+    assert_posed(rig, PLAYED)
+    assert [len(bone.constraints) for bone in rig.pose.bones] == [0, 1, 0, 1]
+
+
+def test_a_rest_pose_that_is_edited_moves_along(live_file):
+    rig = moving_rig("dq_sclerp")
+
+    def edit(edit_bones: bpy.types.ArmatureEditBones) -> None:
+        edit_bones["Upper"].tail = (0.5, 0.4, 1.8)
+        edit_bones["Lower"].roll, edit_bones["Hand"].parent = 0.3, edit_bones["Body"]
+
+    with_edit_bones(rig, edit)
+    assert rig.pose.bones["Hand"].parent.name == "Body"
+    assert_posed(rig, PLAYED)

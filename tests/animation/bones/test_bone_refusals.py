@@ -1,0 +1,171 @@
+"""Where a bone cannot have a mode it is refused: the message names rig, bone and way out, and nothing changes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import Refused, bake, problem_of, refresh, set_mode
+from tests.animation.bones.poses import assert_posed, shown_poses
+from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig
+from tests.animation.oracle import curves_of, snapshot
+
+Hinder = Callable[[bpy.types.PoseBone], None]
+
+
+def modifier(kind: str, **settings: object) -> Hinder:
+    def add(bone: bpy.types.PoseBone) -> None:
+        added = curves_of(bone)["location", 1].modifiers.new(kind)
+        for name, value in settings.items():
+            setattr(added, name, value)
+
+    return add
+
+
+def driver(path: str, index: int = 0) -> Hinder:
+    def add(bone: bpy.types.PoseBone) -> None:
+        bone.driver_add(path, index).driver.expression = "0.01 * frame"
+
+    return add
+
+
+def turned_by_axis_and_angle(bone: bpy.types.PoseBone) -> None:
+    bone.rotation_mode = "AXIS_ANGLE"
+
+
+def sampled(bone: bpy.types.PoseBone) -> None:
+    curves_of(bone)["location", 2].convert_to_samples(1, 41)
+
+
+def not_a_number(bone: bpy.types.PoseBone) -> None:
+    keys = curves_of(bone)["location", 1].keyframe_points
+    points = np.empty(2 * len(keys), np.float32)
+    keys.foreach_get("co", points)
+    points[5] = np.nan
+    keys.foreach_set("co", points)
+
+
+HINDRANCES: dict[str, tuple[Hinder, str]] = {
+    "axis and angle": (turned_by_axis_and_angle, "turns by axis and angle.*set its rotation mode to Quaternion"),
+    "noise": (modifier("NOISE"), "Location Y has a modifier of type Noise.*mute or remove it, or bake"),
+    "cycles in part": (modifier("CYCLES", use_influence=True, influence=0.5), "restricted range or influence"),
+    "driven location": (driver("location", 2), "Location Z is driven: remove the driver, or bake it"),
+    "driven rotation": (driver("rotation_quaternion", 0), "Rotation Quaternion W is driven"),
+    "driven scale": (driver("scale", 1), "Scale Y is driven"),
+    "sampled keys": (sampled, "Location Z is sampled and has no keys"),
+    "not a number": (not_a_number, "key 3 of Location Y is not a finite number: delete it"),
+}
+"""What to do to a bone, and what it is told."""
+
+
+def state_of(rig: bpy.types.Object) -> tuple:
+    """All that choosing a mode may ever touch, and what is to be seen."""
+    action = rig.animation_data.action
+    return (
+        repr(snapshot(rig)),
+        [(fcurve.data_path, fcurve.array_index) for fcurve in curves_of(rig).values()],
+        [bone.rigid_motion.mode for bone in rig.pose.bones],
+        [[constraint.name for constraint in bone.constraints] for bone in rig.pose.bones],
+        [slot.identifier for slot in action.slots],
+        [(slot.handle, slot.prefix, slot.digest) for slot in action.rigid_motion.slots],
+        [group.name for bag in action.layers[0].strips[0].channelbags for group in bag.groups],
+        sorted(block.name for block in bpy.data.actions),
+        {name: matrices.tobytes() for name, matrices in shown_poses([rig], PLAYED)[0].items()},
+    )
+
+
+@pytest.mark.parametrize("frames", [None, (1.0, 11.0)], ids=["whole bone", "keys"])
+@pytest.mark.parametrize("hindrance", HINDRANCES)
+def test_a_mode_that_cannot_work_is_refused_by_name_and_nothing_changes(live_file, hindrance, frames):
+    rig = key_all(new_rig(), scale="even")
+    hand = rig.pose.bones["Hand"]
+    hinder, message = HINDRANCES[hindrance]
+    hinder(hand)
+    bpy.context.view_layer.update()
+    before = state_of(rig)
+    with pytest.raises(Refused, match=f"^Rig.*Hand.*{message}"):
+        set_mode(hand, "dq_sclerp", frames)
+    assert state_of(rig) == before
+    set_mode(hand, "BLENDER")
+    assert state_of(rig) == before, "Blender's own mode is always to be had"
+    with pytest.raises(Refused):
+        bake(hand)
+    assert state_of(rig) == before
+
+
+@pytest.mark.parametrize("hindrance", HINDRANCES)
+def test_of_several_bones_the_others_take_the_mode(live_file, hindrance):
+    rig = key_all(new_rig(), scale="even")
+    hinder, message = HINDRANCES[hindrance]
+    hinder(rig.pose.bones["Lower"])
+    bpy.context.view_layer.update()
+    refused = []
+    set_mode(list(rig.pose.bones), "dq_sclerp", refused=refused)
+    assert len(refused) == 1
+    assert re.match(f"Rig.*Lower.*{message}", str(refused[0]))
+    for name in ("Body", "Upper", "Hand"):
+        assert rig.pose.bones[name].rigid_motion.mode == "dq_sclerp"
+        assert problem_of(rig.pose.bones[name]) == ""
+    assert_posed(rig, PLAYED, ["Body", "Upper"])
+
+
+@pytest.mark.parametrize("hindrance", HINDRANCES)
+def test_what_comes_in_the_way_later_gives_blenders_own_motion_and_a_reason(live_file, hindrance):
+    rig = moving_rig(scale="even")
+    lower = rig.pose.bones["Lower"]
+    hinder, message = HINDRANCES[hindrance]
+    hinder(lower)
+    bpy.context.view_layer.update()
+    refresh()
+    shown = shown_poses([rig], PLAYED)[0]
+    assert re.match(f"Rig.*Lower.*{message}", problem_of(lower))
+    for constraint in list(lower.constraints):
+        lower.constraints.remove(constraint)
+    bpy.context.view_layer.update()
+    native = shown_poses([rig], PLAYED)[0]
+    assert all(np.array_equal(shown[name], native[name], equal_nan=True) for name in shown)
+    assert_posed(rig, PLAYED, ["Body", "Upper"])
+
+
+@pytest.mark.parametrize("hindrance", ["noise", "driven location", "axis and angle", "cycles in part"])
+def test_in_betweens_are_back_as_soon_as_nothing_is_in_the_way_any_more(live_file, hindrance):
+    rig = moving_rig()
+    lower = rig.pose.bones["Lower"]
+    HINDRANCES[hindrance][0](lower)
+    bpy.context.view_layer.update()
+    assert problem_of(lower) != ""
+    for (path, _), fcurve in curves_of(lower).items():
+        for added in list(fcurve.modifiers):
+            if path == "location":
+                fcurve.modifiers.remove(added)
+    for driven in list(rig.animation_data.drivers):
+        rig.driver_remove(driven.data_path, driven.array_index)
+    lower.rotation_mode = "QUATERNION"
+    bpy.context.view_layer.update()
+    assert problem_of(lower) == ""
+    assert_posed(rig, PLAYED)
+
+
+def test_a_bone_without_keys_takes_a_mode_that_waits_for_them(live_file):
+    rig = new_rig()
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    assert_posed(rig, PLAYED)
+    key_all(rig)
+    bpy.context.view_layer.update()
+    assert {bone.rigid_motion.mode for bone in rig.pose.bones} == {"dq_sclerp"}
+    assert_posed(rig, PLAYED)
+
+
+def test_rotation_orders_that_change_between_bones_of_one_slot_are_told(live_file):
+    rig = moving_rig()
+    copy = rig.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    copy.pose.bones["Hand"].rotation_mode = "XYZ"
+    bpy.context.view_layer.update()
+    refresh()
+    assert_posed(rig, PLAYED)
+    assert re.search("moves by the same Action slot as", problem_of(copy.pose.bones["Hand"]))

@@ -1,0 +1,306 @@
+"""Whatever is done to rigs and Actions, bones show what their keys and modes say by now, and nothing stale is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import modes_of, problem_of, refresh, set_enabled, set_mode
+from tests.animation.bones.poses import assert_posed, assert_same_poses, names_of, shown_poses
+from tests.animation.bones.rigs import (
+    ARM,
+    CONSTRAINT,
+    FRAMES,
+    PLAYED,
+    Rest,
+    key_all,
+    moving_rig,
+    new_rig,
+    own_constraints,
+    select_only,
+    with_edit_bones,
+)
+from tests.animation.oracle import curves_of
+
+Edit = Callable[[bpy.types.Object], None]
+
+
+def assert_nothing_stale(*actions: bpy.types.Action) -> None:
+    """No F-curve is about a bone that no rig has, and differences are only of bones with a mode."""
+    bones = {f"{bone.path_from_id()}." for obj in bpy.data.objects if obj.pose for bone in obj.pose.bones}
+    for action in actions or bpy.data.actions:
+        for layer in action.layers:
+            for strip in layer.strips:
+                for channelbag in strip.channelbags:
+                    for fcurve in channelbag.fcurves:
+                        path = fcurve.data_path
+                        if path.startswith("pose.bones") and (fcurve.is_empty or CONSTRAINT in path):
+                            assert any(path.startswith(bone) for bone in bones), f"{path} in {action.name}"
+
+
+def make_lower_fore(rig: bpy.types.Object) -> None:
+    rig.data.bones["Lower"].name = "Fore"
+
+
+def make_lower_fore_in_edit_mode(rig: bpy.types.Object) -> None:
+    with_edit_bones(rig, lambda edit_bones: setattr(edit_bones["Lower"], "name", "Fore"))
+
+
+def swap_two(rig: bpy.types.Object) -> None:
+    rig.data.bones["Lower"].name = "Spare"
+    rig.data.bones["Upper"].name = "Lower"
+    rig.data.bones["Spare"].name = "Upper"
+
+
+def into_odd_signs(rig: bpy.types.Object) -> None:
+    rig.data.bones["Lower"].name = 'Lower "left" \\ 2'
+
+
+RENAMINGS = {
+    "in Pose Mode": make_lower_fore,
+    "in Edit Mode": make_lower_fore_in_edit_mode,
+    "of two, swapped": swap_two,
+    "with odd signs": into_odd_signs,
+}
+
+
+@pytest.mark.parametrize("rename", RENAMINGS.values(), ids=RENAMINGS)
+def test_a_bone_that_is_renamed_keeps_its_mode(live_file, rename: Edit):
+    rig = moving_rig("dq_sclerp")
+    set_mode(rig.pose.bones["Lower"], "pga_lerp", [FRAMES[0]])
+    before, order = shown_poses([rig], PLAYED)[0], names_of(rig)
+    rename(rig)
+    bpy.context.view_layer.update()
+    renamed = dict(zip(order, names_of(rig), strict=True))
+    wanted = {renamed[name]: matrices for name, matrices in before.items()}
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], wanted)
+    assert_posed(rig, PLAYED)
+    assert {len(held) for held in own_constraints(rig).values()} == {1}
+    assert_nothing_stale()
+    bone = rig.pose.bones[renamed["Lower"]]
+    assert modes_of(bone, np.array(FRAMES[:2])) == ["pga_lerp", "dq_sclerp"]
+    curves_of(bone)["location", 0].keyframe_points[1].co_ui.y += 1.0
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    set_mode(list(rig.pose.bones), "BLENDER")
+    assert_posed(rig, PLAYED)
+    assert not any(own_constraints(rig).values())
+
+
+def test_a_bone_that_is_renamed_while_nothing_is_followed_is_caught_up_with(live_file):
+    rig = moving_rig()
+    set_enabled(False)
+    try:
+        make_lower_fore(rig)
+        bpy.context.view_layer.update()
+    finally:
+        set_enabled(True)
+    refresh()
+    assert_posed(rig, PLAYED)
+    assert_nothing_stale()
+
+
+@pytest.mark.parametrize("deleted", ["Hand", "Lower", "Body"])
+def test_a_bone_that_is_deleted_takes_its_in_betweens_along(live_file, deleted):
+    rig = moving_rig()
+    with_edit_bones(rig, lambda edit_bones: edit_bones.remove(edit_bones[deleted]))
+    bpy.context.view_layer.update()
+    refresh()
+    assert_posed(rig, PLAYED)
+    assert deleted not in {name for held in own_constraints(rig) for name in (held,)}
+    curves_of(rig.pose.bones["Upper"])["location", 0].keyframe_points[1].co_ui.y += 1.0
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+
+
+def test_a_bone_that_is_made_anew_under_the_name_of_a_deleted_one_moves_by_its_keys(live_file):
+    rig = moving_rig()
+    with_edit_bones(rig, lambda edit_bones: edit_bones.remove(edit_bones["Hand"]))
+
+    def make(edit_bones: bpy.types.ArmatureEditBones) -> None:
+        edit_bones.new("Hand").tail = (0.2, 0.3, 0.4)
+
+    with_edit_bones(rig, make)
+    rig.pose.bones["Hand"].rotation_mode = "QUATERNION"
+    bpy.context.view_layer.update()
+    refresh()
+    # Keys that are left of a bone are Blender's to keep, and so the mode in their slot.
+    assert problem_of(rig.pose.bones["Hand"]) == ""
+    assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize("second", ["dq_sclerp", "BLENDER"])
+def test_armatures_that_are_joined_move_on(live_file, second):
+    rig = moving_rig("pga_lerp")
+    others = [Rest(f"Other {rest.name}", rest.head, rest.tail, rest.parent and f"Other {rest.parent}") for rest in ARM]
+    other = key_all(new_rig("Other", others))
+    set_mode(list(other.pose.bones), second)
+    select_only(rig, other)
+    bpy.ops.object.join()
+    bpy.context.view_layer.update()
+    refresh()
+    assert len(rig.pose.bones) == 8
+    assert_posed(rig, PLAYED, [rest.name for rest in ARM])
+    # Blender leaves the keys of what is joined behind: those bones rest, without in-betweens.
+    assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize("action", ["linked", "copied"])
+def test_a_copy_of_a_rig_moves_alike_and_goes_its_own_way(live_file, action):
+    rig = moving_rig()
+    copy = rig.copy()
+    copy.name = "Copy"
+    live_file.scene.collection.objects.link(copy)
+    if action == "copied":
+        copy.animation_data.action = rig.animation_data.action.copy()
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    assert_posed(copy, PLAYED)
+    curves_of(copy.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += 1.0
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    assert_posed(copy, PLAYED)
+    set_mode(list(copy.pose.bones), "pga_lerp")
+    assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == ["pga_lerp" if action == "linked" else "dq_sclerp"]
+    assert_posed(rig, PLAYED)
+    assert_posed(copy, PLAYED)
+    bpy.data.objects.remove(rig)
+    bpy.context.view_layer.update()
+    assert_posed(copy, PLAYED)
+    set_mode(list(copy.pose.bones), "BLENDER")
+    assert_posed(copy, PLAYED)
+    assert not any(own_constraints(copy).values())
+
+
+@pytest.mark.parametrize("linked", [True, False])
+def test_a_rig_is_duplicated_as_in_the_window(live_file, linked):
+    rig = moving_rig()
+    select_only(rig)
+    bpy.ops.object.duplicate(linked=linked)
+    copy = live_file.view_layer.objects.active
+    assert copy != rig
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    assert_posed(copy, PLAYED)
+    set_mode(list(rig.pose.bones), "BLENDER")
+    assert_posed(rig, PLAYED)
+    assert_posed(copy, PLAYED)
+
+
+@pytest.mark.parametrize("first", ["the mode", "the second rig"])
+def test_rigs_that_share_an_action_share_its_modes(live_file, first):
+    rig = key_all(new_rig("One"))
+    other_rests = [
+        Rest(rest.name, rest.head[::-1], rest.tail[::-1], rest.parent, 0.3 * place) for place, rest in enumerate(ARM)
+    ]
+    if first == "the mode":
+        set_mode(list(rig.pose.bones), "dq_sclerp")
+    other = new_rig("Two", other_rests)
+    other.animation_data_create().action = rig.animation_data.action
+    other.animation_data.action_slot = rig.animation_data.action_slot
+    bpy.context.view_layer.update()
+    if first != "the mode":
+        set_mode(list(rig.pose.bones), "dq_sclerp")
+        bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    assert_posed(other, PLAYED)
+    set_mode(other.pose.bones["Hand"], "pga_lerp")
+    assert_posed(rig, PLAYED)
+    assert_posed(other, PLAYED)
+    other.animation_data.action = None
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    set_mode(list(rig.pose.bones), "BLENDER")
+    assert_posed(rig, PLAYED)
+
+
+def two_actions(*modes: str) -> tuple[bpy.types.Object, list[bpy.types.Action]]:
+    """A rig with two Actions, of which it has the second, each with a mode on all bones."""
+    rig, actions = new_rig(), []
+    for seed, mode in enumerate(modes):
+        rig.animation_data_create().action = None
+        key_all(rig, seed=seed)
+        set_mode(list(rig.pose.bones), mode, FRAMES)
+        actions.append(rig.animation_data.action)
+        actions[-1].use_fake_user = True
+    return rig, actions
+
+
+@pytest.mark.parametrize("modes", [("dq_sclerp", "pga_lerp"), ("dq_sclerp", "BLENDER"), ("motor_spline", "dq_sclerp")])
+def test_each_action_that_a_rig_switches_to_shows_its_own_modes(live_file, modes):
+    rig, actions = two_actions(*modes)
+    for action, mode in zip(actions * 2, modes * 2, strict=True):
+        rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
+        bpy.context.view_layer.update()
+        assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:3])) == [mode] * 3
+        assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
+        assert_posed(rig, PLAYED)
+
+
+def test_an_action_that_is_unlinked_leaves_nothing_of_its_modes(live_file):
+    rig = moving_rig()
+    action = rig.animation_data.action
+    action.use_fake_user = True
+    live_file.scene.frame_set(17)
+    rig.animation_data.action = None
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+
+
+def test_an_action_that_is_deleted_leaves_nothing(live_file):
+    rig = moving_rig()
+    live_file.scene.frame_set(17)
+    bpy.data.actions.remove(rig.animation_data.action)
+    bpy.context.view_layer.update()
+    refresh()
+    assert_posed(rig, PLAYED)
+    assert not any(own_constraints(rig).values())
+    key_all(rig, seed=4)
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    assert_posed(rig, PLAYED)
+
+
+def test_all_animation_that_is_cleared_leaves_nothing(live_file):
+    rig = moving_rig()
+    live_file.scene.frame_set(17)
+    rig.animation_data_clear()
+    bpy.context.view_layer.update()
+    refresh()
+    assert_posed(rig, PLAYED)
+
+
+def test_a_copy_of_an_action_has_its_modes_and_its_own_keys(live_file):
+    rig = moving_rig()
+    action = rig.animation_data.action
+    copy = action.copy()
+    rig.animation_data.action = copy
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += 1.0
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    bpy.data.actions.remove(action)
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+    assert {c.action for held in own_constraints(rig).values() for c in held} == {copy}
+
+
+def test_another_slot_of_the_same_action_shows_its_own_modes(live_file):
+    rig = moving_rig("dq_sclerp")
+    data = rig.animation_data
+    action, first = data.action, data.action_slot
+    data.action_slot = second = action.slots.new("OBJECT", "Second")
+    key_all(rig, seed=7)
+    set_mode(list(rig.pose.bones), "pga_lerp")
+    assert_posed(rig, PLAYED)
+    for slot, mode in ((first, "dq_sclerp"), (second, "pga_lerp")):
+        data.action_slot = slot
+        bpy.context.view_layer.update()
+        assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == [mode]
+        assert_posed(rig, PLAYED)
