@@ -83,6 +83,21 @@ def test_the_bones_of_all_rigs_in_pose_mode_are_meant(rig):
     assert modes(rig, "Arm") == modes(other, "Hand") == [SCREW] * 3
 
 
+def test_while_weights_are_painted_for_a_posed_rig_its_bones_are_meant(rig):
+    skin = bpy.data.objects.new("Skin", bpy.data.meshes.new("Skin"))
+    skin.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.collection.objects.link(skin)
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    skin.select_set(True)
+    bpy.context.view_layer.objects.active = skin
+    assert bpy.context.mode == "OBJECT"
+    assert names(targets_of(bpy.context)) == ["Rig", "Skin"]
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    assert names(targets_of(bpy.context)) == ["Rig/Arm", "Rig/Hand"]
+    rig.data.bones.active = rig.data.bones["Arm"]
+    assert active_target(bpy.context) == transform_of(bone(rig, "Arm"))
+
+
 @pytest.mark.parametrize("kind", KEY_EDITORS)
 def test_a_key_editor_means_the_bones_and_objects_whose_channels_it_shows(rig, kind):
     rig.keyframe_insert("location", frame=1)
