@@ -98,7 +98,8 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
-    place = active_place(transform_of(target))
+    transform = transform_of(target)
+    place = active_place(transform, places_of(transform))
     return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
 
 
@@ -164,8 +165,11 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
 
     So it is once somebody has edited what they are in, until the frame changes.
     """
+    if transform.prefix:
+        # What a constraint adds cannot be edited.
+        return False
     place = active_place(transform, places_of(transform))
-    if place is None or place.prefix or place.slot.in_nla:
+    if place is None or place.slot.in_nla:
         # Strips are blended with one another.
         return False
     return any(
