@@ -29,6 +29,7 @@ from .targets import (
     WHOLE,
     each_target,
     grouped_by_frames,
+    is_posing,
     scope_for,
     targets_of,
 )
@@ -39,6 +40,7 @@ from .wording import (
     length,
     listed,
     reduction_summary,
+    spoken_of,
 )
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
@@ -71,7 +73,8 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         if not properties.is_property_set("mode"):
             return super().description(context, properties)
-        return f"{DESCRIPTIONS[properties.mode]}.\nOn: {SCOPE_NAMES[properties.on]}"
+        what = spoken_of(DESCRIPTIONS[properties.mode], "bones" if is_posing(context) else "objects")
+        return f"{what}.\nOn: {SCOPE_NAMES[properties.on]}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self.properties.is_property_set("mode"):

@@ -1,4 +1,4 @@
-"""Two bones in Pose Mode, by hand: pies, keys, Auto Key between keys, undo, the constraint, bake and un-bake.
+"""Two bones in Pose Mode, by hand: pies, keys, Auto Key between keys, undo.
 
 Where the bones are seen is held against `tests.animation.oracle`, which is given their channels as those of an object.
 """
@@ -19,7 +19,6 @@ from tests.gui.driver import Hand, Steps
 FRAMES = (1, 20, 40)
 WHOLE = range(1, 46, 2)
 SCREW, STRAIGHT, SMOOTH = "dq_sclerp", "lerp_slerp", "motor_spline"
-CONSTRAINT = "Rigid Motion"
 
 ALIKE = 2e-5
 """What poses may differ by that are the same, in metres and in parts of a rotation matrix."""
@@ -125,27 +124,32 @@ def assert_as_keyed(*frames: float, name: str = "Hand") -> None:
     np.testing.assert_allclose(shown(name), expected, atol=ALIKE)
 
 
-def scenario(hand: Hand) -> Steps[None]:
-    """An animator has an arm and a hand move by screws, and works on."""
+def pose_the_rig(hand: Hand) -> Steps[bpy.types.Area]:
+    """The rig in the Animation workspace, in Pose Mode with all bones selected, by hand; and the viewport."""
     hand.window.workspace = bpy.data.workspaces["Animation"]
     yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
-    view, sheet = hand.area("VIEW_3D"), hand.area("DOPESHEET_EDITOR")
+    view = hand.area("VIEW_3D")
     view.spaces.active.region_3d.view_distance, view.spaces.active.region_3d.view_location = 5, (0, 0, 1.2)
     make_the_rig()
     bpy.ops.ed.undo_push(message="Rig")
-    yield from chosen(hand, view)
-    yield from key_by_key(hand, view, sheet)
-    yield from posed(hand, view)
-    yield from constraint(hand, view)
-    yield from baked(hand, view)
-
-
-def chosen(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """Pose Mode, all bones, and the screw from the pie; undone and redone."""
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("TAB", ctrl=True)
     assert bpy.context.mode == "POSE", bpy.context.mode
     yield from hand.press("A")
+    return view
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator has an arm and a hand move by screws, and works on."""
+    view = yield from pose_the_rig(hand)
+    sheet = hand.area("DOPESHEET_EDITOR")
+    yield from chosen(hand, view)
+    yield from key_by_key(hand, view, sheet)
+    yield from posed(hand, view)
+
+
+def chosen(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """The screw for all bones from the pie; undone and redone."""
     native = shown()
     yield from hand.pie("T", "E", alt=True, picture="pie")
     for name in ("Arm", "Hand"):
@@ -237,58 +241,3 @@ def only_the_hand(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     yield from hand.wait_until(
         lambda: [one.name for one in bpy.context.selected_pose_bones] == ["Hand"], "the hand alone is selected"
     )
-
-
-def constraint(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """The eye of the constraint in its tab, off and on; taken off, and restored from the panel."""
-    if [one.name for one in bpy.context.selected_pose_bones] != ["Hand"]:
-        yield from only_the_hand(hand, view)
-    bpy.context.scene.frame_set(10)
-    before = shown()
-    properties = hand.area("PROPERTIES")
-    properties.spaces.active.context = "BONE_CONSTRAINT"
-    yield 0.5
-    yield from hand.picture("constraint")
-    eye = yield from hand.find_button(properties, "WINDOW", "enabled", narrow=True)
-    yield from hand.click(eye)
-    assert hand_bone().constraints[CONSTRAINT].mute
-    assert np.abs(shown() - before).max() > APART, "muted, it shows Blender's own in-betweens"
-    yield from hand.open_sidebar(view, "Animation")
-    yield from hand.picture("muted")
-    yield from hand.click(eye)
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
-
-    hand_bone().constraints.remove(hand_bone().constraints[CONSTRAINT])
-    bpy.ops.ed.undo_push(message="Remove Constraint")
-    yield 0.5
-    assert np.abs(shown() - before).max() > APART
-    yield from hand.picture("removed")
-    button = yield from hand.find_button(view, "UI", "rigid_motion.mend")
-    yield from hand.click(button)
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
-    yield from hand.picture("restored")
-    yield from hand.hover(places.centre(places.region(view)))
-    yield from hand.press("Z", ctrl=True)
-    assert CONSTRAINT not in hand_bone().constraints
-    yield from hand.press("Z", ctrl=True, shift=True)
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
-
-
-def baked(hand: Hand, view: bpy.types.Area) -> Steps[None]:
-    """From the menus of Pose Mode, and back: the same poses all the while."""
-    before = shown()
-    yield from hand.open_menu(view, "VIEW3D_MT_pose")
-    yield from hand.picture("pose-menu")
-    yield from hand.choose("Bake to Keys")
-    yield from hand.press("RET")
-    assert key_frames() == [float(frame) for frame in range(1, 41)], key_frames()
-    assert key_frames("Arm") == list(FRAMES)
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
-    yield from hand.picture("baked")
-    yield from hand.click(places.centre(places.region(view)), button="RIGHTMOUSE")
-    yield 0.3
-    yield from hand.picture("context-menu")
-    yield from hand.choose("Un-Bake")
-    assert_as_keyed(*FRAMES)
-    np.testing.assert_allclose(shown(), before, atol=ALIKE)
-    yield from hand.picture("un-baked")
