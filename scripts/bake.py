@@ -1,7 +1,7 @@
 """Bake rigid in-betweens into real keys, or take that back, in .blend files and without a window.
 
-In every file each object with rigid-motion modes gets keys that any program plays; its own keys stay in the file for
-the way back. The result is a new file beside the old one, which stays as it is.
+In every file each object and each pose bone with rigid-motion modes gets keys that any program plays; its own keys
+stay in the file for the way back. The result is a new file beside the old one, which stays as it is.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -38,13 +37,17 @@ except ImportError as error:
 import addon_utils
 
 from addon import animation
-from addon.animation import Refused
-from addon.animation.actions.reading import read
-from addon.animation.actions.records import recorded_mode
-from addon.animation.actions.slots import SlotTransform, slot_transforms_of
-from addon.animation.inbetweens.mode_keys import segment_modes
-from addon.animation.transforms import transform_of
-from addon.motion import KEYFRAME_MODES
+from addon.animation.transforms import BoneTransform, Transform
+from scripts.bake_targets import (
+    Result,
+    baking,
+    described,
+    groups_of,
+    matching,
+    matching_missing,
+    title_of,
+    unbaking,
+)
 from scripts.blend_files import (
     HERE,
     FileProblem,
@@ -75,6 +78,7 @@ examples:
   python scripts/bake.py shot.blend
   python scripts/bake.py shots/*.blend --output farm
   python scripts/bake.py shot.blend --objects 'Camera,Tool*' --step 0.25
+  python scripts/bake.py shot.blend --objects 'Rig/Hand*,Rig/Foot*'
   python scripts/bake.py shot.blend --dry-run
   python scripts/bake.py farm/shot-baked.blend --unbake
   blender --background --python scripts/bake.py -- shot.blend
@@ -102,9 +106,9 @@ missing libraries:
 exit code:
   0    all done, or nothing to do, so that one can go on:
        python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
-  1    some objects or files could not be done, and are named with the reason: a driven channel, an infinite key, a
-       missing library, one damaged file of many, a disk that is full, an --objects NAME that nothing has. The others
-       are done.
+  1    some objects, bones or files could not be done, and are named with the reason: a driven channel, an infinite
+       key, a missing library, one damaged file of many, a disk that is full, an --objects NAME that nothing has. The
+       others are done.
   2    a wrong option, or none of the files could be read: nothing was done
   130  stopped by Ctrl-C, and 143 by SIGTERM: the files that were written by then are whole, nothing else was touched
 """
@@ -119,25 +123,17 @@ class Job:
     """The same where it is done in place."""
 
 
-@dataclass(frozen=True)
-class Action:
-    """What is done to objects: baking, or un-baking."""
-
-    done: str
-    suffix: str
-    concerns: Callable[[bpy.types.Object], bool]
-    """Whether there is something to do to an object, possible or not."""
-
-    act: Callable[[bpy.types.Object], str]
-    """Do it, and say what came of it. May raise `Refused`."""
-
-
 @dataclass
 class Outcome:
     """What became of a file."""
 
-    done: int = 0
+    objects: int = 0
+    bones: int = 0
+    """How many of them were done."""
+
     refused: int = 0
+    """How many objects and bones were not."""
+
     failed: bool = False
     unreadable: bool = False
     incomplete: bool = False
@@ -147,7 +143,11 @@ class Outcome:
     """Where to, or where it would have been."""
 
     matched: set[str] = field(default_factory=set)
-    """Of the names and patterns that were asked for, those that there was an object for."""
+    """Of the names and patterns that were asked for, those that there was an object or a bone for."""
+
+    @property
+    def done(self) -> int:
+        return self.objects + self.bones
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
@@ -156,12 +156,13 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         prog="bake.py", description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE.blend", help="files to bake")
-    parser.add_argument("--unbake", action="store_true", help="give baked objects their own keys back")
+    parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     parser.add_argument(
         "--objects",
         type=_names,
         metavar="NAME,...",
-        help="only these objects; * and ? stand for any letters, as in 'Tool*' (all with modes)",
+        help="only these objects, and of rigs all of their bones; Rig/Hand is one bone; * and ? stand for any letters, "
+        "as in 'Tool*' and 'Rig/*' (all with modes)",
     )
     parser.add_argument("--dry-run", action="store_true", help="do everything but write, and say what would be written")
     keys = parser.add_argument_group("keys")
@@ -187,7 +188,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         parser.error("--in-place saves the files themselves, --output writes others: give one of them")
     if options.output and options.output.exists() and not options.output.is_dir():
         parser.error(f"--output {options.output} is a file: give a folder")
-    options.action = _unbaking() if options.unbake else _baking(options.step or 1.0, options.first, options.last)
+    options.action = unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last)
     try:
         options.jobs = jobs_of(options.files, options.action.suffix, options.output, in_place=options.in_place)
     except ValueError as error:
@@ -246,7 +247,9 @@ def main(arguments: list[str]) -> int:
             seen = [one for one in outcomes if not one.failed]
             unmatched = set(options.objects or ()).difference(*(one.matched for one in outcomes)) if seen else set()
             for name in sorted(unmatched):
-                progress.note(f"bake.py: --objects {name}: no object of that name has anything to be {run.action.done}")
+                progress.note(
+                    f"bake.py: --objects {name}: no object or bone of that name has anything to be {run.action.done}"
+                )
     if not options.dry_run:
         for one in outcomes:
             if one.written is not None:
@@ -262,7 +265,8 @@ def main(arguments: list[str]) -> int:
 def _summary(outcomes: Sequence[Outcome], count: int, options: argparse.Namespace, *, interrupted: bool) -> str:
     """What came of it all, in a line."""
     action, would = options.action, "to be " if options.dry_run else ""
-    done, refused = sum(one.done for one in outcomes), sum(one.refused for one in outcomes)
+    objects, bones = sum(one.objects for one in outcomes), sum(one.bones for one in outcomes)
+    refused = sum(one.refused for one in outcomes)
     written, failed = sum(one.written is not None for one in outcomes), sum(one.failed for one in outcomes)
     idle = len(outcomes) - written - failed
     parts = [f"{written} {would}written"]
@@ -270,7 +274,9 @@ def _summary(outcomes: Sequence[Outcome], count: int, options: argparse.Namespac
     parts += [f"{failed} failed"] if failed else []
     parts += [f"{incomplete} incomplete"] if (incomplete := sum(one.incomplete for one in outcomes)) else []
     parts += [f"{count - len(outcomes)} not reached"] if interrupted else []
-    told = f"{_counted(done, 'object')} {would}{action.done}" + (f", {refused} not" if refused else "")
+    done = [_counted(objects, "object")] if objects or not bones else []
+    done += [_counted(bones, "bone")] if bones else []
+    told = f"{' and '.join(done)} {would}{action.done}" + (f", {refused} not" if refused else "")
     return f"{'Stopped. ' if interrupted else ''}{told}; {_counted(count, 'file')}: {', '.join(parts)}."
 
 
@@ -289,7 +295,7 @@ class _Run:
         self._would = "would be " if options.dry_run else ""
 
     def do(self, job: Job) -> Outcome:
-        """Open a file, do its objects, and write it."""
+        """Open a file, do what is in it, and write it."""
         outcome = Outcome()
         try:
             if job.output != job.source:
@@ -319,35 +325,62 @@ class _Run:
     def _do_objects(self, job: Job, outcome: Outcome, missing: Missing) -> None:
         overridden = only_overridden()
         for obj in [obj for obj in bpy.data.objects if obj not in overridden]:
-            matching = self._matching(obj.name)
-            if not matching or not (obj in missing.reasons or self.action.concerns(obj)):
+            if obj in missing.reasons:
+                fitting = {"*"} if self._asked is None else matching_missing(obj, self._asked)
+                if fitting:
+                    self._begin(job, outcome, fitting)
+                    self._refuse(job, outcome, obj.name, missing.reasons[obj])
                 continue
-            if not outcome.matched:  # Only a file in which there is something to do is written.
-                refuse_read_only(job.output)
-            outcome.matched |= matching
-            name = obj.name
-            try:
-                if obj in missing.reasons:
-                    raise Refused(missing.reasons[obj])
-                _refuse_linked(obj)
-                told = self.action.act(obj)
-            except Refused as refusal:
-                outcome.refused += 1
-                reason = str(refusal).removeprefix(f"{name}: ")
-                self._note(f"{job.source}: {name}: not {self.action.done}: {reason}")
-            else:
-                outcome.done += 1
-                self._note(f"{job.source}: {name}: {self._would}{self.action.done}{told}")
-            self._stop_if_asked()
+            for targets in groups_of(obj):
+                fitting = {
+                    target: {"*"} if self._asked is None else matching(target, self._asked) for target in targets
+                }
+                concerned = self.action.concerned([target for target, names in fitting.items() if names])
+                if concerned:
+                    self._begin(job, outcome, set().union(*(fitting[target] for target in concerned)))
+                    self._do_targets(job, outcome, concerned)
+                    self._stop_if_asked()
 
-    def _matching(self, name: str) -> set[str]:
-        """The names and patterns asked for that an object's name fits; without any it fits all the same."""
-        asked = self.options.objects
-        return {"*"} if asked is None else {one for one in asked if name == one or fnmatchcase(name, one)}
+    @property
+    def _asked(self) -> list[str] | None:
+        return self.options.objects
+
+    def _begin(self, job: Job, outcome: Outcome, fitting: set[str]) -> None:
+        """Note which names and patterns there is something to do for."""
+        if not outcome.matched:  # Only a file in which there is something to do is written.
+            refuse_read_only(job.output)
+        outcome.matched |= fitting
+
+    def _do_targets(self, job: Job, outcome: Outcome, targets: Sequence[Transform]) -> None:
+        """Do an object, or bones of a rig."""
+        library = targets[0].animated.library
+        if library is not None:
+            reason = f"it is linked from {library.filepath}: use --in-place on that file, or make it local"
+            self._refuse(job, outcome, title_of(targets), reason, len(targets))
+            return
+        result = self.action.act(targets)
+        for target, reason in result.refused.items():
+            self._refuse(job, outcome, target.name, reason)
+        if result.done:
+            self._tell_done(job, outcome, result)
+
+    def _refuse(self, job: Job, outcome: Outcome, name: str, reason: str, count: int = 1) -> None:
+        outcome.refused += count
+        self._note(f"{job.source}: {name}: not {self.action.done}: {reason}")
+
+    def _tell_done(self, job: Job, outcome: Outcome, result: Result) -> None:
+        targets = list(result.done)
+        if isinstance(targets[0], BoneTransform):
+            outcome.bones += len(targets)
+        else:
+            outcome.objects += len(targets)
+        span = f", {result.span}" if result.span else ""
+        told = f"{self._would}{self.action.done}{span}{described(result.done)}"
+        self._note(f"{job.source}: {title_of(targets)}{' ' if len(targets) > 1 else ': '}{told}")
 
     def _finish(self, job: Job, outcome: Outcome) -> None:
         if not outcome.done:
-            why = "no object could be" if outcome.refused else "nothing to be"
+            why = "nothing could be" if outcome.refused else "nothing to be"
             self._note(f"{job.source}: {why} {self.action.done}; left alone")
             return
         if (before := bpy.data.version[:2]) < HERE:
@@ -358,56 +391,6 @@ class _Run:
             write_file(job.source, job.output, self._stop_if_asked)
         self._note(f"{job.source}: {self._would}written to {job.output}")
         outcome.written = job.output
-
-
-def _baking(step: float, first: float | None, last: float | None) -> Action:
-    def bake(obj: bpy.types.Object) -> str:
-        if problem := animation.problem_of(obj):
-            raise Refused(problem)
-        modes = _labels(obj)
-        begin, end = animation.bake(obj, step=step, first=first, last=last)
-        return f", frames {begin:g} to {end:g}, {', '.join(modes)}"
-
-    return Action("baked", "-baked", has_rigid_segments, bake)
-
-
-def _unbaking() -> Action:
-    def unbake(obj: bpy.types.Object) -> str:
-        animation.unbake(obj)
-        return f", {', '.join(_labels(obj))}"
-
-    return Action("un-baked", "-unbaked", animation.is_baked, unbake)
-
-
-def has_rigid_segments(obj: bpy.types.Object) -> bool:
-    """Whether an object is to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
-    for place in slot_transforms_of([transform_of(obj)]):
-        try:
-            if read(place).is_live:
-                return True
-        except ValueError:
-            if segment_modes(place) and _has_mode(place):
-                return True
-    return False
-
-
-def _has_mode(place: SlotTransform) -> bool:
-    """Whether there is any mode but Blender's own in a slot, also one that this version does not know."""
-    channel = place.curves.get(place.users[0].mode_channel)
-    if channel is None or channel.mute or not len(channel.keyframe_points):
-        return recorded_mode(place) != 0
-    return any(not abs(key.co.y) < 0.5 for key in channel.keyframe_points)
-
-
-def _labels(obj: bpy.types.Object) -> list[str]:
-    """The modes of an object's segments as Blender's menus show them, each once."""
-    modes = dict.fromkeys(mode for place in slot_transforms_of([transform_of(obj)]) for mode in segment_modes(place))
-    return [KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in modes]
-
-
-def _refuse_linked(obj: bpy.types.Object) -> None:
-    if obj.library is not None:
-        raise Refused(f"it is linked from {obj.library.filepath}: use --in-place on that file, or make it local")
 
 
 @contextmanager
@@ -451,7 +434,7 @@ def _stopped_between_steps() -> Iterator[Callable[[], None]]:
 def _names(text: str) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
-        raise argparse.ArgumentTypeError("name an object, or several as in Camera,'Tool*'")
+        raise argparse.ArgumentTypeError("name an object, or several as in Camera,'Tool*','Rig/*'")
     return names
 
 

@@ -5,9 +5,9 @@
     python scripts/benchmark_live.py --only choosing shots
     python scripts/benchmark_live.py --output docs/benchmark_live.md
 
-Scenes of objects with location and rotation keys, as Blender inserts them, in the screw mode. The same work is done
-in turns with and without rigid motion, so that a machine that slows down slows both; figures are medians, and the
-fastest. What counts are the ratios. Where the project has set itself a goal, it is beside what was measured, met or
+Scenes of objects, and a rig, with location and rotation keys, as Blender inserts them, in the screw mode. The same work
+is done in turns with and without rigid motion, so that a machine that slows down slows both; figures are medians, and
+the fastest. What counts are the ratios. Where the project has set itself a goal, it is beside what was measured, met or
 missed.
 """
 
@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from addon import animation
 from scripts.live_benchmark.baking import long_bakes
 from scripts.live_benchmark.everyday import everyday
+from scripts.live_benchmark.rigs import RigSize, rigs
 from scripts.live_benchmark.scenes import Size
 from scripts.live_benchmark.shots import choosing, shots
 from scripts.publishing import opening, publish
@@ -34,6 +35,9 @@ CHOOSING = Size(400, 10, 1000)
 
 SHOT = Size(300, 20, 2000)
 """All of these are edited, and saved."""
+
+RIG = RigSize(100, 10, 1000, vertices=20_000)
+"""One of its bones is edited, all are filled in anew, and it is played."""
 
 LONG = (Size(1, 200, 50_000), Size(1, 200, 100_000))
 """These are baked."""
@@ -50,6 +54,7 @@ def main(arguments: list[str] | None = None) -> int:
         "everyday": "edits and playback of a scene",
         "choosing": f"a mode for {CHOOSING}",
         "shots": f"edits and files of {SHOT}",
+        "rigs": f"edits and playback of a rig of {RIG}",
         "baking": " and ".join(f"{size.frames}" for size in LONG) + " frames of one object",
     }
     parser.add_argument(
@@ -70,6 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
         "everyday": partial(everyday, Size(options.objects, options.keys, options.frames), options.rounds),
         "choosing": partial(choosing, CHOOSING, few),
         "shots": partial(shots, SHOT, few),
+        "rigs": partial(rigs, RIG, options.rounds),
         "baking": partial(long_bakes, LONG, 2 * few),
     }
     lines = opening("Benchmark of live in-betweens", command, __doc__, Blender=bpy.app.version_string)

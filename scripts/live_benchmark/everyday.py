@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import bpy
 
 from addon import animation
 
-from .scenes import MODE, ROTATION_MODES, NativeBaking, Size, all_frames, new_empty, scene_of, set_modes
-from .turns import Seconds, in_turns
+from .scenes import MODE, ROTATION_MODES, NativeBaking, Size, all_frames, forget_digests, new_empty, scene_of, set_modes
+from .turns import Seconds, in_turns, told_in_ms
 
 WARMING = 8
 """Edits in a row, unmeasured and then measured."""
@@ -32,10 +32,7 @@ def rows(objects: list[bpy.types.Object], rounds: int) -> list[str]:
     """The measurements of one scene as rows of a table."""
 
     def row(what: str, ours: list[float], peer: str, theirs: list[float], ratio: str) -> str:
-        return (
-            f"| {what} | {statistics.median(ours) * 1e3:.2f} ({min(ours) * 1e3:.2f}) "
-            f"| {peer}: {statistics.median(theirs) * 1e3:.2f} ({min(theirs) * 1e3:.2f}) | {ratio} |"
-        )
+        return f"| {what} | {told_in_ms(ours)} | {peer}: {told_in_ms(theirs)} | {ratio} |"
 
     set_modes(objects, MODE)
     lines = []
@@ -67,12 +64,7 @@ def refresh_all(objects: list[bpy.types.Object], rounds: int) -> Seconds:
         if animation.refresh() != len(objects):
             raise RuntimeError("not all objects were filled in")
 
-    def forgotten() -> None:
-        for action in bpy.data.actions:
-            for record in action.rigid_motion.slots:
-                record.digest = ""
-
-    seconds = in_turns(rounds, forget=forgotten, refresh=refreshed)
+    seconds = in_turns(rounds, forget=forget_digests, refresh=refreshed)
     same, default = (NativeBaking(objects, all_frames(), every_channel=every) for every in (False, True))
     contestants = {"same": same.bake, "restore": same.restore, "default": default.bake, "again": default.restore}
     animation.set_enabled(False)
@@ -90,7 +82,7 @@ def edit_one(objects: list[bpy.types.Object], rounds: int) -> Seconds:
         key.co_ui.y += 0.01
         update()
 
-    return _with_and_without(edited, rounds)
+    return with_and_without(edited, rounds)
 
 
 def edit_elsewhere(rounds: int) -> Seconds:
@@ -103,27 +95,30 @@ def edit_elsewhere(rounds: int) -> Seconds:
         other.location.x += 0.01
         update()
 
-    return _with_and_without(edited, rounds)
+    return with_and_without(edited, rounds)
 
 
-def _with_and_without(edited: Callable[[], None], rounds: int) -> Seconds:
-    # What was not followed is caught up with outside of the measured time, and so are the caches that this costs.
+def with_and_without(edited: Callable[[], None], rounds: int, edits: int = WARMING) -> Seconds:
+    """Seconds of an edit, as the mean of several in a row, with and without in-betweens following.
+
+    What was not followed is caught up with outside of the measured time, and so are the caches that this costs.
+    """
     seconds: Seconds = {"live": [], "native": []}
     for _ in range(rounds):
         for name, enabled in (("live", True), ("native", False)):
             animation.set_enabled(enabled)
-            for _ in range(WARMING):
+            for _ in range(edits):
                 edited()
             start = time.perf_counter()
-            for _ in range(WARMING):
+            for _ in range(edits):
                 edited()
-            seconds[name].append((time.perf_counter() - start) / WARMING)
+            seconds[name].append((time.perf_counter() - start) / edits)
     animation.set_enabled(True)
     animation.refresh()
     return seconds
 
 
-def play(objects: list[bpy.types.Object], rounds: int) -> Seconds:
+def play(targets: Sequence[bpy.types.Object | bpy.types.PoseBone], rounds: int) -> Seconds:
     """All frames one after the other, with in-betweens and without."""
     scene = bpy.context.scene
 
@@ -134,9 +129,9 @@ def play(objects: list[bpy.types.Object], rounds: int) -> Seconds:
     seconds: Seconds = {"live": [], "native": []}
     for _ in range(rounds):
         for name, mode in (("live", MODE), ("native", "BLENDER")):
-            set_modes(objects, mode)
+            set_modes(targets, mode)
             start = time.perf_counter()
             played()
             seconds[name].append(time.perf_counter() - start)
-    set_modes(objects, MODE)
+    set_modes(targets, MODE)
     return seconds

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -42,6 +43,8 @@ def planar(random: np.random.Generator, width: int) -> tuple[np.ndarray, np.ndar
     return np.array((x, y, 0.0)), np.array(turned)
 
 
+Target = TypeVar("Target", bpy.types.Object, bpy.types.PoseBone)
+
 Pose = Callable[[np.random.Generator, int], tuple[np.ndarray, np.ndarray]]
 
 MOTIONS: dict[str, Pose] = {"about general axes": general, "in a plane": planar}
@@ -61,17 +64,17 @@ def scene_of(size: Size, rotation_mode: str, pose: Pose = general) -> list[bpy.t
 
 
 def keyed(
-    obj: bpy.types.Object, size: Size, rotation_mode: str, pose: Callable[[int], tuple[np.ndarray, np.ndarray]]
-) -> bpy.types.Object:
+    target: Target, size: Size, rotation_mode: str, pose: Callable[[int], tuple[np.ndarray, np.ndarray]]
+) -> Target:
     """Insert keys of these poses, evenly over the frames."""
     rotation = "rotation_quaternion" if rotation_mode == "QUATERNION" else "rotation_euler"
-    obj.rotation_mode = rotation_mode
+    target.rotation_mode = rotation_mode
     for frame in np.linspace(1, size.frames, size.keys).round():
-        obj.location, turned = pose(len(getattr(obj, rotation)))
-        setattr(obj, rotation, turned)
-        obj.keyframe_insert("location", frame=frame)
-        obj.keyframe_insert(rotation, frame=frame)
-    return obj
+        target.location, turned = pose(len(getattr(target, rotation)))
+        setattr(target, rotation, turned)
+        target.keyframe_insert("location", frame=frame)
+        target.keyframe_insert(rotation, frame=frame)
+    return target
 
 
 def new_empty(name: str) -> bpy.types.Object:
@@ -80,9 +83,16 @@ def new_empty(name: str) -> bpy.types.Object:
     return obj
 
 
-def set_modes(objects: list[bpy.types.Object], mode: str) -> None:
-    animation.set_mode(objects, mode)
+def set_modes(targets: Sequence[bpy.types.Object | bpy.types.PoseBone], mode: str) -> None:
+    animation.set_mode(targets, mode)
     bpy.context.view_layer.update()
+
+
+def forget_digests() -> None:
+    """Have nothing be filled in, for all that the extension knows."""
+    for action in bpy.data.actions:
+        for record in action.rigid_motion.slots:
+            record.digest = ""
 
 
 def all_frames() -> range:
@@ -90,15 +100,23 @@ def all_frames() -> range:
 
 
 class NativeBaking:
-    """Blender's own baking of objects as they are: what they show, to keys in new Actions. And the way back."""
+    """Blender's own baking of objects as they are, or of their bones: what they show, to keys in new Actions. And the
+    way back."""
 
-    def __init__(self, objects: Sequence[bpy.types.Object], frames: range, *, every_channel: bool = False) -> None:
+    def __init__(
+        self,
+        objects: Sequence[bpy.types.Object],
+        frames: range,
+        *,
+        every_channel: bool = False,
+        of_bones: bool = False,
+    ) -> None:
         self.objects, self.frames = objects, frames
         self.played = [(obj.animation_data.action, obj.animation_data.action_slot) for obj in objects]
         self.options = anim_utils.BakeOptions(
             only_selected=False,
-            do_pose=False,
-            do_object=True,
+            do_pose=of_bones,
+            do_object=not of_bones,
             do_visual_keying=True,
             do_constraint_clear=False,
             do_parents_clear=False,

@@ -13,6 +13,11 @@ TABLE = (
     "|---|---:|---:|---:|---:|",
 )
 
+MILLISECONDS = (
+    "| what | Rigid Motion, ms: median (fastest) | beside, ms: median (fastest) | ratio | goal |",
+    "|---|---:|---:|---:|---:|",
+)
+
 
 def in_turns(rounds: int, **contestants: Callable[[], object]) -> Seconds:
     """Seconds of every round of each."""
@@ -31,9 +36,15 @@ def told(seconds: Sequence[float]) -> str:
     return f"{statistics.median(seconds):.3f} s{fastest}"
 
 
-def judged(value: float, goal: float, unit: str = "") -> str:
+def told_in_ms(seconds: Sequence[float]) -> str:
+    """The median and the fastest, in milliseconds."""
+    return f"{statistics.median(seconds) * 1e3:.2f} ({min(seconds) * 1e3:.2f})"
+
+
+def judged(value: float, goal: float, unit: str = "", *, at_least: bool = False) -> str:
     """Whether a figure is within its goal."""
-    return f"at most {goal:g}{unit}: {'met' if value <= goal else 'missed'}"
+    is_met = value >= goal if at_least else value <= goal
+    return f"at {'least' if at_least else 'most'} {goal:g}{unit}: {'met' if is_met else 'missed'}"
 
 
 def against(ours: Sequence[float], theirs: Sequence[float]) -> str:

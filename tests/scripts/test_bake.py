@@ -243,7 +243,7 @@ def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):
 
 def test_a_name_that_nothing_has_is_said(shot, tmp_path, capsys):
     assert run(shot, "--output", tmp_path, "--objects", "Camera,Camra") == 1
-    assert "--objects Camra: no object of that name" in capsys.readouterr().err
+    assert "--objects Camra: no object or bone of that name" in capsys.readouterr().err
     assert (tmp_path / "shot-baked.blend").is_file()
     assert run(shot, "--output", tmp_path, "--objects", "Camra") == 1
     assert "Camra" not in capsys.readouterr().err, "a file that was not looked into may have it"

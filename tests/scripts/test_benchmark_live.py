@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 import pytest
 
@@ -10,11 +11,13 @@ from addon.animation import channelbag_of, read_poses
 from scripts import benchmark_live
 from scripts.live_benchmark.baking import long_bakes
 from scripts.live_benchmark.everyday import everyday
+from scripts.live_benchmark.rigs import RigSize, add_skin, edits, rig_of, rigs
 from scripts.live_benchmark.scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
 from scripts.live_benchmark.shots import KEY, SAMPLE, choosing, file_sizes, samples_of, shot, shots, what_is_left
-from scripts.live_benchmark.turns import against, judged, told
+from scripts.live_benchmark.turns import against, judged, told, told_in_ms
 
 SMALL = Size(3, 5, 40)
+SMALL_RIG = RigSize(12, 5, 40, vertices=400)
 
 
 @pytest.fixture
@@ -170,7 +173,81 @@ def test_native_baking_keys_what_is_shown_and_gives_it_back():
     np.testing.assert_allclose(read_poses(objects[1], frames).positions, shown.positions, atol=1e-6)
 
 
+@pytest.mark.usefixtures("live_file")
+def test_rigs_are_told_beside_native_work_and_their_goals():
+    (rows,) = tables(rigs(SMALL_RIG, 1)).values()
+    told_of = [(row[0], row[4].partition(":")[0]) for row in rows]
+    assert told_of == [
+        *[("one bone edited, and the view updated", "at most 3 ms")] * 2,
+        ("one bone edited of a rig without modes, and the view updated", "at most 3 ms"),
+        ("all in-betweens anew", "at least 50"),
+        ("a mode chosen for all bones, and the view updated", ""),
+        ("a key of each bone edited, and the view updated", ""),
+        ("all frames played, bare armature", "at most 2"),
+        ("all frames played, skin of 400 vertices", "at most 1.3"),
+    ]
+
+
+@pytest.mark.usefixtures("live_file")
+def test_an_edit_of_a_bone_is_measured_with_modes_and_without():
+    rig = rig_of(SMALL_RIG)
+    bones = list(rig.pose.bones)
+    seconds = edits(rig, bones[:1], 2, 1)
+    assert {name: len(rounds) for name, rounds in seconds.items()} == dict.fromkeys(
+        ("without", "native", "live", "paused"), 2
+    )
+    assert {bone.rigid_motion.mode for bone in bones} == {MODE}
+    assert animation.refresh() == 0
+
+
+@pytest.mark.usefixtures("live_file")
+def test_the_rig_is_chains_of_bones_and_its_skin_follows_two_for_each_vertex():
+    rig = rig_of(SMALL_RIG)
+    roots = [bone for bone in rig.data.bones if bone.parent is None]
+    assert [len(root.children_recursive) for root in roots] == [9, 1]
+    assert len(channelbag_of(rig).fcurves) == 12 * 7
+    skin = add_skin(rig, SMALL_RIG.vertices)
+    assert len(skin.data.vertices) == SMALL_RIG.vertices
+    for vertex in skin.data.vertices:
+        assert len(vertex.groups) == 2
+        assert sum(group.weight for group in vertex.groups) == pytest.approx(1.0)
+    still = np.array([vertex.co for vertex in skin.data.vertices])
+    moved = skin.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices
+    assert np.linalg.norm(np.array([vertex.co for vertex in moved]) - still, axis=1).min() > 1e-3
+
+
+@pytest.mark.usefixtures("live_file")
+def test_native_baking_of_bones_keys_what_they_show():
+    rig = rig_of(SMALL_RIG)
+    bone = rig.pose.bones["Bone 3"]
+    set_modes([bone], MODE)
+    shown = shown_matrices(bone)
+    native = NativeBaking([rig], range(1, SMALL_RIG.frames + 1), every_channel=True, of_bones=True)
+    animation.set_enabled(False)
+    native.bake()
+    fcurve = channelbag_of(rig).fcurves.find(bone.path_from_id("location"), index=2)
+    assert len(fcurve.keyframe_points) == SMALL_RIG.frames
+    bone.constraints[0].mute = True
+    np.testing.assert_allclose(shown_matrices(bone), shown, atol=1e-5)
+    bone.constraints[0].mute = False
+    native.restore()
+    # The baking leaves scales behind that are 1 but for rounding.
+    np.testing.assert_allclose(shown_matrices(bone), shown, atol=1e-5)
+
+
+def shown_matrices(bone) -> np.ndarray:
+    """Where a bone is on every frame, in the space of its armature (frames, 4, 4)."""
+    found = []
+    for frame in range(1, SMALL_RIG.frames + 1):
+        bpy.context.scene.frame_set(frame)
+        found.append(np.array(bone.matrix))
+    return np.array(found)
+
+
 def test_figures_are_judged_by_their_goals():
+    assert judged(50.0, 50, at_least=True) == "at least 50: met"
+    assert judged(49.9, 50, at_least=True) == "at least 50: missed"
+    assert told_in_ms([0.003, 0.001, 0.002]) == "2.00 (1.00)"
     assert judged(2.2, 2.2) == "at most 2.2: met"
     assert judged(0.21, 0.2, " s") == "at most 0.2 s: missed"
     assert told([0.3, 0.1, 0.2]) == "0.200 s (0.100)"

@@ -1,0 +1,298 @@
+"""bake.py on rigs: bones are baked and given back beside objects, chosen by name, and told of rig by rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import is_baked, set_mode
+from tests.animation.farm import played_on_a_farm
+from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.scenes import FRAMES, key, new_object
+from tests.scripts.baking import baked_name, extension, new_file, open_again, run, save
+
+PLAYED = np.arange(0.0, 46.0)
+"""From before the first key until after the last."""
+
+HAND = ("Hand", "Thumb", "Index")
+NAMES = ("Root", "Arm", *HAND)
+"""Each the child of the one before, and the fingers both of the hand."""
+
+
+def new_rig(name: str = "Rig", names: Iterable[str] = NAMES) -> bpy.types.Object:
+    """An armature with keyed bones, and an empty at the end of each, called RIG at BONE, that shows where it is."""
+    data = bpy.data.armatures.new(name)
+    rig = new_object(name, data=data)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for number, bone_name in enumerate(names):
+        bone = data.edit_bones.new(bone_name)
+        bone.head, bone.tail = (0.0, 0.1 * number, number), (0.0, 0.1 * number, number + 1.0)
+        bone.parent = parent
+        parent = parent if bone_name in HAND[1:] else bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    random = np.random.default_rng(3)
+    for number, bone in enumerate(rig.pose.bones):
+        bone.rotation_mode = "XYZ" if number == 1 else "QUATERNION"
+        rotation = "rotation_euler" if number == 1 else "rotation_quaternion"
+        for frame in FRAMES:
+            bone.location, turned = random.normal(size=3), random.normal(size=3 if number == 1 else 4)
+            setattr(bone, rotation, turned)
+            bone.keyframe_insert("location", frame=frame)
+            bone.keyframe_insert(rotation, frame=frame)
+        probe = new_object(f"{name} at {bone.name}")
+        probe.parent, probe.parent_type, probe.parent_bone = rig, "BONE", bone.name
+    return rig
+
+
+def rig_file(path: Path, edit: Callable[[bpy.types.Object], object] = lambda rig: None) -> Path:
+    """A file with a rig that moves itself too; all bones but one have a mode, one of them another in one segment."""
+    with extension():
+        new_file()
+        rig = new_rig()
+        key(rig, (5.0, 30.0))
+        set_mode([rig, *(bone for bone in rig.pose.bones if bone.name != "Thumb")], "dq_sclerp")
+        set_mode(rig.pose.bones["Arm"], "motor_spline", FRAMES[1:2])
+        edit(rig)
+        bpy.context.scene.frame_set(17)
+        return save(path)
+
+
+def baked_bones(rig: bpy.types.Object) -> list[str]:
+    return [bone.name for bone in rig.pose.bones if is_baked(bone)]
+
+
+def probes() -> list[str]:
+    return [f"Rig at {name}" for name in NAMES]
+
+
+def test_a_baked_rig_plays_in_any_blender_as_the_live_one_does_with_the_extension(tmp_path):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path) == 0
+    with extension():
+        open_again(path)
+        wanted = shown_worlds([bpy.data.objects[name] for name in ("Rig", *probes())], PLAYED)
+    _, played = played_on_a_farm(baked_name(path), ("Rig", *probes()), PLAYED)
+    np.testing.assert_allclose(played, wanted, atol=1e-4)
+
+
+def test_every_bone_with_a_mode_has_keys_on_every_frame_and_the_others_their_own(tmp_path):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path) == 0
+    with extension():
+        open_again(baked_name(path))
+        rig = bpy.data.objects["Rig"]
+        assert is_baked(rig)
+        assert baked_bones(rig) == [name for name in NAMES if name != "Thumb"]
+        for bone in rig.pose.bones:
+            curve = curves_of(rig)[bone.path_from_id("location"), 0]
+            frames = [point.co.x for point in curve.keyframe_points]
+            assert frames == list(FRAMES if bone.name == "Thumb" else np.arange(1.0, 41.0))
+            assert not len(bone.constraints)
+
+
+def test_un_baking_gives_back_exactly_the_keys_the_modes_and_the_motion(tmp_path):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--output", tmp_path / "farm") == 0
+    assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
+    found = []
+    for one in (path, tmp_path / "farm" / "shot-baked-unbaked.blend"):
+        with extension():
+            open_again(one)
+            rig = bpy.data.objects["Rig"]
+            modes = [animation.modes_of(bone, np.array(FRAMES)) for bone in rig.pose.bones]
+            shown = shown_worlds([bpy.data.objects[name] for name in probes()], PLAYED)
+            found.append((snapshot(rig), modes, shown, [action.name for action in bpy.data.actions]))
+    (keys, modes, shown, actions), (keys_back, modes_back, shown_back, actions_back) = found
+    assert (keys_back, modes_back, actions_back) == (keys, modes, actions)
+    np.testing.assert_allclose(shown_back, shown, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("asked", "bones", "itself"),
+    [
+        ("Rig", ["Root", "Arm", "Hand", "Index"], True),
+        ("R*", ["Root", "Arm", "Hand", "Index"], True),
+        ("Rig/*", ["Root", "Arm", "Hand", "Index"], False),
+        ("Rig/Hand", ["Hand"], False),
+        ("Rig/[AI]*", ["Arm", "Index"], False),
+        ("*/Root,Rig/?rm", ["Root", "Arm"], False),
+    ],
+)
+def test_bones_can_be_chosen_by_rig_and_by_names_and_patterns(tmp_path, asked, bones, itself):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--objects", asked) == 0
+    with extension():
+        open_again(baked_name(path))
+        rig = bpy.data.objects["Rig"]
+        assert (baked_bones(rig), is_baked(rig)) == (bones, itself)
+
+
+def test_bones_can_be_given_back_one_by_one(tmp_path):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--in-place") == 0
+    assert run(path, "--in-place", "--unbake", "--objects", "Rig/Arm,Rig/Hand") == 0
+    with extension():
+        open_again(path)
+        rig = bpy.data.objects["Rig"]
+        assert (baked_bones(rig), is_baked(rig)) == (["Root", "Index"], True)
+        assert rig.pose.bones["Hand"].rigid_motion.mode == "dq_sclerp"
+
+
+def test_a_bone_that_no_rig_has_is_said(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--objects", "Rig/Hand,Rig/Hnad,Rig/Thumb") == 1
+    said = capsys.readouterr().err
+    for name in ("Rig/Hnad", "Rig/Thumb"):
+        assert f"--objects {name}: no object or bone of that name has anything to be baked" in said
+
+
+def test_bones_are_told_of_rig_by_rig_with_their_modes(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend", lambda rig: set_mode(rig.pose.bones["Thumb"], "motor_spline"))
+    assert run(path, "--dry-run") == 0
+    lines = capsys.readouterr().err.splitlines()
+    told = f"{path}: Rig: 5 bones would be baked, frames 1 to 40; 3 Screw (Dual Quaternion); "
+    (line,) = (line for line in lines if line.startswith(told))
+    assert line.removeprefix(told).split("; ") == [
+        "1 Screw (Dual Quaternion), Smooth Screw (PGA)",
+        "1 Smooth Screw (PGA)",
+    ]
+    assert f"{path}: Rig: would be baked, frames 5 to 30, Screw (Dual Quaternion)" in lines
+    assert lines[-1] == "1 object and 5 bones to be baked; 1 file: 1 to be written."
+
+
+def test_few_bones_are_named(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--objects", "Rig/Arm,Rig/Hand,Rig/Index", "--first", "30") == 0
+    assert run(baked_name(path), "--objects", "Rig/Hand", "--unbake") == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert (
+        f"{path}: Rig: 3 bones baked, frames 24 to 40; Screw (Dual Quaternion), Smooth Screw (PGA): Arm; "
+        "Screw (Dual Quaternion): Hand, Index"
+    ) in lines
+    assert f"{baked_name(path)}: Rig/Hand: un-baked, Screw (Dual Quaternion)" in lines
+    assert lines[-1] == "1 bone un-baked; 1 file: 1 written."
+
+
+def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp_path, capsys):
+    def edit(rig: bpy.types.Object) -> None:
+        rig.pose.bones["Index"].rotation_mode = "AXIS_ANGLE"
+        rig.driver_add(rig.pose.bones["Hand"].path_from_id("location"), 1).driver.expression = "frame"
+        for point in curves_of(rig)[rig.pose.bones["Arm"].path_from_id("location"), 0].keyframe_points:
+            point.co_ui.x -= 100.0
+
+    path = rig_file(tmp_path / "shot.blend", edit)
+    assert run(path, "--objects", "Rig/*", "--first", "35") == 1
+    lines = capsys.readouterr().err.splitlines()
+    refused = {line.removeprefix(f"{path}: Rig/").partition(":")[0]: line for line in lines if "not baked" in line}
+    assert list(refused) == ["Hand", "Index"]
+    assert "Location Y is driven" in refused["Hand"]
+    assert "set its rotation mode to Quaternion first" in refused["Index"]
+    assert f"{path}: Rig: 2 bones baked, " in "\n".join(lines)
+    assert lines[-1] == "2 bones baked, 2 not; 1 file: 1 written."
+
+
+def test_bones_whose_keys_are_elsewhere_are_told_from_those_whose_names_begin_alike(tmp_path, capsys):
+    with extension():
+        new_file()
+        rig = new_rig(names=("Arm", "Arm.L", "Arm has"))
+        set_mode(list(rig.pose.bones), "dq_sclerp")
+        for (path, _), curve in curves_of(rig).items():
+            for point in curve.keyframe_points if "Arm.L" in path or "has" in path else ():
+                point.co_ui.x += 100.0
+        path = save(tmp_path / "shot.blend")
+    assert run(path, "--last", "50") == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition(": ")[2].partition(":")[0] for line in lines if "none of them is in that range" in line] == [
+        "Rig/Arm.L",
+        "Rig/Arm has",
+    ]
+    assert f"{path}: Rig/Arm: baked, frames 1 to 40, Screw (Dual Quaternion)" in lines
+
+
+def test_the_bones_of_a_library_override_are_baked_and_given_back(tmp_path):
+    with extension():
+        new_file()
+        new_rig()
+        library = save(tmp_path / "library.blend")
+        new_file()
+        with bpy.data.libraries.load(str(library), link=True, relative=False) as (_, here):
+            here.objects = ["Rig"]
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        rig = here.objects[0].override_create(remap_local_usages=True)
+        rig.animation_data.action = rig.animation_data.action.copy()
+        set_mode(list(rig.pose.bones), "dq_sclerp")
+        wanted, keys = shown_bones(rig), snapshot(rig)
+        path = save(tmp_path / "shot.blend")
+    assert run(path, "--output", tmp_path / "farm") == 0
+    assert run(tmp_path / "farm" / "shot-baked.blend", "--unbake") == 0
+    for name, baked in (("shot-baked", list(NAMES)), ("shot-baked-unbaked", [])):
+        with extension():
+            open_again(tmp_path / "farm" / f"{name}.blend")
+            rig = next(obj for obj in bpy.data.objects if obj.override_library)
+            assert baked_bones(rig) == baked
+            np.testing.assert_allclose(shown_bones(rig), wanted, atol=1e-4)
+    assert snapshot(rig) == keys
+
+
+def shown_bones(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones of a rig are on all frames, in its own space (frames, bones, 4, 4)."""
+    found = []
+    for frame in PLAYED:
+        bpy.context.scene.frame_set(int(frame))
+        found.append([np.array(bone.matrix) for bone in rig.pose.bones])
+    return np.array(found)
+
+
+def test_a_linked_rig_is_named_once_and_says_how_many_bones_it_has(tmp_path, capsys):
+    library = rig_file(tmp_path / "library.blend")
+    with extension():
+        new_file()
+        with bpy.data.libraries.load(str(library), link=True, relative=False) as (_, here):
+            here.objects = ["Rig"]
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        path = save(tmp_path / "shot.blend")
+    assert run(path) == 1
+    lines = [line for line in capsys.readouterr().err.splitlines() if "not baked" in line]
+    assert [line.partition(": not baked: it is linked from ")[0] for line in lines] == [
+        f"{path}: Rig: 4 bones",
+        f"{path}: Rig",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("asked", "counts"), [("Rig", True), ("Rig/Hand", True), ("*/Hand", True), ("Rug/Hand", False), ("Other", False)]
+)
+def test_a_missing_rig_counts_where_bones_of_it_are_asked_for(tmp_path, capsys, asked, counts):
+    library = rig_file(tmp_path / "library.blend")
+    with extension():
+        new_file()
+        with bpy.data.libraries.load(str(library), link=True, relative=False) as (_, here):
+            here.objects = ["Rig"]
+        bpy.context.scene.collection.objects.link(here.objects[0])
+        path = save(tmp_path / "shot.blend")
+    library.unlink()
+    capsys.readouterr()
+    assert run(path, "--objects", asked) == 1
+    said = capsys.readouterr().err
+    assert (f"{path}: Rig: not baked: it is missing from {library}" in said) is counts
+    assert (f"--objects {asked}: no object or bone" in said) is not counts
+
+
+def test_all_bones_of_a_rig_are_baked_in_one_go(tmp_path, monkeypatch):
+    path = rig_file(tmp_path / "shot.blend")
+    calls, real = [], animation.bake
+
+    def counted(targets: list, **options: object) -> tuple[float, float]:
+        calls.append([target.name for target in targets])
+        return real(targets, **options)
+
+    monkeypatch.setattr(animation, "bake", counted)
+    assert run(path) == 0
+    assert calls == [["Rig/Root", "Rig/Arm", "Rig/Hand", "Rig/Index"], ["Rig"]]
