@@ -10,7 +10,7 @@ import bpy
 
 from ..animation import Reduction
 from ..animation.inbetweens.describing import SegmentFacts
-from ..animation.inbetweens.outlets.constraints import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from ..animation.inbetweens.outlets.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from ..animation.properties import MODE_ITEMS
 from ..animation.transforms import BoneTransform, Transform
 

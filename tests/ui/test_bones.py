@@ -8,7 +8,7 @@ import pytest
 
 from addon import animation
 from addon.animation import constraint_trouble, mend, modes_of, set_mode
-from addon.animation.inbetweens.outlets.constraints import (
+from addon.animation.inbetweens.outlets.restoring import (
     CHANGED,
     MUTED,
     NOT_FIRST,

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
+from ..actions.refusals import refuse_linked
 from ..actions.slots import Slot, SlotTransform, uses_of
 from ..transforms import BoneTransform, Refused, Transform, transform_of
 from .acting import Readings, Targets, act_on
-from .outlets import constraints
-from .outlets.constraints import trouble_of
+from .outlets.restoring import restore, trouble_of
 
 
 def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform) -> str:
@@ -19,7 +19,7 @@ def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform
     Returns
     -------
     str
-        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `outlets.constraints`; "" where its
+        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `outlets.restoring`; "" where its
         constraint is as it was made, where there are no in-betweens, and for objects, which need no constraint.
     """
     transform = transform_of(target)
@@ -53,8 +53,7 @@ def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     """
 
     def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
-        if not transform.animated.is_editable:
-            raise Refused(f"{transform.name} is linked from another file: make a library override of its rig first")
+        refuse_linked(transform)
         places = [place for place, _ in readings if place.filled] if isinstance(transform, BoneTransform) else []
         if not places:
             raise Refused(f"{transform.name} has no constraint to restore: choose a mode for keys of a bone first")
@@ -62,7 +61,7 @@ def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
 
     def act(transform: BoneTransform, places: list[SlotTransform]) -> None:
         for place in places:
-            constraints.mend(transform, place)
+            restore(transform, place)
 
     act_on(targets, plan, act, refused)
 

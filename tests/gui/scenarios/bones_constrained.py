@@ -1,4 +1,4 @@
-"""The constraint of a bone in its tab, muted and removed and restored by hand; and bones baked from the menus, and back.
+"""The constraint of a bone in its tab, muted and removed and restored by hand; and bones baked from the menus.
 
 Where the bones are seen is held against `tests.animation.oracle`, as in `bones_by_hand`.
 """
