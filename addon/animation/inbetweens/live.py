@@ -17,7 +17,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..actions.mode_property import adopt_from_properties, show_awaited, show_modes
-from ..actions.reading import differing_users, keyed_in, leading, sources_of_users
+from ..actions.reading import keyed_in, leading
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import (
@@ -32,7 +32,6 @@ from ..actions.sources import Source
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, transform_of
 from . import glances, insertion, known_sources
 from .densification import keep_motion
-from .differences import differences
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
 from .outlets import outlet_of, release, remove_orphans
 
@@ -145,37 +144,6 @@ def follow_original(transform: ObjectTransform) -> None:
             return
         transform.follow_original()
         _refresh(slot_transforms_of([transform]))
-
-
-def problem_of(target: bpy.types.Object | Transform) -> str:
-    """Why something does not move as its mode says, and the way out; "" where nothing is amiss."""
-    transform = transform_of(target)
-    places = slot_transforms_of([transform])
-    try:
-        for place, sources in zip(places, sources_of_users(places), strict=True):
-            source = sources[place.users.index(transform)]
-            if isinstance(source, Refused):
-                raise source
-            refuse_numbers(transform.name, source)
-            if source.is_live:
-                differences([source])
-                _refuse_differing(transform, place, sources)
-    except Refused as problem:
-        return str(problem)
-    except ValueError as problem:
-        return f"{transform.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
-    return ""
-
-
-def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[Source | Refused]) -> None:
-    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
-    if transform in (differing := differing_users(place, sources)):
-        leader = next(user for user in place.users if user not in differing)
-        raise Refused(
-            f"{transform.name} moves by the same Action slot as {leader.name}, but has another rotation mode or delta "
-            f"transform; the in-betweens are those of {leader.name}: give it an Action of its own "
-            "(Object > Relations > Make Single User)"
-        )
 
 
 def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused] | None = None) -> int:
