@@ -17,6 +17,7 @@ from scripts.build_extension import build
 from scripts.workplan.processes import processors
 from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
 from tests.recordings import RECORDINGS
+from tests.rigs import human as rigify
 
 EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 
@@ -126,6 +127,15 @@ def empty_file() -> bpy.types.Context:
     """A new file without objects, at factory settings."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy.context
+
+
+@pytest.fixture
+def human(empty_file: bpy.types.Context) -> bpy.types.Object:
+    """Rigify's human in a new file."""
+    try:
+        return rigify.human()
+    except rigify.NoRigify as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")

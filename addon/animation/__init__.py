@@ -21,8 +21,10 @@ from .baking.reducing import (
     restore_keys,
 )
 from .inbetweens import live
-from .inbetweens.live import problem_of, refresh, set_enabled
+from .inbetweens.live import refresh, set_enabled
+from .inbetweens.mending import constraint_trouble, mend
 from .inbetweens.mode_keys import key_frames, modes_of, set_mode
+from .inbetweens.problems import problem_of
 from .transforms import Refused
 
 __all__ = [
@@ -32,10 +34,12 @@ __all__ = [
     "bake",
     "bake_poses",
     "channelbag_of",
+    "constraint_trouble",
     "discard_dense_keys",
     "is_baked",
     "is_reduced",
     "key_frames",
+    "mend",
     "modes_of",
     "problem_of",
     "radius_of",

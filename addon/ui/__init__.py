@@ -1,11 +1,12 @@
 """What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
 
 targets      the transforms and keys an editor means    operators    what can be done to them
-menus        entries in Blender's menus, and the pies   keymap       the pies' shortcut
-panels       the sidebar                                rows         its lines, aligned
-notes        what the panel notes on a target            shown        the transform seen on the screen
-overlay      paths in the viewport                      look         how they look
-wording      labels and texts                           preferences  of the extension
+on_targets   what these operators have in common        keymap       the pies' shortcut
+menus        entries in Blender's menus, and the pies   panels       the sidebar
+rows         its lines, aligned                         notes        what the panel notes on a target
+shown        the transform seen on the screen           overlay      paths in the viewport
+look         how they look                              wording      labels and texts
+preferences  of the extension
 """
 
 from __future__ import annotations

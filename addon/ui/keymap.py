@@ -5,12 +5,13 @@ from __future__ import annotations
 import bpy
 import rna_keymap_ui
 
-from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_object
+from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_object, RIGID_MOTION_MT_pie_pose
 
 OPERATOR = "wm.call_menu_pie"
 
 PLACES = (
     ("Object Mode", "EMPTY", RIGID_MOTION_MT_pie_object.__name__),
+    ("Pose", "EMPTY", RIGID_MOTION_MT_pie_pose.__name__),
     ("Dopesheet", "DOPESHEET_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
     ("Graph Editor", "GRAPH_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
 )

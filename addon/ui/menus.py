@@ -1,7 +1,7 @@
 """Rigid Motion in Blender's menus, and its pie menus.
 
 In the Dope Sheet and the Graph Editor modes are for the selected keys, as interpolation is; in the viewport for the
-whole object. The mode that is chosen at present is ticked, for the active object.
+whole object, or in Pose Mode for the whole bone. The mode that is chosen at present is ticked, for the active one.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 import bpy
 
-from .targets import CURRENT, SELECTED, WHOLE, active_target, modes_meant
+from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS
 
 
@@ -29,7 +29,7 @@ def _draw_modes(
         properties.mode, properties.on = mode, scope
 
 
-def _draw_rest(layout: bpy.types.UILayout, pie: str) -> None:
+def _draw_rest(layout: bpy.types.UILayout, pie: str, *, posing: bool) -> None:
     layout.separator()
     layout.operator("rigid_motion.bake", text="Bake to Keys...")
     layout.operator("rigid_motion.unbake")
@@ -40,13 +40,18 @@ def _draw_rest(layout: bpy.types.UILayout, pie: str) -> None:
     layout.separator()
     layout.operator("rigid_motion.clear")
     layout.operator("rigid_motion.refresh")
+    if posing:
+        layout.operator("rigid_motion.mend")
     layout.separator()
     layout.operator("wm.call_menu_pie", text="Pie Menu").name = pie
 
 
-class RIGID_MOTION_MT_object(bpy.types.Menu):
+class _InView:
+    """For all that is selected in a viewport."""
+
     bl_label = "Rigid Motion"
-    bl_description = "How the selected objects move from key to key"
+    pie: str
+    posing: bool
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
@@ -54,25 +59,38 @@ class RIGID_MOTION_MT_object(bpy.types.Menu):
         _draw_modes(context, layout, WHOLE)
         layout.separator()
         layout.menu(RIGID_MOTION_MT_current.__name__)
-        _draw_rest(layout, RIGID_MOTION_MT_pie_object.__name__)
+        _draw_rest(layout, self.pie, posing=self.posing)
+
+
+class RIGID_MOTION_MT_object(_InView, bpy.types.Menu):
+    bl_description = "How the selected objects move from key to key"
+    pie = "RIGID_MOTION_MT_pie_object"
+    posing = False
+
+
+class RIGID_MOTION_MT_pose(_InView, bpy.types.Menu):
+    bl_description = "How the selected bones move from key to key"
+    pie = "RIGID_MOTION_MT_pie_pose"
+    posing = True
 
 
 class RIGID_MOTION_MT_keys(bpy.types.Menu):
     bl_label = "Rigid Motion"
-    bl_description = "How objects move on from the selected keys"
+    bl_description = "How objects and bones move on from the selected keys"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.operator_context = "INVOKE_REGION_WIN"
         _draw_modes(context, layout, SELECTED)
         layout.separator()
-        layout.menu(RIGID_MOTION_MT_whole.__name__)
-        _draw_rest(layout, RIGID_MOTION_MT_pie_keys.__name__)
+        posing = is_posing(context)
+        layout.menu(RIGID_MOTION_MT_whole.__name__, text="Whole Bone" if posing else "Whole Object")
+        _draw_rest(layout, RIGID_MOTION_MT_pie_keys.__name__, posing=posing)
 
 
 class RIGID_MOTION_MT_current(bpy.types.Menu):
     bl_label = "Current Segment"
-    bl_description = "How the selected objects move between the two keys that the playhead is between"
+    bl_description = "How the selected objects or bones move between the two keys that the playhead is between"
 
     def draw(self, context: bpy.types.Context) -> None:
         _draw_modes(context, self.layout, CURRENT)
@@ -80,7 +98,7 @@ class RIGID_MOTION_MT_current(bpy.types.Menu):
 
 class RIGID_MOTION_MT_whole(bpy.types.Menu):
     bl_label = "Whole Object"
-    bl_description = "One mode for all segments of the objects that are shown"
+    bl_description = "One mode for all segments of the objects and bones that are shown"
 
     def draw(self, context: bpy.types.Context) -> None:
         _draw_modes(context, self.layout, WHOLE)
@@ -117,6 +135,11 @@ class RIGID_MOTION_MT_pie_object(_Pie, bpy.types.Menu):
     scope = WHOLE
 
 
+class RIGID_MOTION_MT_pie_pose(_Pie, bpy.types.Menu):
+    bl_label = "Rigid Motion of Bones"
+    scope = WHOLE
+
+
 class RIGID_MOTION_MT_pie_keys(_Pie, bpy.types.Menu):
     bl_label = "Rigid Motion of Keys"
     scope = SELECTED
@@ -124,17 +147,19 @@ class RIGID_MOTION_MT_pie_keys(_Pie, bpy.types.Menu):
 
 CLASSES = (
     RIGID_MOTION_MT_object,
+    RIGID_MOTION_MT_pose,
     RIGID_MOTION_MT_keys,
     RIGID_MOTION_MT_current,
     RIGID_MOTION_MT_whole,
     RIGID_MOTION_MT_pie_object,
+    RIGID_MOTION_MT_pie_pose,
     RIGID_MOTION_MT_pie_keys,
 )
 
 
-def _draw_object(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+def _draw_in_view(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
-    self.layout.menu(RIGID_MOTION_MT_object.__name__)
+    self.layout.menu((RIGID_MOTION_MT_pose if is_posing(context) else RIGID_MOTION_MT_object).__name__)
 
 
 def _draw_keys(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
@@ -147,10 +172,11 @@ ENTRIES = {
     "DOPESHEET_MT_context_menu": _draw_keys,
     "GRAPH_MT_key": _draw_keys,
     "GRAPH_MT_context_menu": _draw_keys,
-    "VIEW3D_MT_object_animation": _draw_object,
-    "VIEW3D_MT_object_context_menu": _draw_object,
+    "VIEW3D_MT_object_animation": _draw_in_view,
+    "VIEW3D_MT_object_context_menu": _draw_in_view,
+    "VIEW3D_MT_pose_context_menu": _draw_in_view,
 }
-"""Blender's menus, and what is appended to each."""
+"""Blender's menus, and what is appended to each. That of Object > Animation is the one of Pose > Animation too."""
 
 
 def register() -> None:

@@ -12,18 +12,21 @@ from ..animation.inbetweens.describing import (
     SegmentFacts,
     frame_in_action,
     has_edited_differences,
+    is_blended,
     is_up_to_date,
     segment_at,
 )
 from ..animation.inbetweens.mode_keys import active_place, source_of
 from ..animation.transforms import Transform, transform_of
-from .wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS, cautions
+from .wording import BAKED, BLENDED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS, TROUBLES, cautions
 
 Notes = list[tuple[str, str]]
 """Texts, each behind its icon."""
 
 
-def facts_and_notes(target: bpy.types.Object | Transform, frame: float) -> tuple[SegmentFacts | None, Notes]:
+def facts_and_notes(
+    target: bpy.types.Object | bpy.types.PoseBone | Transform, frame: float
+) -> tuple[SegmentFacts | None, Notes]:
     """The segment that a frame of the scene is in, and notes on it."""
     target = transform_of(target)
     source, problem = _read(target)
@@ -44,6 +47,10 @@ def facts_and_notes(target: bpy.types.Object | Transform, frame: float) -> tuple
         elif target.animated.visible_get() and has_edited_differences(target, frame):
             # What is hidden need not have been evaluated on this frame.
             notes.append(("INFO", DELTA_EDITED))
+    if trouble := animation.constraint_trouble(target):
+        notes.append(TROUBLES[trouble])
+    if is_blended(target):
+        notes.append(("INFO", BLENDED))
     if animation.is_baked(target):
         notes.append(("INFO", BAKED))
     return segment, notes

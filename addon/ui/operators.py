@@ -1,13 +1,8 @@
-"""What can be done to motions. Every operator does all that it can in one go, and says why not where it cannot.
-
-Where there is nothing to do, a button is greyed out, and its tooltip has the reason. That is asked on every redraw, so
-it looks at as little as it can. An operator that every target refused has changed nothing: it is cancelled, without an
-undo step.
-"""
+"""What can be done to motions: an operator for each verb of `addon.animation`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from typing import ClassVar
 
@@ -20,79 +15,41 @@ from ..animation.actions.slots import places_of
 from ..animation.baking.copies import BAKED, REDUCED, entries_in_use
 from ..animation.baking.originals import WAYS_BACK
 from ..animation.baking.reducing import metres_per_unit
-from ..animation.inbetweens.describing import has_in_betweens, has_mode, has_more_keys_than
 from ..animation.inbetweens.live import paused
+from ..animation.inbetweens.mending import with_troubles
+from ..animation.inbetweens.polls import with_in_betweens, with_modes, with_more_keys_than
 from ..animation.properties import MODE_ITEMS
-from ..animation.transforms import Transform
+from ..animation.transforms import Transform, transform_of
+from .on_targets import OnTargets
 from .preferences import DEFAULT_MODE, default_mode
 from .rows import labelled
-from .targets import SCOPES, SELECTED, WHOLE, each_target, grouped_by_frames, scope_for, targets_of
-from .wording import DESCRIPTIONS, LABELS, counted_modes, length, listed, names_of, reduction_summary
+from .targets import (
+    SCOPES,
+    SELECTED,
+    WHOLE,
+    each_target,
+    grouped_by_frames,
+    is_posing,
+    scope_for,
+    targets_of,
+)
+from .wording import (
+    DESCRIPTIONS,
+    LABELS,
+    counted_modes,
+    length,
+    listed,
+    reduction_summary,
+    spoken_of,
+)
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
-
-NO_TARGETS = "Select an object with keys first"
 
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
 
-MOST_REFUSALS = 8
-"""Refusals that a report has room for."""
 
-
-class _OnTargets:
-    """Operators on the selected objects, or on those that the editor shows."""
-
-    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
-
-    nothing_to_do: ClassVar[str] = ""
-    """Why the operator is greyed out where it has nothing to do on any target."""
-
-    @classmethod
-    def has_work(cls, _target: Transform) -> bool:
-        """Whether there is something to do on a target."""
-        return True
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        reason = NO_TARGETS
-        for target in each_target(context):
-            if cls.has_work(target):
-                return True
-            reason = cls.nothing_to_do
-        cls.poll_message_set(reason)
-        return False
-
-    def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
-        """Do something to all targets at once, and report it.
-
-        Parameters
-        ----------
-        targets
-        verb
-            Does it, puts refusals into the list that it is given, and returns in words what was done. May raise
-            `Refused` where nothing could be.
-        """
-        refused: list[Refused] = []
-        try:
-            summary = verb(refused)
-        except Refused as refusal:
-            refused, summary = [refusal], ""
-        refusals = [str(refusal) for refusal in refused[:MOST_REFUSALS]]
-        if len(refused) > MOST_REFUSALS:
-            refusals.append(f"and {len(refused) - MOST_REFUSALS} more")
-        if not summary or len(refused) >= len(targets):
-            self.report({"ERROR"}, "\n".join(refusals))
-            return {"CANCELLED"}
-        if refused:
-            done = len(targets) - len(refused)
-            self.report({"WARNING"}, "\n".join([f"{done} of {len(targets)} objects: {summary}. But", *refusals]))
-        else:
-            self.report({"INFO"}, f"{names_of(targets)}: {summary}")
-        return {"FINISHED"}
-
-
-class RIGID_MOTION_OT_set_mode(_OnTargets, bpy.types.Operator):
+class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.set_mode"
     bl_label = "Set Rigid Motion Mode"
     bl_description = "Choose how the selected objects move from key to key"
@@ -106,17 +63,18 @@ class RIGID_MOTION_OT_set_mode(_OnTargets, bpy.types.Operator):
     )
     on: EnumProperty(
         name="On",
-        description="What of each object gets the mode",
+        description="Which segments get the mode",
         items=SCOPES,
         default=WHOLE,
         options={"SKIP_SAVE"},
     )
 
     @classmethod
-    def description(cls, _context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         if not properties.is_property_set("mode"):
-            return cls.bl_description
-        return f"{DESCRIPTIONS[properties.mode]}.\nOn: {SCOPE_NAMES[properties.on]}"
+            return super().description(context, properties)
+        what = spoken_of(DESCRIPTIONS[properties.mode], "bones" if is_posing(context) else "objects")
+        return f"{what}.\nOn: {SCOPE_NAMES[properties.on]}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self.properties.is_property_set("mode"):
@@ -146,7 +104,7 @@ class RIGID_MOTION_OT_set_mode(_OnTargets, bpy.types.Operator):
         return f"{label} from frame{'s' * (len(frames) > 1)} {listed([f'{frame:g}' for frame in frames])}"
 
 
-class RIGID_MOTION_OT_clear(_OnTargets, bpy.types.Operator):
+class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.clear"
     bl_label = "Clear Modes"
     bl_description = (
@@ -156,11 +114,11 @@ class RIGID_MOTION_OT_clear(_OnTargets, bpy.types.Operator):
     nothing_to_do = "These objects have Blender's own in-betweens already"
 
     @classmethod
-    def has_work(cls, target: Transform) -> bool:
-        return has_mode(target)
+    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
+        return with_modes(targets)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = [target for target in each_target(context) if has_mode(target)]
+        targets = list(with_modes(each_target(context)))
 
         def clear(refused: list[Refused]) -> str:
             animation.set_mode(targets, "BLENDER", refused=refused)
@@ -169,7 +127,7 @@ class RIGID_MOTION_OT_clear(_OnTargets, bpy.types.Operator):
         return self.act(targets, clear)
 
 
-class RIGID_MOTION_OT_bake(_OnTargets, bpy.types.Operator):
+class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.bake"
     bl_label = "Bake to Keys"
     bl_description = (
@@ -193,7 +151,7 @@ class RIGID_MOTION_OT_bake(_OnTargets, bpy.types.Operator):
         name="Frames",
         description="What to bake, widened to whole segments",
         items=[
-            ("ACTION", "Action", "From the first key of each object to its last"),
+            ("ACTION", "Action", "From the first key of each to its last"),
             ("SCENE", "Scene", "The frame range of the scene, or its preview range while that is in use"),
             ("CUSTOM", "Custom", "From one frame to another"),
         ],
@@ -202,8 +160,8 @@ class RIGID_MOTION_OT_bake(_OnTargets, bpy.types.Operator):
     last: FloatProperty(name="End", description="Last frame to bake", default=250.0, step=100, precision=2)
 
     @classmethod
-    def has_work(cls, target: Transform) -> bool:
-        return has_in_betweens(target)
+    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
+        return with_in_betweens(targets)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if self.frames != "CUSTOM":
@@ -244,7 +202,7 @@ def _range_of(scene: bpy.types.Scene) -> tuple[int, int]:
     return scene.frame_start, scene.frame_end
 
 
-class _OnChanged(_OnTargets):
+class _OnChanged(OnTargets):
     """Operators on targets whose keys were baked or reduced last, while what they had before is still in the file."""
 
     kind: ClassVar[str]
@@ -252,22 +210,26 @@ class _OnChanged(_OnTargets):
     summary: ClassVar[str]
 
     @classmethod
-    def last_changes(cls, context: bpy.types.Context) -> dict[Transform, str]:
+    def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
         """What was done last to the keys of each target that something was done to."""
-        found = {}
-        for target in each_target(context):
+        found, places = {}, {}
+        for target in targets:
             if len(target.motion.bakes):
-                entries = entries_in_use(target, places_of(target))
+                animated = target.animated
+                if animated not in places:
+                    places[animated] = places_of(transform_of(animated))
+                entries = entries_in_use(target, places[animated])
                 if kind := next((entry.kind for entry in entries if entry.original is not None), None):
                     found[target] = kind
         return found
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        changes = cls.last_changes(context)
+        targets = targets_of(context)
+        changes = cls.last_changes(targets)
         if cls.kind in changes.values():
             return True
-        reason = cls.nothing_to_do
+        reason = cls.reason(targets, context)
         for target, later in changes.items():
             if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
                 reason = f"These keys were {later.lower()} since: {WAYS_BACK[later]} first"
@@ -275,7 +237,7 @@ class _OnChanged(_OnTargets):
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = [target for target, kind in self.last_changes(context).items() if kind == self.kind]
+        targets = [target for target, kind in self.last_changes(each_target(context)).items() if kind == self.kind]
 
         def go_back(refused: list[Refused]) -> str:
             type(self).verb(targets, refused=refused)
@@ -294,7 +256,7 @@ class RIGID_MOTION_OT_unbake(_OnChanged, bpy.types.Operator):
     summary = "back to the keys from before baking"
 
 
-class RIGID_MOTION_OT_reduce_keys(_OnTargets, bpy.types.Operator):
+class RIGID_MOTION_OT_reduce_keys(OnTargets, bpy.types.Operator):
     bl_idname = "rigid_motion.reduce_keys"
     bl_label = "Reduce Keys to Poses"
     bl_description = (
@@ -310,8 +272,8 @@ class RIGID_MOTION_OT_reduce_keys(_OnTargets, bpy.types.Operator):
     tolerance: FloatProperty(
         name="Tolerance",
         description=(
-            "How far off any of three points of the object may be on any frame, at the radius from its origin along "
-            "its axes. A millimetre to begin with"
+            "How far off any of three points may be on any frame, at the radius from the origin along the axes of what "
+            "is moved. A millimetre to begin with"
         ),
         default=0.001,
         min=1e-6,
@@ -323,8 +285,8 @@ class RIGID_MOTION_OT_reduce_keys(_OnTargets, bpy.types.Operator):
     radius: FloatProperty(
         name="Radius",
         description=(
-            "How far out the object is held to the tolerance: the larger, the more a rotation counts. "
-            "At 0 each object has the size of its own bounding box"
+            "How far out from the origin the tolerance holds: the larger, the more a rotation counts. "
+            "At 0 each object has the size of its own bounding box, and each bone its length"
         ),
         default=0.0,
         min=0.0,
@@ -344,7 +306,7 @@ class RIGID_MOTION_OT_reduce_keys(_OnTargets, bpy.types.Operator):
         name="Best per Segment",
         description=(
             "Then key each segment with the mode that comes closest to the recording there, within the tolerance. "
-            "Where one mode meets another the object may turn a corner"
+            "Where one mode meets another the path may turn a corner"
         ),
     )
 
@@ -366,8 +328,8 @@ class RIGID_MOTION_OT_reduce_keys(_OnTargets, bpy.types.Operator):
                         labelled(column).label(text=line)
 
     @classmethod
-    def has_work(cls, target: Transform) -> bool:
-        return has_more_keys_than(target, 2)
+    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
+        return with_more_keys_than(targets, 2)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = targets_of(context)
@@ -414,6 +376,29 @@ class RIGID_MOTION_OT_discard_dense_keys(_OnChanged, bpy.types.Operator):
     summary = "the keys from before they were reduced are removed from the file"
 
 
+class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
+    bl_idname = "rigid_motion.mend"
+    bl_label = "Restore Constraint"
+    bl_description = (
+        'Put the constraint "Rigid Motion" back on the selected bones, which shows their in-betweens: '
+        "first in the stack, unmuted, with full influence"
+    )
+    nothing_to_do = "None of these objects lacks its constraint"
+
+    @classmethod
+    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
+        return with_troubles(targets)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        targets = list(with_troubles(each_target(context)))
+
+        def mend(refused: list[Refused]) -> str:
+            animation.mend(targets, refused=refused)
+            return "constraint restored"
+
+        return self.act(targets, mend)
+
+
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):
     bl_idname = "rigid_motion.refresh"
     bl_label = "Refresh In-Betweens"
@@ -439,5 +424,6 @@ CLASSES = (
     RIGID_MOTION_OT_reduce_keys,
     RIGID_MOTION_OT_restore_keys,
     RIGID_MOTION_OT_discard_dense_keys,
+    RIGID_MOTION_OT_mend,
     RIGID_MOTION_OT_refresh,
 )

@@ -1,4 +1,4 @@
-"""The sidebar panel of the viewport, the Dope Sheet and the Graph Editor: how the active object moves, and why."""
+"""The sidebar panel of the viewport, the Dope Sheet and the Graph Editor: how the active object or bone moves."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from contextlib import suppress
 import bpy
 
 from .. import animation
-from ..animation.inbetweens.describing import SegmentFacts, has_in_betweens
-from ..animation.transforms import ORIGINALS, SCALE, Refused, Transform
+from ..animation.inbetweens.describing import SegmentFacts, parts_with_in_betweens
+from ..animation.inbetweens.polls import with_in_betweens
+from ..animation.transforms import ORIGINALS, SCALE, BoneTransform, ObjectTransform, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
-from .wording import LABELS, OUT_OF_DATE, degrees, length
+from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
@@ -33,20 +34,26 @@ class _Main:
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, target = self.layout, active_target(context)
+        if target is None:
+            layout.label(text=NO_BONE)
+            return
         segment, notes = facts_and_notes(target, context.scene.frame_current_final)
         if is_key_editor(context):
             _draw_mode_menu(labelled(layout, "Selected"), SELECTED, modes_meant(context, target, SELECTED))
+        label = "Bone" if isinstance(target, BoneTransform) else "Object"
         mode_path, _ = target.mode_channel
         if any(fcurve.data_path == mode_path for fcurve in fcurves_of(target.animated)):
-            _draw_mode_menu(labelled(layout, "Object"), WHOLE, modes_meant(context, target, WHOLE))
+            _draw_mode_menu(labelled(layout, label), WHOLE, modes_meant(context, target, WHOLE))
         else:
-            labelled(layout, "Object").prop(target.motion, "mode", text="")
+            labelled(layout, label).prop(target.motion, "mode", text="")
         if segment is not None:
             _draw_segment(context, layout, segment)
         for icon, text in notes:
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:
             layout.operator("rigid_motion.refresh")
+        if any(trouble in notes for trouble in TROUBLES.values()):
+            layout.operator("rigid_motion.mend")
         row = layout.row(align=True)
         row.operator("rigid_motion.bake", text="Bake...")
         row.operator("rigid_motion.unbake")
@@ -56,22 +63,25 @@ class _Main:
 class _Shown:
     bl_label = "Transform on Screen"
     bl_description = (
-        "Where the object is seen on this frame, with the in-betweens. The Item tab has Blender's own values, without"
+        "Where the object or bone is seen on this frame, with the in-betweens. "
+        "The Item tab has Blender's own values, without"
     )
     bl_region_type = "UI"
     bl_category = CATEGORY
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return has_in_betweens(active_target(context))
+        target = active_target(context)
+        return target is not None and any(True for _ in with_in_betweens((target,)))
 
     def draw(self, context: bpy.types.Context) -> None:
         column = self.layout.column()
         with suppress(Refused):  # that is in a note of the panel
             target = active_target(context)
+            parts = parts_with_in_betweens(target)
             for name, prop in target.properties.items():
                 # A scale without in-betweens is that of the Item tab.
-                if name != SCALE or target.is_noted([(f"delta_{prop}", 0)]):
+                if name != SCALE or name in parts:
                     column.prop(context.window_manager.rigid_motion_shown, prop)
 
 
@@ -93,7 +103,8 @@ class _Delta:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return any(active_target(context).motion.filled)
+        target = active_target(context)
+        return isinstance(target, ObjectTransform) and any(target.motion.filled)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, target = self.layout, active_target(context)

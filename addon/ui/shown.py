@@ -1,6 +1,7 @@
 """The transform that is seen on the screen, as properties to be drawn by a panel: in the scene's units, and read-only.
 
-Where in-betweens are in the delta transforms, the Item tab has Blender's own values, and the object stands elsewhere.
+Where in-betweens are in the delta transforms, or come from the constraint of a bone, the Item tab has Blender's own
+values, and the object or bone stands elsewhere.
 """
 
 from __future__ import annotations
@@ -55,14 +56,14 @@ class ShownTransform(bpy.types.PropertyGroup):
 
     location: FloatVectorProperty(
         name="Location",
-        description="Where the object is seen on this frame: its location with the in-betweens",
+        description="Where it is seen on this frame: its location with the in-betweens",
         subtype="TRANSLATION",
         precision=5,
         get=_location,
     )
     rotation_quaternion: FloatVectorProperty(
         name="Rotation",
-        description="How the object is seen turned on this frame: its rotation with the in-betweens",
+        description="How it is seen turned on this frame: its rotation with the in-betweens",
         size=4,
         subtype="QUATERNION",
         precision=3,
@@ -70,14 +71,14 @@ class ShownTransform(bpy.types.PropertyGroup):
     )
     rotation_euler: FloatVectorProperty(
         name="Rotation",
-        description="How the object is seen turned on this frame: its rotation with the in-betweens",
+        description="How it is seen turned on this frame: its rotation with the in-betweens",
         subtype="EULER",
         precision=5,
         get=_euler,
     )
     scale: FloatVectorProperty(
         name="Scale",
-        description="How large the object is seen on this frame: its scale with the in-betweens",
+        description="How large it is seen on this frame: its scale with the in-betweens",
         subtype="XYZ",
         precision=3,
         get=_scale,

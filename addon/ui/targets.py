@@ -1,6 +1,7 @@
 """From the context to targets: the transforms and keys that an editor means, here and nowhere else.
 
-In a Dope Sheet or Graph Editor these are the transforms whose channels are shown, elsewhere the selected objects.
+In a Dope Sheet or Graph Editor these are the transforms whose channels are shown. Elsewhere they are the selected
+objects; while bones are posed, the selected bones of all rigs in Pose Mode.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from ..animation import Refused, key_frames, modes_of
 from ..animation.inbetweens.describing import frame_in_action, segment_at
 from ..animation.inbetweens.mode_keys import source_of
-from ..animation.transforms import Transform, transform_of
+from ..animation.transforms import MODE_PROPERTY, WIDTHS, Transform, bone_name, split_path, transform_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
 WHOLE, CURRENT, SELECTED = "WHOLE", "CURRENT", "SELECTED"
 
 SCOPES = [
-    (WHOLE, "Whole Object", "One mode for all segments. Keys of the mode are removed"),
+    (WHOLE, "All Segments", "One mode for all segments. Keys of the mode are removed"),
     (CURRENT, "Current Segment", "The segment that the playhead is in. The others keep their modes"),
     (SELECTED, "Selected Keys", "The segments that the selected keys begin. The others keep their modes"),
 ]
@@ -35,15 +36,20 @@ def is_key_editor(context: bpy.types.Context) -> bool:
     return context.area is not None and context.area.type in KEY_EDITORS
 
 
+def is_posing(context: bpy.types.Context) -> bool:
+    """Whether bones are selected here, and not objects: in Pose Mode, and while weights are painted for a posed rig."""
+    return context.mode == "POSE" or (context.mode == "PAINT_WEIGHT" and context.pose_object is not None)
+
+
 def active_target(context: bpy.types.Context) -> Transform | None:
     """What panels and ticks in menus are about."""
-    return None if context.object is None else transform_of(context.object)
+    active = context.active_pose_bone if is_posing(context) else context.object
+    return None if active is None else transform_of(active)
 
 
 def each_target(context: bpy.types.Context) -> Iterator[Transform]:
     """What an operator acts on here, one after the other: polls need no more than the first that fits."""
-    objects = _shown_in_editor(context) if is_key_editor(context) else selected_objects(context)
-    return map(transform_of, objects)
+    return _shown_in_editor(context) if is_key_editor(context) else map(transform_of, selected(context))
 
 
 def targets_of(context: bpy.types.Context) -> list[Transform]:
@@ -51,9 +57,15 @@ def targets_of(context: bpy.types.Context) -> list[Transform]:
     return list(each_target(context))
 
 
-def selected_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected objects, without any the active one."""
-    return list(context.selected_objects) or [obj for obj in (context.object,) if obj is not None]
+def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
+    """The selected objects, without any the active one; or the selected bones alone, as Blender's operators have it."""
+    found = selected_in_view(context)
+    return found if found or is_posing(context) or context.object is None else [context.object]
+
+
+def selected_in_view(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:
+    """The selected bones of all rigs in Pose Mode while these are posed, else the selected objects."""
+    return list((context.selected_pose_bones if is_posing(context) else context.selected_objects) or ())
 
 
 def scope_for(context: bpy.types.Context) -> str:
@@ -108,13 +120,32 @@ def modes_meant(context: bpy.types.Context, target: Transform | None, scope: str
     return set(modes_of(target, frames[~np.isin(frames, keys[-1:])] if len(frames) > 1 else frames))
 
 
-def _shown_in_editor(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
+def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
+    """The objects and the bones of which location, rotation, scale or the mode is shown in a key editor."""
     shown = {fcurve.as_pointer() for fcurve in context.visible_fcurves or ()}
-    if shown:
-        only_selected = context.space_data.dopesheet.show_only_selected
-        for obj in context.selected_objects if only_selected else context.view_layer.objects:
-            if any(fcurve.as_pointer() in shown for fcurve in fcurves_of(obj)):
-                yield obj
+    for obj in _animated_in_editor(context) if shown else ():
+        found = set()
+        for fcurve in fcurves_of(obj):
+            prefix, prop = split_path(fcurve.data_path)
+            if prefix not in found and (prop in WIDTHS or prop == MODE_PROPERTY) and fcurve.as_pointer() in shown:
+                found.add(prefix)
+                if (carrier := _carrier(obj, prefix)) is not None:
+                    yield transform_of(carrier)
+
+
+def _animated_in_editor(context: bpy.types.Context) -> Iterable[bpy.types.Object]:
+    """The objects that a key editor may show."""
+    if not context.space_data.dopesheet.show_only_selected:
+        return context.view_layer.objects
+    active = (context.object,) if context.object is not None else ()
+    return dict.fromkeys((*context.selected_objects, *active, *(context.objects_in_mode or ())))
+
+
+def _carrier(obj: bpy.types.Object, prefix: str) -> bpy.types.Object | bpy.types.PoseBone | None:
+    """What a prefix of data paths stands for in an object; None where that has no such bone."""
+    if not prefix:
+        return obj
+    return None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
 
 
 def fcurves_of(animated: bpy.types.Object) -> bpy.types.bpy_prop_collection | tuple:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import bpy
 
 from ..animation import Reduction
 from ..animation.inbetweens.describing import SegmentFacts
+from ..animation.inbetweens.outlets.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from ..animation.properties import MODE_ITEMS
-from ..animation.transforms import Transform
+from ..animation.transforms import BoneTransform, Transform
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
@@ -27,6 +29,19 @@ DELTA_EDITED = (
     "The delta transform holds the in-betweens, so this edit of it lasts until the frame changes. "
     "To keep it, edit Delta Transform below"
 )
+
+NO_BONE = "No Bone Active"
+BLENDED = "Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first"
+
+TROUBLES = {
+    REMOVED: ("ERROR", 'The constraint "Rigid Motion" was removed, so the in-betweens are Blender\'s own'),
+    OTHER_SLOT: ("ERROR", 'The constraint "Rigid Motion" shows another Action, not the one that moves the bone'),
+    MUTED: ("INFO", 'The constraint "Rigid Motion" is muted, so the in-betweens are Blender\'s own'),
+    CHANGED: ("ERROR", 'The constraint "Rigid Motion" has other settings, which put the bone elsewhere'),
+    NOT_FIRST: ("ERROR", 'Another constraint comes before "Rigid Motion", which has to be the first'),
+    WEAK: ("INFO", 'The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left'),
+}
+"""What is amiss with the constraint of a bone, each behind its icon."""
 
 NEAR_HALF_TURN = math.radians(170.0)
 """From here on a small change of a key may send the object round the other way."""
@@ -87,7 +102,21 @@ def listed(items: Sequence[str], most: int = 3) -> str:
 
 def names_of(targets: Sequence[Transform]) -> str:
     """One target by its name, several by their number."""
-    return targets[0].name if len(targets) == 1 else f"{len(targets)} objects"
+    return targets[0].name if len(targets) == 1 else f"{len(targets)} {kind_of(targets)}"
+
+
+def kind_of(targets: Iterable[Transform]) -> str:
+    """What several targets are called together."""
+    bones = {isinstance(target, BoneTransform) for target in targets}
+    return "objects and bones" if len(bones) == 2 else "bones" if True in bones else "objects"
+
+
+def spoken_of(text: str, kind: str) -> str:
+    """A text about objects, as it is where `kind` is meant: "objects", "bones" or "objects and bones"."""
+    if kind == "bones":
+        text = text.replace("an object", "a bone").replace("Object > ", "Pose > ")
+        text = re.sub(r"\bobject\b", "bone", text)
+    return re.sub(r"\bobjects\b", kind, text)
 
 
 def wrapped(text: str, fits: Callable[[str], bool]) -> list[str]:

@@ -165,16 +165,26 @@ def _components(
         else:
             ends = _key_poses(obj, np.array((first, last)), own, scaled)
             poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
-        location[inside], quaternion[inside] = poses.positions, poses.quaternions
+        location[inside], quaternion[inside] = poses.positions @ _axes(obj), poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
     return location, quaternion, scale
 
 
+def _axes(obj: Carrier) -> np.ndarray:
+    """The axes that location runs along, as columns in those of the body: a bone may have its parent's."""
+    if isinstance(obj, bpy.types.Object) or obj.bone.use_local_location:
+        return np.eye(3)
+    above = obj.bone.parent.matrix_local.to_3x3() if obj.bone.parent else np.eye(3)
+    return np.linalg.inv(np.array(obj.bone.matrix_local.to_3x3())) @ np.array(above)
+
+
 def _key_poses(obj: Carrier, frames: np.ndarray, own: Own, scaled: bool) -> Poses:
     positions, quaternions, scales = _native(obj, frames)
     return Poses(
-        positions + own.location, multiply(np.array(own.quaternion), quaternions), scales[:, 0] if scaled else None
+        (positions + own.location) @ _axes(obj).T,
+        multiply(np.array(own.quaternion), quaternions),
+        scales[:, 0] if scaled else None,
     )
 
 

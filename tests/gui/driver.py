@@ -199,7 +199,7 @@ class Hand:
             if seen[-1] == seen[-2]:
                 raise LookupError(f"the sidebar of the {area.type} has no tab {category!r}, only {sorted(set(seen))}")
 
-    def find_button(self, area: bpy.types.Area, kind: str, what: str) -> Steps[Place]:
+    def find_button(self, area: bpy.types.Area, kind: str, what: str, *, narrow: bool = False) -> Steps[Place]:
         """Where in a region the button of a property or an operator is, found by moving the mouse over all of it.
 
         Parameters
@@ -208,10 +208,12 @@ class Hand:
             The region's type: "UI" for a sidebar, "HEADER" for a header.
         what
             The end of the property's data path ("rigid_motion.mode"), or the operator ("action.bake_keys").
+        narrow
+            Whether it is no wider than its icon.
         """
         part = places.region(area, kind)
         flat = part.height < 40  # a header: one row of narrow buttons, where a sidebar has many rows of wide ones
-        right, down = (15, part.height // 2) if flat else (part.width // 4, 15)
+        right, down = 15 if flat or narrow else part.width // 4, part.height // 2 if flat else 15
         for y in range(part.y + part.height - down, part.y, -down):
             for x in range(part.x + right, part.x + part.width, right):
                 yield from self.hover((x, y))

@@ -13,7 +13,15 @@ from addon.ui import keymap
 SHARED = {"Window", "Screen", "Screen Editing", "Frames", "Animation", "Markers", "View2D", "Animation Channels"}
 """Keymaps that are asked in all of the editors, or in parts of them."""
 
-OF_EDITORS = {"3D View", "3D View Generic", "Object Mode", "Object Non-modal", "Dopesheet", "Dopesheet Generic"} | {
+OF_EDITORS = {
+    "3D View",
+    "3D View Generic",
+    "Object Mode",
+    "Object Non-modal",
+    "Pose",
+    "Dopesheet",
+    "Dopesheet Generic",
+} | {
     "Graph Editor",
     "Graph Editor Generic",
 }
@@ -40,7 +48,7 @@ def test_the_shortcut_is_free(name):
     assert looked_through == SHARED | OF_EDITORS
 
 
-def test_the_shortcut_is_in_all_three_editors(extension):
+def test_the_shortcut_is_in_both_modes_of_the_viewport_and_in_both_key_editors(extension):
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
     for name, space, menu in keymap.PLACES:
         items = keymaps.find(name, space_type=space).keymap_items

@@ -24,7 +24,7 @@ class Layout:
     def separator(self):
         pass
 
-    def menu(self, name):
+    def menu(self, name, text=""):
         self.drawn.append((name, "", ""))
 
     def operator(self, name, text="", icon="NONE"):
@@ -36,7 +36,8 @@ class Layout:
 def drawn(menu):
     """What a menu draws for the active object: operator or menu, icon, properties."""
     layout = Layout()
-    menu.draw(SimpleNamespace(layout=layout, scope=getattr(menu, "scope", None)), bpy.context)
+    own = {name: getattr(menu, name, None) for name in ("scope", "pie", "posing")}
+    menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
     return layout.drawn
 
 
@@ -49,7 +50,7 @@ def test_every_menu_offers_every_mode(tool, menu):
     assert sorted(offered) == sorted(MODE_IDS)
 
 
-PIES = [menus.RIGID_MOTION_MT_pie_object, menus.RIGID_MOTION_MT_pie_keys]
+PIES = [menus.RIGID_MOTION_MT_pie_object, menus.RIGID_MOTION_MT_pie_pose, menus.RIGID_MOTION_MT_pie_keys]
 
 
 @pytest.mark.parametrize("menu", [menu for menu in MODE_MENUS if menu not in PIES], ids=lambda menu: menu.__name__)

@@ -153,6 +153,7 @@ def _source(
         channels=tuple(([rows[number] for number in numbers], keys) for numbers, keys in channels),
         rest=keyed.rest,
         original=user.original(),
+        location_axes=user.location_axes,
         mode=modes[0][1] if modes else recorded_mode(place),
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,

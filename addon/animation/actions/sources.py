@@ -65,6 +65,9 @@ class Source:
     mode: int | Keys
     """The number of the mode of all segments, or the mode channel."""
 
+    location_axes: np.ndarray | None = None
+    """The axes that location runs along, as columns (3, 3) in those of the body at rest; None where they are one."""
+
     in_nla: bool = False
     """Whether there are NLA strips beside it, which Blender blends with the defaults of what it does not key."""
 
@@ -82,6 +85,8 @@ class Source:
         if any(row >= ROWS[ROTATION].start for row in self.rest):
             summary.update(repr({row: value for row, value in self.rest.items() if row >= 3}).encode())
         summary.update(self.original.tobytes())
+        if self.location_axes is not None:
+            summary.update(self.location_axes.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
         span = self.seen if self.goes_on and not self.repeats else None
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())

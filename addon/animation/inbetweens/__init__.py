@@ -6,4 +6,7 @@ live         refreshing after every edit                known_sources   what an 
 insertion    a key inserted in between                  densification   keys inserted all along
 mode_keys    choosing modes                             acting      many targets at once
 describing   what there is to tell of a segment        on_screen       what is seen, as properties
+bodies       channels as poses of a body                glances        which bones an edit was about
+polls        what is asked of many at every redraw     mending         constraints of bones, put right
+outlets      where differences go                      problems       why something does not move as it should
 """

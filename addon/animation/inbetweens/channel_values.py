@@ -16,7 +16,8 @@ def channel_values(transform: Transform, source: Source, motion: InBetweens) -> 
     own, poses, channels = source.original, motion.wanted, {}
     first = source.values_at(motion.frames[:1])[:, 0]
     if LOCATION in source.keyed:
-        channels["location"] = poses.positions - own[:3]
+        axes = source.location_axes
+        channels["location"] = (poses.positions if axes is None else poses.positions @ axes) - own[:3]
     if ROTATION in source.keyed:
         # In the sign and the turn that the animator's first key has.
         quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))

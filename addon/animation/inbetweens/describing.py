@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 
 from ...motion.eulers import quaternions_from_extrinsic_eulers
-from ..actions.records import recorded_digest, recorded_mode
+from ..actions.records import recorded_digest
 from ..actions.slots import places_of
 from ..actions.sources import MODE_NAMES, SAME_FRAME, Source
 from ..curves import cycled
-from ..transforms import PART_OF, WIDTHS, Transform, transform_of
+from ..transforms import PART_OF, Transform, transform_of
 from .mode_keys import active_place
 from .on_screen import seen_components
 from .outlets import outlet_of
@@ -98,42 +98,9 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
 
 def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     """Whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
-    place = active_place(transform_of(target))
+    transform = transform_of(target)
+    place = active_place(transform, places_of(transform))
     return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
-
-
-def has_mode(transform: Transform) -> bool:
-    """Whether another mode than Blender's own was chosen for something, in its slots or before it had any.
-
-    For what is asked on every redraw: nothing is looked at but its own slots.
-    """
-    if transform.motion.awaited != "BLENDER":
-        return True
-    return any(
-        recorded_digest(place) or recorded_mode(place) or place.users[0].mode_channel in place.curves
-        for place in places_of(transform)
-    )
-
-
-def has_in_betweens(transform: Transform) -> bool:
-    """Whether in-betweens were filled in for something. As quick as `has_mode`."""
-    data = transform.animated.animation_data
-    if data is None:
-        return False
-    if not len(data.nla_tracks) and (data.action is None or not len(data.action.rigid_motion.slots)):
-        # The commonest case, and the slots are not even taken apart.
-        return False
-    return any(recorded_digest(place) for place in places_of(transform))
-
-
-def has_more_keys_than(transform: Transform, count: int) -> bool:
-    """Whether a channel of location, rotation or scale has more keys than this."""
-    return any(
-        len(fcurve.keyframe_points) > count
-        for place in places_of(transform)
-        for (path, _), fcurve in place.curves.items()
-        if path.removeprefix(place.prefix) in WIDTHS
-    )
 
 
 def shown_components(transform: Transform) -> np.ndarray | None:
@@ -166,13 +133,43 @@ def shown_components(transform: Transform) -> np.ndarray | None:
     return seen
 
 
+def parts_with_in_betweens(transform: Transform) -> set[str]:
+    """Which of location, rotation and scale in-betweens are in. `Refused` where it turns by axis and angle."""
+    filled = {channel for place in places_of(transform) for channel in place.filled}
+    return {PART_OF[row] for row, channel in transform.differences.items() if channel in filled}
+
+
+def is_blended(transform: Transform) -> bool:
+    """Whether in-betweens of a bone are in an Action that strips fade in or out, or mix with what is below.
+
+    Blender blends the keys, and the time of the constraint beside them: that is not the blend of the poses.
+    """
+    data = transform.animated.animation_data
+    if not transform.prefix or data is None or not len(data.nla_tracks):
+        return False
+    own = {(place.slot.action, place.slot.handle) for place in places_of(transform) if recorded_digest(place)}
+    if (data.action, data.action_slot_handle) in own:
+        below = any(track.strips for track in data.nla_tracks)
+        if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
+            return True
+    strips = (strip for track in data.nla_tracks if not track.mute for strip in track.strips if not strip.mute)
+    return any(
+        strip.blend_in or strip.blend_out or strip.use_animated_influence or strip.blend_type != "REPLACE"
+        for strip in strips
+        if (strip.action, strip.action_slot_handle) in own
+    )
+
+
 def has_edited_differences(transform: Transform, frame: float) -> bool:
     """Whether something has another difference than its in-betweens on this frame of its Action.
 
     So it is once somebody has edited what they are in, until the frame changes.
     """
+    if transform.prefix:
+        # What a constraint adds cannot be edited.
+        return False
     place = active_place(transform, places_of(transform))
-    if place is None or place.prefix or place.slot.in_nla:
+    if place is None or place.slot.in_nla:
         # Strips are blended with one another.
         return False
     return any(

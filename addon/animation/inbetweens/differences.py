@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...motion import KEYFRAME_MODES, Poses, prepare
-from ...motion.eulers import extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
+from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.poses import beyond
-from ...motion.quaternions import conjugate, multiply
+from ...motion.quaternions import multiply
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
 from ..curves import Keys, evaluate
 from ..transforms import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
+from .bodies import differ, key_poses, location_axes, turn_into_quaternions
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -46,7 +47,10 @@ if any(mode.behind > 1 or mode.ahead > 1 for mode in KEYFRAME_MODES.values()):
 
 @dataclass(frozen=True, eq=False)
 class InBetweens:
-    """The motion of one source, in the space of its channels, with the delta transforms that the object has anyway."""
+    """The motion of one source as a body, with the delta transforms that the object has anyway.
+
+    It is in the space of the channels; but where location runs along other axes than the body's at rest, in those.
+    """
 
     frames: np.ndarray
     """Shape (m,)."""
@@ -79,8 +83,9 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
 
     def moved_by(deltas: np.ndarray) -> Poses:
+        positions = (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T
         return Poses(
-            (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T,
+            positions if source.location_axes is None else positions @ source.location_axes.T,
             multiply(deltas[ROWS[ROTATION]].T, native[ROWS[ROTATION]].T),
             (native[ROWS[SCALE]] * deltas[ROWS[SCALE]]).mean(axis=0) if source.uniform_scale else None,
         )
@@ -223,7 +228,7 @@ def _move(
         progress = np.empty((1, place.stop - place.start))
         combine(weights[None, :, some], timing[:, place], counts[some], progress)
         progress = progress[0] - offsets[some].repeat(counts[some])
-        _turn_into_quaternions(native[:, place], order)
+        turn_into_quaternions(native[:, place], order)
         default = original[:, ends.owners[some]]
         ends.keep_even(some, counts[some], every_frame[place], progress)
         _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
@@ -257,7 +262,7 @@ def _fill(
             continue
         wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode])
         part = delta if every else np.empty((len(delta), int(here.sum())))
-        _differ(wanted, native[:, some], part)
+        differ(wanted, native[:, some], part)
         if wanted.scales is not None:
             part[ROWS[SCALE]] *= own[ROWS[SCALE]].repeat(here, axis=1)
         if not every:
@@ -283,6 +288,9 @@ class _Ends:
     around: tuple[np.ndarray, Poses] | None
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
+    axes: np.ndarray | None
+    """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
+
     prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
     """What each mode makes of all segments, once it has been asked for."""
 
@@ -298,12 +306,15 @@ class _Ends:
             ],
             axis=1,
         )
-        keys = _key_poses(start, end, np.stack([source.original for source in sources], axis=1)[:, owners], sources[0])
+        keys = key_poses(start, end, np.stack([source.original for source in sources], axis=1)[:, owners], sources[0])
+        axes = location_axes(sources, owners)
+        if axes is not None:
+            keys = replace(keys, positions=np.einsum("sij,skj->ski", axes, keys.positions))
         if not smooth.any():
-            return cls(owners, times, keys, smooth, None)
+            return cls(owners, times, keys, smooth, None, axes)
         holds = np.concatenate([source.holds for source in sources])
         plain = np.concatenate([source.is_plain for source in sources])
-        return cls(owners, times, keys, smooth & plain, _with_neighbours(owners, times, keys, holds))
+        return cls(owners, times, keys, smooth & plain, _with_neighbours(owners, times, keys, holds), axes)
 
     def keep_even(self, some: slice, counts: np.ndarray, frames: np.ndarray, progress: np.ndarray) -> None:
         """Let progress (m,) be even in time where a smooth mode has it so."""
@@ -313,7 +324,11 @@ class _Ends:
             np.divide(frames - first, last - first, out=progress, where=inside)
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
-        """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,)."""
+        """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
+
+        Positions run along the axes that location does.
+        """
+        axes = None if self.axes is None else self.axes[some].repeat(counts, axis=0)
         smooth = KEYFRAME_MODES[mode].is_smooth
         if mode not in self.prepared:
             even = np.broadcast_to((0.0, 1.0), self.times.shape)
@@ -322,7 +337,8 @@ class _Ends:
             # Of the three segments between four keys the one in the middle.
             some = slice(3 * some.start, 3 * some.stop)
             counts = np.multiply.outer(counts, (0, 1, 0)).ravel()
-        return self.prepared[mode](counts, progress, some)
+        poses = self.prepared[mode](counts, progress, some)
+        return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
 
 
 def _with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: np.ndarray) -> tuple[np.ndarray, Poses]:
@@ -459,38 +475,3 @@ def _weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.
     total = np.einsum("rs,rs->s", weights, chord)
     weights /= np.where(total > 0.0, total, np.inf)
     return weights, np.einsum("rs,rs->s", weights, start)
-
-
-def _turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
-    """Put unit quaternions in place of what the channels (10, m) turn by."""
-    if order is not None:
-        rows[ROWS[ROTATION]] = quaternions_from_extrinsic_eulers(rows[3:6].T, order).T
-        return
-    quaternions = rows[ROWS[ROTATION]]
-    lengths = np.sqrt(np.einsum("rm,rm->m", quaternions, quaternions))
-    if not lengths.all():
-        # Blender turns by half a turn about x where a quaternion has no length.
-        quaternions[1, lengths == 0.0] = lengths[lengths == 0.0] = 1.0
-    quaternions /= lengths
-
-
-def _key_poses(start: np.ndarray, end: np.ndarray, own: np.ndarray, source: Source) -> Poses:
-    """The poses that segments run between, shape (S, 2), with the objects' own delta transforms (10, S)."""
-    own = own[:, :, None]
-    for rows in (start, end):
-        _turn_into_quaternions(rows, source.order)
-    ends = np.stack((start, end), axis=2)
-    return Poses(
-        np.moveaxis(ends[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1),
-        multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(ends[ROWS[ROTATION]], 0, -1)),
-        ends[7] if source.uniform_scale else None,
-    )
-
-
-def _differ(poses: Poses, native: np.ndarray, delta: np.ndarray) -> None:
-    """Set deltas (., m) to what takes Blender's in-betweens (., m), which may be in their place, to these poses."""
-    np.subtract(poses.positions.T, native[ROWS[LOCATION]], out=delta[ROWS[LOCATION]])
-    multiply(poses.quaternions, conjugate(native[ROWS[ROTATION]].T), out=delta[ROWS[ROTATION]].T)
-    if poses.scales is not None:
-        scale = native[ROWS[SCALE]]
-        delta[ROWS[SCALE]] = np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)

@@ -66,6 +66,7 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
         and {row: value for row, value in old.rest.items() if row >= 3}
         == {row: value for row, value in new.rest.items() if row >= 3}
         and np.array_equal(old.original, new.original)
+        and _axes_bytes(old) == _axes_bytes(new)
         and _mode_bytes(old) == _mode_bytes(new)
         and [rows for rows, _ in old.channels] == [rows for rows, _ in new.channels]
     )
@@ -139,6 +140,10 @@ def _arrays(keys: Keys) -> dict[str, np.ndarray]:
     """The arrays that keys are made of."""
     arrays = {name: getattr(keys, name) for name in _OTHER_AXES}
     return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _axes_bytes(source: Source) -> bytes | None:
+    return None if source.location_axes is None else source.location_axes.tobytes()
 
 
 def _mode_bytes(source: Source) -> bytes | int:

@@ -17,7 +17,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..actions.mode_property import adopt_from_properties, show_awaited, show_modes
-from ..actions.reading import differing_users, keyed_in, leading, sources_of_users
+from ..actions.reading import keyed_in, leading
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import (
@@ -29,10 +29,9 @@ from ..actions.slots import (
     transforms_in,
 )
 from ..actions.sources import Source
-from ..transforms import ObjectTransform, Refused, Transform, transform_of
+from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, transform_of
 from . import glances, insertion, known_sources
 from .densification import keep_motion
-from .differences import differences
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
 from .outlets import outlet_of, release, remove_orphans
 
@@ -59,6 +58,12 @@ class _State:
 
     edited = False
     """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
+
+    followed: ClassVar[set[int]] = set()
+    """The Actions, by session id, that were followed before Blender evaluated them."""
+
+    moved: ClassVar[set[Transform]] = set()
+    """What these move."""
 
     operator = (0, "")
     """The operator that had ended last when edits were last seen."""
@@ -139,37 +144,6 @@ def follow_original(transform: ObjectTransform) -> None:
             return
         transform.follow_original()
         _refresh(slot_transforms_of([transform]))
-
-
-def problem_of(target: bpy.types.Object | Transform) -> str:
-    """Why something does not move as its mode says, and the way out; "" where nothing is amiss."""
-    transform = transform_of(target)
-    places = slot_transforms_of([transform])
-    try:
-        for place, sources in zip(places, sources_of_users(places), strict=True):
-            source = sources[place.users.index(transform)]
-            if isinstance(source, Refused):
-                raise source
-            refuse_numbers(transform.name, source)
-            if source.is_live:
-                differences([source])
-                _refuse_differing(transform, place, sources)
-    except Refused as problem:
-        return str(problem)
-    except ValueError as problem:
-        return f"{transform.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
-    return ""
-
-
-def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[Source | Refused]) -> None:
-    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
-    if transform in (differing := differing_users(place, sources)):
-        leader = next(user for user in place.users if user not in differing)
-        raise Refused(
-            f"{transform.name} moves by the same Action slot as {leader.name}, but has another rotation mode or delta "
-            f"transform; the in-betweens are those of {leader.name}: give it an Action of its own "
-            "(Object > Relations > Make Single User)"
-        )
 
 
 def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused] | None = None) -> int:
@@ -262,18 +236,23 @@ def _turn() -> Iterator[bool]:
             _State.busy = False
 
 
-def _follow(depsgraph: bpy.types.Depsgraph, *, edited: bool) -> set[Transform]:
-    """Refresh after an update in which Actions were edited or not, and say what those move."""
-    if _State.unseen:
-        _look_through()
-    if not edited:
-        return set()
-    actions = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+def _follow(actions: Iterable[bpy.types.Action]) -> set[Transform]:
+    """Refresh what these Actions, which were edited, move; and say what that is."""
     places = [place for slot in slots_in(actions) for place in transforms_in(slot, glances.changed_in(slot))]
     with _turn() as ours:
         if ours:
             _refresh(places)
     return {user for place in places for user in place.users}
+
+
+def _edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Action]:
+    """The Actions that wait to be evaluated, or just were."""
+    if depsgraph is None or not depsgraph.id_type_updated("ACTION"):
+        return []
+    # By name: the original of what was deleted just now is no longer there to be asked for.
+    blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+    found = (bpy.data.actions.get((block.name, block.library and block.library.filepath)) for block in blocks)
+    return [action for action in found if action is not None]
 
 
 def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Transform]) -> None:
@@ -305,9 +284,8 @@ def _concerns_us(obj: bpy.types.Object) -> bool:
 
 def _has_mode(obj: bpy.types.Object) -> bool:
     """Whether an object itself has, or had, anything to do with modes."""
-    return _has_properties(obj) or any(
-        not record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
-    )
+    records = (record for action in actions_of(obj) for record in action.rigid_motion.slots)
+    return _has_properties(obj) or any(not record.prefix for record in records)
 
 
 def _has_properties(obj: bpy.types.Object) -> bool:
@@ -386,14 +364,25 @@ def _careful(handler: Callable) -> Callable:
 
 @_careful
 def _before_update(scene: bpy.types.Scene, *_: object) -> None:
-    _before_evaluation(scene, scene.frame_current_final)
+    _State.frame = scene.frame_current_final
+    _before_evaluation(scene, _State.frame)
+    # In-betweens that are there by now are evaluated with the edit; later they would cost an evaluation of their own.
+    edited = {action for layer in scene.view_layers for action in _edited_actions(layer.depsgraph)}
+    _State.followed = {action.session_uid for action in edited}
+    _State.moved = _follow(edited) if edited else set()
+    insertion.forget_poses(_State.moved)
 
 
 @_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
-    seen = _follow(depsgraph, edited=depsgraph.id_type_updated("ACTION"))
-    insertion.forget_poses(seen)
+    if _State.unseen:
+        _look_through()
+    edited = _edited_actions(depsgraph)
+    later = _follow([action for action in edited if action.session_uid not in _State.followed])
+    insertion.forget_poses(later)
+    seen = _State.moved | later
+    _State.followed, _State.moved = set(), set()
     if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
         _follow_objects(depsgraph, _State.frame, seen)
 
@@ -409,7 +398,10 @@ def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
 @_careful
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     # Edits that nobody has seen yet were made on the frame before this one.
-    _follow(depsgraph, edited=_State.edited)
+    if _State.unseen:
+        _look_through()
+    elif _State.edited:
+        _follow(_edited_actions(depsgraph))
     insertion.forget_poses()
     _State.frame = scene.frame_current_final
 
@@ -418,6 +410,14 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def _on_file(*_: object) -> None:
     _State.frame = bpy.context.scene.frame_current_final if bpy.context.scene else 0.0
     _look_through()
+
+
+@_careful
+def _before_saving(*arguments: object) -> None:
+    _on_file(*arguments)
+    for obj in bpy.data.objects:
+        if obj.rigid_motion.has_bones:
+            let_override_be_read(obj)
 
 
 @_careful
@@ -452,7 +452,7 @@ HANDLERS = {
     "undo_post": _on_undo,
     "redo_post": _on_undo,
     "load_post": _on_load,
-    "save_pre": _on_file,
+    "save_pre": _before_saving,
     "render_init": _on_file,
 }
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..actions.channels import replace_keys
 from ..actions.mode_property import await_mode, is_keyed
-from ..actions.reading import read
+from ..actions.reading import keyed_in, read
 from ..actions.records import record_mode, recorded_mode
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.slots import SlotTransform, places_of, slot_transforms_of
@@ -49,6 +49,30 @@ def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
     return source if source and source.channels else None
 
 
+def active_places_of(transforms: Sequence[Transform]) -> dict[Transform, SlotTransform]:
+    """`active_place` of each that has one, by a single look."""
+    wanted, found = set(transforms), {}
+    for place in slot_transforms_of(transforms):
+        for user in place.users:
+            data = user.animated.animation_data
+            if user in wanted and (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle):
+                found[user] = place
+    return found
+
+
+def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
+    """What is keyed in each of these, None where nothing is or rigid motion cannot act on it."""
+    found: list[Source | None] = []
+    for place, source in zip(places, keyed_in(places), strict=True):
+        try:
+            if isinstance(source, Source):
+                refuse_numbers(place.name, source)
+            found.append(source if isinstance(source, Source) and source.channels else None)
+        except Refused:
+            found.append(None)
+    return found
+
+
 def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
     """The frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
 
@@ -56,7 +80,7 @@ def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False)
     """
     transform = transform_of(carrier)
     place = active_place(transform, places_of(transform))
-    return np.empty(0) if place is None else _frames_in(place, selected=selected)
+    return np.empty(0) if place is None else frames_in(place, selected=selected)
 
 
 def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
@@ -65,15 +89,16 @@ def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[
     place = active_place(transform, places_of(transform))
     if place is None:
         return [transform.motion.mode or "BLENDER"] * len(frames)
-    return [MODE_NAMES[number] for number in _modes_in(place, frames)]
+    return [MODE_NAMES[number] for number in _modes_in(place, np.asarray(frames, dtype=np.float64))]
 
 
 def segment_modes(place: SlotTransform) -> list[str]:
     """The modes of the segments between the keys of a slot, one after the other."""
-    return [MODE_NAMES[number] for number in _modes_in(place, _frames_in(place)[:-1])]
+    return [MODE_NAMES[number] for number in _modes_in(place, frames_in(place)[:-1])]
 
 
-def _frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
+def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
+    """`key_frames` in a slot."""
     found = []
     transform = place.users[0]
     for channel, fcurve in place.curves.items():
@@ -175,7 +200,7 @@ def set_whole(place: SlotTransform, mode: str) -> None:
 
 def set_mode_in(place: SlotTransform, mode: str, frames: Sequence[float]) -> None:
     """Key the mode channel of a slot on these frames, and behind them where another mode goes on."""
-    chosen, keyed = np.asarray(frames, dtype=np.float64), _frames_in(place)
+    chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(place)
     is_chosen = _is_among(chosen, keyed)
     wanted = np.where(is_chosen, MODE_NUMBERS[mode], _modes_in(place, keyed))
     channel = place.users[0].mode_channel

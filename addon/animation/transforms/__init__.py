@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import bpy
 
-from .bones import CONSTRAINT, BoneTransform, bone_name, is_ours, prefix_of, split_path
+from .bones import CONSTRAINT, BoneTransform, bone_name, is_ours, let_override_be_read, prefix_of, split_path
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .objects import GROUP, ORIGINALS, ObjectTransform, default_of
 from .transform import MODE_PROPERTY, WIDTHS, Channel, Refused, Transform, properties_for
@@ -36,6 +36,7 @@ __all__ = [
     "bone_name",
     "default_of",
     "is_ours",
+    "let_override_be_read",
     "prefix_of",
     "properties_for",
     "split_path",

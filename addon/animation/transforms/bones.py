@@ -38,6 +38,15 @@ class BoneTransform(Transform):
     def group(self) -> str:
         return self.carrier.name
 
+    @property
+    def location_axes(self) -> np.ndarray | None:
+        """Without *Local Location* a bone is moved along the axes of its parent, and still turns about its own."""
+        bone = self.carrier.bone
+        if bone.use_local_location:
+            return None
+        axes = bone.matrix_local.to_3x3().transposed()
+        return np.array(axes @ bone.parent.matrix_local.to_3x3() if bone.parent else axes)
+
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under(self.prefix, rotation)
 
@@ -71,3 +80,15 @@ def bone_name(prefix: str) -> str:
     """The name of the bone that data paths which begin so speak of."""
     found = _BONE.fullmatch(prefix)
     return "" if found is None else bpy.utils.unescape_identifier(found[1])
+
+
+def let_override_be_read(rig: bpy.types.Object) -> None:
+    """Have what an override keeps on bones be there when its file is opened again.
+
+    Blender 5 does not read it where the library has nothing of the kind on the bone, not even what is made when it is
+    asked for.
+    """
+    override = rig.override_library
+    if override is not None and override.reference is not None:
+        for bone in override.reference.pose.bones:
+            bone.rigid_motion  # noqa: B018

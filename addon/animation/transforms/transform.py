@@ -53,6 +53,11 @@ class Transform(ABC):
         return self.carrier.name
 
     @property
+    def location_axes(self) -> np.ndarray | None:
+        """The axes that it is moved along, as columns (3, 3) in those that it turns about; None where they are one."""
+        return None
+
+    @property
     @abstractmethod
     def group(self) -> str:
         """The group of F-curves that its mode channel is in."""

@@ -1,8 +1,8 @@
-"""The overlay of the 3D viewport: paths of the selected objects, Blender's own beside that of a rigid-motion mode.
+"""The overlay of the 3D viewport: paths of selected objects or bones, Blender's own beside that of a rigid-motion mode.
 
 settings    what to show                    points      where the paths lead, as arrays
-cache       what is worked out already      spacing     which ticks can be told apart in a view
-drawing     lines and dots on the screen
+bones       which point of a bone is shown   spacing     which ticks can be told apart in a view
+cache       what is worked out already      drawing     lines and dots on the screen
 """
 
 from __future__ import annotations

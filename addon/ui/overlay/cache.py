@@ -8,15 +8,19 @@ that is merely played, or looked at from elsewhere, costs no more than looking p
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
-from ...animation import key_frames
-from ...animation.inbetweens.mode_keys import source_of
-from ...animation.transforms import Transform, transform_of
+from ...animation.actions.slots import SlotTransform
+from ...animation.actions.sources import Source
+from ...animation.inbetweens.mode_keys import active_places_of, frames_in, sources_of
+from ...animation.transforms import BoneTransform, Transform, transform_of
+from .bones import axis_length_of_bone, followed
 from .points import Path, axis_length_of, trace
 
 SPARE = 64
@@ -30,13 +34,13 @@ class _Entry:
     """Of all that the path depends on."""
 
     settings: tuple
-    """The part of it that is the scene's."""
+    """The part of it that is the scene's, and what stands between a bone's rotation and its location, as bytes."""
 
     action: int
     """Session id of the Action that the path was read from, 0 for none."""
 
     selected: bytes = b""
-    """The frames of the keys that were selected."""
+    """Which keys of its channels were selected."""
 
     stale: bool = False
 
@@ -45,20 +49,38 @@ _entries: OrderedDict[tuple[int, str], _Entry] = OrderedDict()
 """By the identity of what is moved; those drawn last come last."""
 
 
-def path_of(target: bpy.types.Object | Transform, scene: bpy.types.Scene) -> Path | None:
+def path_of(target: bpy.types.Object | bpy.types.PoseBone | Transform, scene: bpy.types.Scene) -> Path | None:
     """The path of a target, as the overlay of the scene is set.
 
     None where it has none: without keys in its Action, with a single one, and where rigid motion is refused.
     """
-    target = transform_of(target)
+    return paths_of([transform_of(target)], scene)[0]
+
+
+def paths_of(
+    targets: Sequence[Transform], scene: bpy.types.Scene, turned: Mapping[Transform, np.ndarray | None] | None = None
+) -> list[Path | None]:
+    """The paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
     overlay = scene.rigid_motion_overlay
     settings = (overlay.mode, overlay.tick_step, overlay.axes_size, scene.frame_start, scene.frame_end)
-    identity = _identity(target)
-    entry = _entries.get(identity)
-    if entry is None or entry.stale or entry.settings != settings:
-        entry = _entries[identity] = _read(target, settings, entry)
-    _entries.move_to_end(identity)
-    return entry.path
+    stale: dict[Transform, np.ndarray | None] = {}
+    for target in targets:
+        entry, turn = _entries.get(_identity(target)), (turned or {}).get(target)
+        if entry is None or entry.stale or entry.settings != (*settings, _bytes(turn)):
+            stale[target] = turn
+    if stale:
+        places = active_places_of(list(stale))
+        sources = dict(zip(places, sources_of(list(places.values())), strict=True))
+        for target, turn in stale.items():
+            before = _entries.get(_identity(target))
+            _entries[_identity(target)] = _read(target, places.get(target), sources.get(target), settings, turn, before)
+    for target in targets:
+        _entries.move_to_end(_identity(target))
+    return [_entries[_identity(target)].path for target in targets]
+
+
+def _bytes(turn: np.ndarray | None) -> bytes:
+    return b"" if turn is None else turn.astype(np.float32).tobytes()
 
 
 def keep_only(drawn: int) -> None:
@@ -72,13 +94,10 @@ def notice_selection(targets: Iterable[bpy.types.Object | Transform]) -> bool:
 
     Selecting is no edit, so Blender's handlers are silent about it.
     """
-    targets = map(transform_of, targets)
-    entries = [(entry, target) for target in targets if (entry := _entries.get(_identity(target))) is not None]
-    changed = [
-        entry
-        for entry, target in entries
-        if entry.path and entry.selected != key_frames(target, selected=True).tobytes()
-    ]
+    entries = {target: entry for target in map(transform_of, targets) if (entry := _entries.get(_identity(target)))}
+    drawn = [target for target, entry in entries.items() if entry.path]
+    places = active_places_of(drawn) if drawn else {}
+    changed = [entries[target] for target in drawn if entries[target].selected != _selection(places.get(target))]
     for entry in changed:
         entry.stale = True
     return bool(changed)
@@ -88,26 +107,47 @@ def _identity(target: Transform) -> tuple[int, str]:
     return target.animated.session_uid, target.prefix
 
 
-def _read(target: Transform, settings: tuple, before: _Entry | None) -> _Entry:
+def _selection(place: SlotTransform | None) -> bytes:
+    """Which keys are selected, channel by channel: quicker to have than their frames."""
+    found = []
+    for fcurve in place.curves.values() if place is not None else ():
+        chosen = np.empty(len(fcurve.keyframe_points), bool)
+        fcurve.keyframe_points.foreach_get("select_control_point", chosen)
+        found.append(chosen.tobytes())
+    return b"".join(found)
+
+
+def _read(
+    target: Transform,
+    place: SlotTransform | None,
+    source: Source | None,
+    settings: tuple,
+    turn: np.ndarray | None,
+    before: _Entry | None,
+) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
-    entry = _Entry(None, (), settings, action.session_uid if action else 0)
-    try:
-        source = source_of(target)
-        if source is not None:
-            mode, tick_step, axes_size, *_ = settings
-            selected = key_frames(target, selected=True)
-            axis_length = axes_size * axis_length_of(target.carrier, source)
-            entry.selected = selected.tobytes()
-            # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
-            entry.digest = (source.digest, tuple(source.rest.items()), entry.selected, axis_length, settings)
-            if before is not None and before.digest == entry.digest:
-                entry.path = before.path
-            else:
-                entry.path = trace(source, None if mode == "CHOSEN" else mode, tick_step, axis_length, selected)
-    except ValueError:
-        # Refused. The panel says why.
-        pass
+    entry = _Entry(None, (), (*settings, _bytes(turn)), action.session_uid if action else 0)
+    if place is None or source is None:
+        # Where it was refused, the panel says why.
+        return entry
+    mode, tick_step, axes_size, *_ = settings
+    point = None
+    if isinstance(target, BoneTransform):
+        point, size = followed(target.carrier, source, turn), axis_length_of_bone(target.carrier, source)
+    else:
+        size = axis_length_of(target.carrier, source)
+    entry.selected = _selection(place)
+    # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
+    of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
+    selected = frames_in(place, selected=True)
+    entry.digest = (source.digest, tuple(source.rest.items()), of_point, selected.tobytes(), size, entry.settings)
+    if before is not None and before.digest == entry.digest:
+        entry.path = before.path
+    else:
+        with suppress(ValueError):  # numbers that make no motion
+            chosen = None if mode == "CHOSEN" else mode
+            entry.path = trace(source, chosen, tick_step, axes_size * size, selected, point)
     return entry
 
 

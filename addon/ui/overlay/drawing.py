@@ -15,13 +15,15 @@ from weakref import WeakKeyDictionary
 import bpy
 import gpu
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ...animation.inbetweens.describing import frame_in_action
-from ...animation.transforms import transform_of
+from ...animation.transforms import BoneTransform, Transform, transform_of
 from ..look import DEFAULT_LOOK, Color
 from ..preferences import preferences
+from ..targets import selected_in_view
 from . import cache
+from .bones import space_of_bone
 from .points import TICKS, Path, space_of, thinned
 from .settings import RigidMotionOverlay, are_paths_shown
 from .spacing import Readable, readable
@@ -202,7 +204,7 @@ class _Pen:
 
 
 def draw_paths() -> None:
-    """Draw the paths of the selected objects in the viewport that is being drawn. It never raises."""
+    """Draw the paths of the selected objects or bones in the viewport that is being drawn. It never raises."""
     try:
         if are_paths_shown(bpy.context):
             _draw(bpy.context)
@@ -217,7 +219,7 @@ def follow_selection() -> None:
         # While it plays the viewports are drawn anyway, as fast as they can be.
         if not are_paths_shown(context) or context.screen.is_animation_playing:
             return
-        if cache.notice_selection(context.selected_objects):
+        if cache.notice_selection(selected_in_view(context)):
             for window in context.window_manager.windows:
                 for area in window.screen.areas:
                     if area.type == "VIEW_3D":
@@ -236,8 +238,10 @@ def _complain(problem: Exception) -> None:
 
 def _draw(context: bpy.types.Context) -> None:
     scene, depsgraph = context.scene, context.view_layer.depsgraph
-    settings, targets = scene.rigid_motion_overlay, list(map(transform_of, context.selected_objects))
-    paths = [(target, path) for target in targets if (path := cache.path_of(target, scene)) is not None]
+    settings, targets = scene.rigid_motion_overlay, list(map(transform_of, selected_in_view(context)))
+    spaces = {target: _space_of(target, depsgraph) for target in targets}
+    found = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
+    paths = [(target, path) for target, path in zip(targets, found, strict=True) if path is not None]
     cache.keep_only(len(targets))
     if not paths:
         return
@@ -248,7 +252,7 @@ def _draw(context: bpy.types.Context) -> None:
     gpu.state.program_point_size_set(True)
     try:
         for target, path in paths:
-            space = space_of(target.carrier, depsgraph)
+            space, _ = spaces[target]
             with gpu.matrix.push_pop():
                 gpu.matrix.multiply_matrix(space)
                 _draw_path(pen, path, settings)
@@ -262,6 +266,13 @@ def _draw(context: bpy.types.Context) -> None:
     finally:
         gpu.state.program_point_size_set(False)
         gpu.state.blend_set("NONE")
+
+
+def _space_of(target: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
+    """Where a path leads in the world, and what stands between rotation and location in it, for bones."""
+    if isinstance(target, BoneTransform):
+        return space_of_bone(target.carrier, depsgraph)
+    return space_of(target.carrier, depsgraph), None
 
 
 def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:

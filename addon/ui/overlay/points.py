@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -35,9 +36,36 @@ FINENESS = 5000
 """How many times its width a line may be wide on the screen until corners show."""
 
 
+class Followed(NamedTuple):
+    """Which point of something a path is of, where it is not the origin."""
+
+    moves: bool
+    """Whether its location counts."""
+
+    stays: np.ndarray
+    """Where it is besides, shape (3,)."""
+
+    tip: np.ndarray
+    """The point on its own axes, shape (3,)."""
+
+    turned: np.ndarray | None
+    """What its rotation, and the axes with it, are turned by in the space of its location, shape (3, 3)."""
+
+    def points(self, poses: Poses) -> np.ndarray:
+        """Where the point is at these poses, shape (n, 3)."""
+        arms = rotate(poses.quaternions, self.tip)
+        if poses.scales is not None:
+            arms = poses.scales[:, None] * arms
+        return poses.positions * self.moves + self.stays + self.strokes(arms)
+
+    def strokes(self, vectors: np.ndarray) -> np.ndarray:
+        """What vectors that turn with it are in the space of its location, shape (..., 3)."""
+        return vectors if self.turned is None else vectors @ self.turned.T
+
+
 @dataclass(frozen=True, eq=False)
 class Path:
-    """The path of one object's origin, as Blender's own in-betweens have it and as a mode has it."""
+    """The path of an object's origin or of a point of a bone: as Blender's in-betweens have it, and as a mode does."""
 
     frames: np.ndarray
     """Shape (m,), rising, with the whole frames (or as many of them as can be told apart) and the keys."""
@@ -87,6 +115,7 @@ def trace(
     tick_step: int = 0,
     axis_length: float = 1.0,
     selected: np.ndarray | None = None,
+    followed: Followed | None = None,
 ) -> Path | None:
     """The path of a source, None where it has fewer than two keys.
 
@@ -101,6 +130,8 @@ def trace(
         Of the axes at the ticks, in the unit of the channels, at scale 1.
     selected : array, shape (n,), optional
         The frames of the keys that are selected.
+    followed : Followed, optional
+        The point that the path is of, where it is not the origin.
 
     Raises
     ------
@@ -120,7 +151,10 @@ def trace(
         np.searchsorted(frames, wanted_frames) for wanted_frames in (samples, keys, ticks, with_axes)
     )
     is_native = not source.is_live if mode is None else mode == "BLENDER"
-    native, wanted = motion.native.positions, motion.wanted.positions
+    shown = motion.native if is_native else motion.wanted
+    native, wanted = (
+        poses.positions if followed is None else followed.points(poses) for poses in (motion.native, motion.wanted)
+    )
     return Path(
         frames=samples,
         native=native[on_samples],
@@ -131,7 +165,7 @@ def trace(
         native_ticks=native[on_ticks],
         wanted_ticks=None if is_native else wanted[on_ticks],
         axis_frames=with_axes,
-        axes=_axes((motion.native if is_native else motion.wanted)[on_axes], axis_length),
+        axes=_axes((native if is_native else wanted)[on_axes], shown[on_axes], axis_length, followed),
     )
 
 
@@ -170,11 +204,13 @@ def _round_step(length: int, most: int) -> int:
     )
 
 
-def _axes(poses: Poses, length: float) -> np.ndarray:
-    """Both ends of the local axes at each pose, shape (n, 3, 2, 3)."""
+def _axes(points: np.ndarray, poses: Poses, length: float, followed: Followed | None) -> np.ndarray:
+    """Both ends of the local axes at each pose, from these points on, shape (n, 3, 2, 3)."""
     lengths = np.full(len(poses), length) if poses.scales is None else length * poses.scales
     strokes = lengths[:, None, None] * rotate(poses.quaternions[:, None], np.eye(3))
-    starts = np.broadcast_to(poses.positions[:, None], strokes.shape)
+    if followed is not None:
+        strokes = followed.strokes(strokes)
+    starts = np.broadcast_to(points[:, None], strokes.shape)
     return np.stack((starts, starts + strokes), axis=2)
 
 

@@ -14,7 +14,8 @@ MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MO
 class RigidMotionOverlay(bpy.types.PropertyGroup):
     show_paths: BoolProperty(
         name="Rigid Motion Paths",
-        description="Draw the paths of the selected objects: Blender's own, and beside it that of a rigid-motion mode. "
+        description="Draw the paths of the selected objects or bones: Blender's own, and beside it that of a "
+        "rigid-motion mode. Of a bone it is the path of its head, or of its tail where the bone only turns. "
         "Parents are taken as they are on the current frame",
         options=set(),
     )
@@ -32,13 +33,13 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
     )
     show_axes: BoolProperty(
         name="Axes",
-        description="Draw how the object is turned along its path, by its local axes at some of the ticks",
+        description="Draw how it is turned along its path, by its local axes at some of the ticks",
         default=True,
         options=set(),
     )
     axes_size: FloatProperty(
         name="Size",
-        description="Length of the axes. At 1 they are half as long as the object is",
+        description="Length of the axes. At 1 they are half as long as the object or bone is",
         default=1.0,
         min=0.01,
         soft_max=5.0,

@@ -110,6 +110,7 @@ def key_bone(
     turned = amount * random.normal(size=(len(frames), WIDTHS[rotation_path(pose_bone)]))
     if pose_bone.rotation_mode == "QUATERNION" and amount < 1.0:
         turned += (1.0, 0.0, 0.0, 0.0)
+        turned /= np.linalg.norm(turned, axis=1, keepdims=True)
     values[rotation_path(pose_bone)] = turned
     if scale:
         grown = random.normal(size=(len(frames), 3))

@@ -87,7 +87,7 @@ def test_every_mode_is_exact_in_every_setting_on_every_frame(live_file, order, s
 
 
 @pytest.mark.parametrize(
-    ("setting", "order"), in_turn(["plain", *(name for name in SETTINGS if "inherits scale" in name)], ORDERS)
+    ("setting", "order"), in_turn(sample(["plain", *(name for name in SETTINGS if "inherits scale" in name)]), ORDERS)
 )
 def test_below_parents_that_are_scaled_unevenly_bones_move_as_with_real_keys(live_file, order, setting):
     rig = pairs(order, "uneven", setting)

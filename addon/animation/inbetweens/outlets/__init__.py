@@ -2,6 +2,7 @@
 
 outlet   the interface                                  sampled      F-curves without keys
 deltas   objects                                        constraints  pose bones
+                                                        restoring    their constraints
 """
 
 from __future__ import annotations

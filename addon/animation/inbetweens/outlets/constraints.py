@@ -21,7 +21,7 @@ from mathutils import Euler, Quaternion
 
 from ...actions.channels import add_cycles, replace_keys
 from ...actions.records import ensure_record, record_of, recorded_digest
-from ...actions.slots import Slot, SlotTransform, actions_of, slot_transforms_of, strips_of
+from ...actions.slots import Slot, SlotTransform, slot_transforms_of, strips_of, uses_of
 from ...actions.sources import Source
 from ...curves import Cycles
 from ...transforms import (
@@ -51,7 +51,6 @@ SETTINGS = {
     "target_space": "LOCAL",
 }
 """How the constraint mixes: location added, rotation from the left, scale multiplied, and transforms by hand see it."""
-
 
 MOST_FRAMES = 1_048_574
 """The last frame that Blender lets a constraint have."""
@@ -86,7 +85,7 @@ class Constraints(Outlet):
         for user in place.users if place.filled else ():
             if user.animated.is_editable:
                 if not _is_mounted(user, place):
-                    _mount(user, place)
+                    mount(user, place)
                 if _has_stale(user):
                     self.release([user])
 
@@ -131,7 +130,7 @@ class Constraints(Outlet):
         for place in slot_transforms_of(bones):
             if place.filled:
                 for user in place.users:
-                    shown.setdefault(user, set()).add(_slot_of_differences(place))
+                    shown.setdefault(user, set()).add(slot_of_differences(place))
         for bone in bones:
             if bone.animated.is_editable:
                 _dismount(bone, shown.get(bone, set()))
@@ -171,15 +170,16 @@ def remove_orphans(slot: Slot) -> None:
 
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
     """The constraint that shows the differences of a slot on a bone."""
-    wanted = _slot_of_differences(place)
-    return next((one for one in user.carrier.constraints if is_ours(one) and _shown_by(one) == wanted), None)
+    wanted = slot_of_differences(place)
+    return next((one for one in user.carrier.constraints if is_ours(one) and shown_by(one) == wanted), None)
 
 
-def _shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
+def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
+    """The Action and the handle of the slot in it that a constraint shows."""
     return constraint.action, constraint.action_slot_handle
 
 
-def _slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
+def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
     """The Action and the handle of the slot in it that the differences are in, 0 where there is none yet."""
     pairs = place.slot.action.rigid_motion.bone_slots
     handle = next((pair.differences for pair in pairs if pair.handle == place.slot.handle), 0)
@@ -191,27 +191,39 @@ def _is_mounted(user: Transform, place: SlotTransform) -> bool:
     constraint = constraint_of(user, place)
     if constraint is None:
         return not _is_free_to_mount(user, place)
-    return (constraint.name, constraint.frame_start, constraint.frame_end) == (_name(place), *_span(place))
+    return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(place), *_span(place))
 
 
 def _has_stale(user: BoneTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
-    shown = [_shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
-    actions = set(actions_of(user.animated))
-    return len(set(shown)) < len(shown) or any(action not in actions for action, _ in shown)
+    shown = [shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
+    return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
+
+
+def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
+    """The Actions of a rig, and the handles of the slots in them that differences of its bones are in."""
+    return {
+        (action, pair.differences)
+        for action, handle, _ in uses_of(rig).values()
+        for pair in action.rigid_motion.bone_slots
+        if pair.handle == handle
+    }
 
 
 def _is_free_to_mount(user: Transform, place: SlotTransform) -> bool:
     """Whether a bone lacks a constraint that nobody took off it."""
-    name = _name(place)
+    name = name_of(place)
     present = user.carrier.constraints.get(name)
     return name not in user.motion.mounted.split("\n") or (present is not None and is_ours(present))
 
 
-def _mount(user: BoneTransform, place: SlotTransform) -> None:
+def mount(user: BoneTransform, place: SlotTransform) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
-    constraints, name = user.carrier.constraints, _name(place)
+    constraints, name = user.carrier.constraints, name_of(place)
     constraint = constraint_of(user, place) or constraints.get(name)
+    if constraint is not None and not (is_ours(constraint) and _is_to_be_had(constraint, user, place)):
+        # This slot gets a constraint of another name when it is written.
+        return
     if constraint is None:
         constraint = constraints.new("ACTION")
         for setting, value in SETTINGS.items():
@@ -219,25 +231,31 @@ def _mount(user: BoneTransform, place: SlotTransform) -> None:
         constraints.move(len(constraints) - 1, 0)
         constraint = constraints[0]
         constraint.show_expanded = False
+    names = [one for one in user.motion.mounted.split("\n") if one not in ("", name, constraint.name)]
     if constraint.name != name:
         constraint.name = name
-    action, handle = _slot_of_differences(place)
-    if _shown_by(constraint) != (action, handle):
+    action, handle = slot_of_differences(place)
+    if shown_by(constraint) != (action, handle):
         constraint.action = action
         constraint.action_slot = next(slot for slot in action.slots if slot.handle == handle)
     constraint.frame_start, constraint.frame_end = _span(place)
-    names = user.motion.mounted.split("\n") if user.motion.mounted else []
-    if name not in names:
-        user.motion.mounted = "\n".join((*names, name))
+    if (mounted := "\n".join((*names, name))) != user.motion.mounted:
+        user.motion.mounted = mounted
     if not user.animated.rigid_motion.has_bones:
         user.animated.rigid_motion.has_bones = True
+
+
+def _is_to_be_had(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
+    """Whether a constraint shows a slot already, or one that does not move the rig any more."""
+    shown = shown_by(constraint)
+    return shown == slot_of_differences(place) or shown not in _in_use(user.animated)
 
 
 def _dismount(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
     """Take the constraints off a bone that show something else than these."""
     constraints, names, left = user.carrier.constraints, [], set(shown)
     for constraint in [one for one in constraints if is_ours(one)]:
-        if (what := _shown_by(constraint)) in left:
+        if (what := shown_by(constraint)) in left:
             left.remove(what)
             names.append(constraint.name)
         else:
@@ -259,7 +277,7 @@ def _duration(last: int) -> int:
     return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
 
 
-def _name(place: SlotTransform) -> str:
+def name_of(place: SlotTransform) -> str:
     record = record_of(place)
     return (record is not None and record.constraint) or CONSTRAINT
 
@@ -269,11 +287,11 @@ def _constraint_path(place: SlotTransform, name: str) -> str:
 
 
 def _time_path(place: SlotTransform) -> str:
-    return f"{_constraint_path(place, _name(place))}.eval_time"
+    return f"{_constraint_path(place, name_of(place))}.eval_time"
 
 
 def _influence_path(place: SlotTransform) -> str:
-    return f"{_constraint_path(place, _name(place))}.influence"
+    return f"{_constraint_path(place, name_of(place))}.influence"
 
 
 def _time(place: SlotTransform) -> bpy.types.FCurve | None:
@@ -421,8 +439,8 @@ def _avoid_names(place: SlotTransform) -> None:
     tracked = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
     if tracked:
         others = slot_transforms_of(tracked)
-        taken |= {_name(other) for other in others if recorded_digest(other) and not _is_same(other, place)}
-    if _name(place) in taken:
+        taken |= {name_of(other) for other in others if recorded_digest(other) and not _is_same(other, place)}
+    if name_of(place) in taken:
         _remove_time(place)
         numbers = (f"{CONSTRAINT}.{number:03d}" for number in range(1, 1000))
         name = next(name for name in (CONSTRAINT, *numbers) if name not in taken)

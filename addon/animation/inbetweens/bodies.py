@@ -1,0 +1,56 @@
+"""From channels to the poses of a body, and back to what the channels differ by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...motion import Poses
+from ...motion.eulers import quaternions_from_extrinsic_eulers
+from ...motion.quaternions import conjugate, multiply
+from ..actions.sources import Source
+from ..transforms import LOCATION, ROTATION, ROWS, SCALE
+
+
+def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
+    """Put unit quaternions in place of what the channels (10, m) turn by."""
+    if order is not None:
+        rows[ROWS[ROTATION]] = quaternions_from_extrinsic_eulers(rows[3:6].T, order).T
+        return
+    quaternions = rows[ROWS[ROTATION]]
+    lengths = np.sqrt(np.einsum("rm,rm->m", quaternions, quaternions))
+    if not lengths.all():
+        # Blender turns by half a turn about x where a quaternion has no length.
+        quaternions[1, lengths == 0.0] = lengths[lengths == 0.0] = 1.0
+    quaternions /= lengths
+
+
+def key_poses(start: np.ndarray, end: np.ndarray, own: np.ndarray, source: Source) -> Poses:
+    """The poses that segments run between, shape (S, 2), with the objects' own delta transforms (10, S)."""
+    own = own[:, :, None]
+    for rows in (start, end):
+        turn_into_quaternions(rows, source.order)
+    ends = np.stack((start, end), axis=2)
+    return Poses(
+        np.moveaxis(ends[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1),
+        multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(ends[ROWS[ROTATION]], 0, -1)),
+        ends[7] if source.uniform_scale else None,
+    )
+
+
+def differ(poses: Poses, native: np.ndarray, delta: np.ndarray) -> None:
+    """Set deltas (., m) to what takes Blender's in-betweens (., m), which may be in their place, to these poses."""
+    np.subtract(poses.positions.T, native[ROWS[LOCATION]], out=delta[ROWS[LOCATION]])
+    multiply(poses.quaternions, conjugate(native[ROWS[ROTATION]].T), out=delta[ROWS[ROTATION]].T)
+    if poses.scales is not None:
+        scale = native[ROWS[SCALE]]
+        delta[ROWS[SCALE]] = np.divide(poses.scales, scale, out=np.ones_like(scale), where=scale != 0.0)
+
+
+def location_axes(sources: Sequence[Source], owners: np.ndarray) -> np.ndarray | None:
+    """The axes that the location of each segment's owner runs along, (S, 3, 3); None where all have their own."""
+    if all(source.location_axes is None for source in sources):
+        return None
+    same = np.eye(3)
+    return np.stack([same if (own := source.location_axes) is None else own for source in sources])[owners]

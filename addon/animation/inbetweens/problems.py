@@ -1,0 +1,45 @@
+"""Why something does not move as its mode says, in words, and the way out."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..actions.reading import differing_users, sources_of_users
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.sources import Source
+from ..transforms import Refused, Transform, transform_of
+from .differences import differences
+
+
+def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
+    """Why something does not move as its mode says, and the way out; "" where nothing is amiss."""
+    transform = transform_of(target)
+    places = slot_transforms_of([transform])
+    try:
+        for place, sources in zip(places, sources_of_users(places), strict=True):
+            source = sources[place.users.index(transform)]
+            if isinstance(source, Refused):
+                raise source
+            refuse_numbers(transform.name, source)
+            if source.is_live:
+                differences([source])
+                _refuse_differing(transform, place, sources)
+    except Refused as problem:
+        return str(problem)
+    except ValueError as problem:
+        return f"{transform.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
+    return ""
+
+
+def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[Source | Refused]) -> None:
+    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
+    if transform in (differing := differing_users(place, sources)):
+        leader = next(user for user in place.users if user not in differing)
+        reason = "another rotation mode or delta transform"
+        if transform.prefix:
+            reason = "another rotation mode or Local Location"
+        raise Refused(
+            f"{transform.name} moves by the same Action slot as {leader.name}, but has {reason}; the in-betweens are "
+            f"those of {leader.name}: give it an Action of its own (Object > Relations > Make Single User)"
+        )

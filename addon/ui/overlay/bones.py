@@ -1,0 +1,63 @@
+"""Paths of pose bones: which point of a bone is followed, and where its channels lead to.
+
+The path of a bone is that of its head, in the space of its channels, placed by its parent as it is posed on the current
+frame. The head of a bone that only turns stays where it is: there it is the path of the tail.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...animation.actions.sources import Source
+from ...animation.transforms import LOCATION
+from .points import Followed
+
+SAME = 1e-5
+"""Components of directions that differ by less are the same in single precision."""
+
+
+def space_of_bone(bone: bpy.types.PoseBone, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
+    """From the space of a bone's location channels into the world, as its parent is posed on the current frame.
+
+    Returns
+    -------
+    space : Matrix
+    turned : array, shape (3, 3), or None
+        What stands between its rotation and that space where these are not the same: where a bone does not inherit the
+        rotation or scale of its parent, or is not moved along its own axes. None where they are.
+    """
+    rig = bone.id_data.evaluated_get(depsgraph)
+    evaluated = rig.pose.bones[bone.name]
+    rest, parent = evaluated.bone, evaluated.parent
+    above = {} if parent is None else {"parent_matrix": parent.matrix, "parent_matrix_local": parent.bone.matrix_local}
+
+    def posed(basis: Matrix) -> Matrix:
+        return rest.convert_local_to_pose(basis, rest.matrix_local, **above)
+
+    stands = posed(Matrix())
+    space = Matrix.Translation(stands.translation)
+    for column in range(3):
+        unit = Vector(float(row == column) for row in range(3))
+        along = posed(Matrix.Translation(unit)).translation - stands.translation
+        for row in range(3):
+            space[row][column] = along[row]
+    turned = space.to_3x3().inverted_safe() @ stands.to_3x3()
+    turned = np.array(turned)
+    return rig.matrix_world @ space, None if np.abs(turned - np.eye(3)).max() < SAME else turned
+
+
+def followed(bone: bpy.types.PoseBone, source: Source, turned: np.ndarray | None) -> Followed:
+    """The point of a bone that its path is of."""
+    moves = LOCATION in source.keyed and not bone.bone.use_connect
+    stays = np.zeros(3) if moves or bone.bone.use_connect else np.array(bone.location)
+    tip = np.zeros(3) if moves else np.array((0.0, bone.bone.length, 0.0))
+    scale = np.ones(3) if moves or source.uniform_scale else np.array(bone.scale)
+    return Followed(moves, stays, tip * scale, turned)
+
+
+def axis_length_of_bone(bone: bpy.types.PoseBone, source: Source) -> float:
+    """How long to draw its local axes: half as long as it is. At scale 1, where the source has a scale."""
+    size = 0.5 * bone.bone.length
+    return float(size if source.uniform_scale else size * np.abs(np.array(bone.scale)).max()) or 1.0

@@ -1,0 +1,103 @@
+"""Bones without *Local Location*, as Rigify's controls of hands and feet: moved along their parent's axes, they turn
+about their own, and go by the same screw as if there was no such setting."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler, Matrix, Vector
+
+from addon import animation
+from addon.motion import KEYFRAME_MODES
+from tests.animation.oracle import curves_of
+from tests.rigs import scenes
+
+POSES = (
+    (1, (0.1, -0.4, 1.2), (0.9, 0.2, -0.4)),
+    (11, (0.5, 0.3, 0.7), (-0.3, 0.8, 0.6)),
+    (25, (-0.2, 0.6, 0.4), (0.2, -0.5, 1.4)),
+)
+"""Frame, head and Euler angles, in the space of the armature."""
+
+
+@pytest.fixture
+def pair(live_file) -> tuple[bpy.types.PoseBone, bpy.types.PoseBone]:
+    """Two bones at one place, askew below a parent that is askew too, of which the second is moved along other axes."""
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    ends = {"Parent": ((0.2, 0.1, 0.0), (0.3, 0.4, 0.5)), **dict.fromkeys("AB", ((0.4, 0.2, 0.6), (0.9, 0.4, 0.2)))}
+    for name, (head, tail) in ends.items():
+        bone = rig.data.edit_bones.new(name)
+        bone.head, bone.tail, bone.roll = head, tail, 0.7
+        bone.parent = None if name == "Parent" else rig.data.edit_bones["Parent"]
+    bpy.ops.object.mode_set(mode="POSE")
+    rig.data.bones["B"].use_local_location = False
+    bpy.context.view_layer.update()
+    return rig.pose.bones["A"], rig.pose.bones["B"]
+
+
+def pose(bones: tuple[bpy.types.PoseBone, ...], rotation_mode: str = "QUATERNION") -> None:
+    for bone in bones:
+        bone.rotation_mode = rotation_mode
+        for frame, head, angles in POSES:
+            scenes.key(bone, frame, Matrix.LocRotScale(Vector(head), Euler(angles), None))
+        # What Bezier handles make of a key in the middle depends on the axes.
+        for fcurve in curves_of(bone.id_data).values():
+            for point in fcurve.keyframe_points:
+                point.interpolation = "LINEAR"
+
+
+def shown(bones: tuple[bpy.types.PoseBone, ...]) -> list[np.ndarray]:
+    """The matrices of bones in their armature on all frames."""
+    rig, frames = bones[0].id_data, range(POSES[0][0], POSES[-1][0] + 1)
+    rows = [[np.array(scenes.shown(rig, frame)[bone.name].matrix) for bone in bones] for frame in frames]
+    return list(np.moveaxis(np.array(rows), 1, 0))
+
+
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "YXZ"])
+def test_it_goes_as_a_bone_that_is_moved_along_its_own_axes(pair, mode, rotation_mode):
+    pose(pair, rotation_mode)
+    animation.set_mode(list(pair), mode)
+    one, other = shown(pair)
+    np.testing.assert_allclose(other, one, atol=1e-5)
+
+
+def test_its_screw_is_about_one_axis_in_the_armature(pair):
+    """Between two keys a point on the axis of the turn from the one to the other stays on it."""
+    pose(pair)
+    animation.set_mode([pair[1]], "dq_sclerp")
+    (poses,) = shown((pair[1],))
+    first, last = Matrix(poses[0]), Matrix(poses[10])
+    turn = last @ first.inverted()
+    axis = np.array(turn.to_quaternion().axis)
+    # The point of the axis nearest to the origin: (1 - R) p = t without what slides along the axis.
+    slide = axis * (axis @ np.array(turn.translation))
+    point = np.linalg.lstsq(np.eye(3) - np.array(turn.to_3x3()), np.array(turn.translation) - slide, rcond=None)[0]
+    in_body = np.linalg.inv(poses[0]) @ np.append(point, 1.0)
+    off = (poses[:11] @ in_body)[:, :3] - point
+    assert np.linalg.norm(off - np.outer(off @ axis, axis), axis=1).max() < 1e-5
+
+
+def test_baked_it_stays_where_it_is(pair):
+    pose(pair)
+    animation.set_mode([pair[1]], "dq_sclerp")
+    (before,) = shown((pair[1],))
+    animation.bake([pair[1]])
+    (after,) = shown((pair[1],))
+    np.testing.assert_allclose(after, before, atol=1e-5)
+
+
+def test_when_it_gets_other_axes_the_in_betweens_are_made_anew_at_once(pair):
+    pose(pair)
+    animation.set_mode([pair[1]], "dq_sclerp")
+    pair[1].bone.use_local_location = True
+    bpy.context.view_layer.update()
+    (followed,) = shown((pair[1],))
+    for mode in ("BLENDER", "dq_sclerp"):
+        animation.set_mode([pair[1]], mode)
+    (anew,) = shown((pair[1],))
+    np.testing.assert_allclose(followed, anew, atol=1e-6)

@@ -1,0 +1,392 @@
+"""Pose bones in the interface: which are meant, what menus, operators and the panel say, and their constraint."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import animation
+from addon.animation import constraint_trouble, mend, modes_of, set_mode
+from addon.animation.inbetweens.outlets.restoring import (
+    CHANGED,
+    MUTED,
+    NOT_FIRST,
+    OTHER_SLOT,
+    REMOVED,
+    WEAK,
+)
+from addon.animation.transforms import CONSTRAINT, Refused, transform_of
+from addon.ui import menus
+from addon.ui.notes import facts_and_notes
+from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, active_target, modes_meant, scope_for, targets_of
+from addon.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, spoken_of
+from tests.ui.conftest import keyed
+from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
+from tests.ui.test_menus import drawn
+from tests.ui.test_targets import editor
+
+operators = bpy.ops.rigid_motion
+SCREW = "dq_sclerp"
+
+
+@pytest.fixture
+def rig(extension) -> bpy.types.Object:
+    return keyed_rig()
+
+
+def bone(rig, name="Hand"):
+    return rig.pose.bones[name]
+
+
+def names(targets):
+    return [target.name for target in targets]
+
+
+def modes(rig, name):
+    return modes_of(bone(rig, name), FRAMES[:-1])
+
+
+def pose_of(rig, name="Hand"):
+    """Where a bone is seen, in the space of the armature."""
+    evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return np.array(evaluated.pose.bones[name].matrix)
+
+
+def test_in_pose_mode_the_selected_bones_are_meant_and_not_the_rig(rig):
+    with editor("VIEW_3D"):
+        assert names(targets_of(bpy.context)) == ["Rig/Arm", "Rig/Hand"]
+        assert active_target(bpy.context) == transform_of(bone(rig))
+        assert scope_for(bpy.context) == WHOLE
+
+
+def test_in_pose_mode_without_selected_bones_nothing_is_meant(rig):
+    select(rig, ())
+    assert targets_of(bpy.context) == []
+    assert active_target(bpy.context) is None
+    with pytest.raises(RuntimeError, match="Select bones first"):
+        operators.set_mode(mode=SCREW)
+
+
+def test_out_of_pose_mode_the_rig_itself_is_meant(rig):
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert targets_of(bpy.context) == [transform_of(rig)] == [active_target(bpy.context)]
+
+
+def test_the_bones_of_all_rigs_in_pose_mode_are_meant(rig):
+    other = keyed_rig("Other")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.select_set(True)
+    bpy.ops.object.mode_set(mode="POSE")
+    assert sorted(names(targets_of(bpy.context))) == ["Other/Arm", "Other/Hand", "Rig/Arm", "Rig/Hand"]
+    operators.set_mode(mode=SCREW)
+    assert modes(rig, "Arm") == modes(other, "Hand") == [SCREW] * 3
+
+
+def test_while_weights_are_painted_for_a_posed_rig_its_bones_are_meant(rig):
+    skin = bpy.data.objects.new("Skin", bpy.data.meshes.new("Skin"))
+    skin.data.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.collection.objects.link(skin)
+    skin.modifiers.new("Armature", "ARMATURE").object = rig
+    skin.select_set(True)
+    bpy.context.view_layer.objects.active = skin
+    assert bpy.context.mode == "OBJECT"
+    assert names(targets_of(bpy.context)) == ["Rig", "Skin"]
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    assert names(targets_of(bpy.context)) == ["Rig/Arm", "Rig/Hand"]
+    rig.data.bones.active = rig.data.bones["Arm"]
+    assert active_target(bpy.context) == transform_of(bone(rig, "Arm"))
+
+
+@pytest.mark.parametrize("kind", KEY_EDITORS)
+def test_a_key_editor_means_the_bones_and_objects_whose_channels_it_shows(rig, kind):
+    rig.keyframe_insert("location", frame=1)
+    rig["reach"] = 1.0
+    unmoved = new_rig("Unmoved")
+    unmoved["reach"] = 1.0
+    unmoved.keyframe_insert('["reach"]', frame=1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.select_set(True)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="POSE")
+    with editor(kind) as space:
+        space.dopesheet.show_only_selected = False
+        assert sorted(names(targets_of(bpy.context))) == ["Rig", "Rig/Arm", "Rig/Hand", "Rig/Hip"]
+        space.dopesheet.show_only_selected = True
+        assert {"Rig/Arm", "Rig/Hand"} <= set(names(targets_of(bpy.context))) <= {"Rig", "Rig/Arm", "Rig/Hand"}
+        assert scope_for(bpy.context) == SELECTED
+
+
+@pytest.mark.parametrize("kind", KEY_EDITORS)
+def test_each_bone_gets_the_mode_from_its_own_selected_keys_on(rig, kind):
+    select_keys(bone(rig, "Arm"), 1.0)
+    select_keys(bone(rig, "Hand"), 11.0, 21.0)
+    select_keys(bone(rig, "Hip"), 1.0)
+    with editor(kind) as space:
+        space.dopesheet.show_only_selected = True
+        operators.set_mode(mode=SCREW)
+    assert modes(rig, "Arm") == [SCREW, "BLENDER", "BLENDER"]
+    assert modes(rig, "Hand") == ["BLENDER", SCREW, SCREW]
+    assert modes(rig, "Hip") == ["BLENDER"] * 3
+
+
+def test_mode_channel_and_evaluation_time_are_in_the_bones_group(rig):
+    select_keys(bone(rig), 11.0)
+    operators.set_mode(mode=SCREW, on=SELECTED)
+    data = rig.animation_data
+    fcurves = data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves
+    groups = {c.data_path.partition('"].')[2]: c.group.name for c in fcurves if '"Hand"' in c.data_path and c.group}
+    assert groups["rigid_motion.mode"] == "Hand"
+    assert groups[f'constraints["{CONSTRAINT}"].eval_time'] == "Hand"
+
+
+def test_the_segment_under_the_playhead_of_a_bone_gets_the_mode(rig):
+    bpy.context.scene.frame_set(15)
+    operators.set_mode(mode=SCREW, on=CURRENT)
+    assert modes(rig, "Hand") == modes(rig, "Arm") == ["BLENDER", SCREW, "BLENDER"]
+    assert modes_meant(bpy.context, transform_of(bone(rig)), CURRENT) == {SCREW}
+
+
+def test_a_report_speaks_of_bones(rig, capfd):
+    bone(rig, "Arm").rotation_mode = "AXIS_ANGLE"
+    operators.set_mode(mode=SCREW)
+    said = capfd.readouterr().out
+    assert "1 of 2 bones: Screw (Dual Quaternion). But" in said
+    assert "Rig/Arm turns by axis and angle" in said
+
+
+REASONS = {
+    "clear": "These bones have Blender's own in-betweens already",
+    "bake": "choose a mode for keys of these bones first",
+    "unbake": "None of these bones is baked",
+    "reduce_keys": r"None of these bones has more than two keys.*Pose > Animation > Bake Action",
+    "restore_keys": "The keys of these bones are not reduced",
+    "mend": "None of these bones lacks its constraint",
+}
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_where_there_is_nothing_to_do_on_bones_the_reason_speaks_of_bones(extension, name):
+    rig = new_rig()
+    select(rig, ("Arm", "Hand"))
+    with pytest.raises(RuntimeError, match=REASONS[name]):
+        getattr(operators, name)()
+
+
+def test_clearing_modes_is_for_the_selected_bones_alone(rig):
+    set_mode(list(rig.pose.bones), SCREW)
+    assert operators.clear() == {"FINISHED"}
+    assert modes(rig, "Arm") == modes(rig, "Hand") == ["BLENDER"] * 3
+    assert modes(rig, "Hip") == [SCREW] * 3
+    with pytest.raises(RuntimeError, match="Blender's own in-betweens already"):
+        operators.clear()
+
+
+def test_bones_are_baked_and_un_baked(rig):
+    operators.set_mode(mode=SCREW)
+    bpy.context.scene.frame_set(6)
+    before = pose_of(rig)
+    assert operators.bake() == {"FINISHED"}
+    bpy.context.scene.frame_set(6)
+    assert pose_of(rig) == pytest.approx(before, abs=1e-5)
+    assert modes(rig, "Hand") == ["BLENDER"] * 3
+    assert operators.unbake() == {"FINISHED"}
+    assert modes(rig, "Hand") == [SCREW] * 3
+
+
+def test_keys_of_bones_are_reduced_and_restored(rig):
+    assert operators.reduce_keys(tolerance=10.0) == {"FINISHED"}
+    assert not operators.unbake.poll()
+    assert animation.is_reduced(bone(rig))
+    assert operators.restore_keys() == {"FINISHED"}
+    assert not animation.is_reduced(bone(rig))
+
+
+@pytest.mark.parametrize("text", ["An object", "Select an object with keys", "of the objects", "Object > Animation"])
+def test_texts_about_objects_are_spoken_of_bones(text):
+    assert "bject" not in spoken_of(text.replace("An", "an"), "bones")
+    assert spoken_of(text, "objects") == text
+
+
+def test_objects_and_bones_together_are_called_so(rig):
+    both = [transform_of(rig), transform_of(bone(rig))]
+    assert [kind_of(some) for some in (both, both[:1], both[1:])] == ["objects and bones", "objects", "bones"]
+
+
+def test_the_menu_of_poses_ticks_the_mode_of_the_active_bone_and_has_a_pie(rig):
+    set_mode(bone(rig, "Arm"), "pga_lerp")
+    set_mode(bone(rig), SCREW)
+    entries = drawn(menus.RIGID_MOTION_MT_pose)
+    assert [p.mode for name, icon, p in entries if name == "rigid_motion.set_mode" and icon == "CHECKMARK"] == [SCREW]
+    assert "rigid_motion.mend" in [name for name, *_ in entries]
+    assert [p.name for name, _, p in entries if name == "wm.call_menu_pie"] == ["RIGID_MOTION_MT_pie_pose"]
+
+
+def test_blenders_animation_menu_is_one_for_objects_and_poses(rig):
+    assert {"VIEW3D_MT_object_animation", "VIEW3D_MT_pose_context_menu"} <= menus.ENTRIES.keys()
+    seen = []
+    for mode in ("POSE", "OBJECT"):
+        bpy.ops.object.mode_set(mode=mode)
+        layout = type("Layout", (), {"separator": lambda _: None, "menu": lambda _, name: seen.append(name)})()
+        menus.ENTRIES["VIEW3D_MT_object_animation"](type("Menu", (), {"layout": layout})(), bpy.context)
+    assert seen == ["RIGID_MOTION_MT_pose", "RIGID_MOTION_MT_object"]
+
+
+def notes_on(target, frame=5.0):
+    bpy.context.scene.frame_set(int(frame))
+    segment, notes = facts_and_notes(target, frame)
+    return notes, segment and segment.mode
+
+
+def test_of_a_bone_the_facts_of_its_segment_are_shown(rig):
+    assert notes_on(bone(rig)) == ([], "BLENDER")
+    set_mode(bone(rig), SCREW)
+    assert notes_on(bone(rig)) == ([], SCREW)
+    segment, _ = facts_and_notes(bone(rig), 15.0)
+    assert (segment.first, segment.last) == (11.0, 21.0)
+    assert notes_on(bone(rig), 50.0) == ([("INFO", NO_SEGMENT)], None)
+    assert notes_on(new_rig("Unkeyed").pose.bones["Arm"]) == ([("INFO", NO_KEYS)], None)
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+def test_the_transform_on_screen_is_that_of_the_bone(extension, order):
+    rig = new_rig()
+    bone = rig.pose.bones["Hand"]
+    bone.rotation_mode = order
+    rotation = "rotation_quaternion" if order == "QUATERNION" else "rotation_euler"
+    key_bone(bone, paths=("location", rotation, "scale"))
+    select(rig, ("Hand",))
+    set_mode(bone, SCREW)
+    bpy.context.scene.frame_set(6)
+    seen = pose_of(rig)
+    shown = bpy.context.window_manager.rigid_motion_shown
+    values = [tuple(shown.location), tuple(getattr(shown, rotation)), tuple(shown.scale)]
+    assert values[0] != pytest.approx(tuple(bone.location), abs=1e-3)
+    bone.constraints[CONSTRAINT].mute = True
+    animation.set_enabled(False)
+    rig.animation_data.action = None
+    bone.location, bone.scale = values[0], values[2]
+    setattr(bone, rotation, values[1])
+    bpy.context.view_layer.update()
+    assert pose_of(rig) == pytest.approx(seen, abs=1e-5)
+
+
+def _remove(bone):
+    bone.constraints.remove(bone.constraints[CONSTRAINT])
+
+
+def _mute(bone):
+    bone.constraints[CONSTRAINT].mute = True
+
+
+def _weaken(bone):
+    bone.constraints[CONSTRAINT].influence = 0.5
+
+
+def _change(bone):
+    bone.constraints[CONSTRAINT].mix_mode = "AFTER_FULL"
+
+
+def _put_behind(bone):
+    bone.constraints.new("COPY_LOCATION").target = bone.id_data
+    bone.constraints.move(1, 0)
+
+
+def _rename(bone):
+    bone.constraints[CONSTRAINT].name = "Mine"
+
+
+def _go_by_a_target(bone):
+    bone.constraints[CONSTRAINT].use_eval_time = False
+
+
+def _show_another(bone):
+    animation.set_enabled(False)
+    bone.constraints[CONSTRAINT].action = bpy.data.actions.new("Other")
+
+
+TAMPERINGS = [
+    (_remove, REMOVED),
+    (_rename, REMOVED),
+    (_go_by_a_target, REMOVED),
+    (_show_another, OTHER_SLOT),
+    (_mute, MUTED),
+    (_change, CHANGED),
+    (_put_behind, NOT_FIRST),
+    (_weaken, WEAK),
+]
+
+
+@pytest.mark.parametrize(("tamper", "trouble"), TAMPERINGS)
+def test_a_constraint_that_is_not_as_it_was_made_is_noted_and_mended(rig, tamper, trouble):
+    hand = bone(rig)
+    set_mode([hand, bone(rig, "Arm")], SCREW)
+    bpy.context.scene.frame_set(5)
+    seen = pose_of(rig)
+    tamper(hand)
+    bpy.context.view_layer.update()
+    assert constraint_trouble(hand) == trouble
+    assert constraint_trouble(bone(rig, "Arm")) == ""
+    notes, mode = notes_on(hand)
+    assert (notes, mode) == ([TROUBLES[trouble]], SCREW)
+
+    assert operators.mend() == {"FINISHED"}
+    assert constraint_trouble(hand) == ""
+    assert hand.constraints[0].name == CONSTRAINT
+    assert len([one for one in hand.constraints if one.type == "ACTION"]) == 1
+    for constraint in list(hand.constraints)[1:]:
+        hand.constraints.remove(constraint)
+    bpy.context.scene.frame_set(4)
+    bpy.context.scene.frame_set(5)
+    assert pose_of(rig) == pytest.approx(seen, abs=1e-5)
+    assert not operators.mend.poll()
+
+
+def test_a_constraint_that_is_behind_a_muted_one_is_well(rig):
+    set_mode(bone(rig), SCREW)
+    _put_behind(bone(rig))
+    bone(rig).constraints[0].mute = True
+    assert constraint_trouble(bone(rig)) == ""
+
+
+def test_an_influence_that_is_keyed_is_meant_so(rig):
+    set_mode(bone(rig), SCREW)
+    constraint = bone(rig).constraints[CONSTRAINT]
+    constraint.influence = 0.5
+    constraint.keyframe_insert("influence", frame=1)
+    assert constraint_trouble(bone(rig)) == ""
+
+
+def test_what_has_no_in_betweens_has_no_trouble_and_cannot_be_mended(rig):
+    bpy.ops.object.mode_set(mode="OBJECT")
+    tool = keyed("Tool")
+    set_mode(tool, SCREW)
+    refused = []
+    mend([tool, bone(rig)], refused=refused)
+    assert [str(refusal).split(" has ")[0] for refusal in refused] == ["Tool", "Rig/Hand"]
+    assert constraint_trouble(tool) == constraint_trouble(bone(rig)) == ""
+    with pytest.raises(Refused, match="choose a mode"):
+        mend(bone(rig))
+
+
+def test_a_mended_constraint_is_one_step_of_undo(rig):
+    set_mode([bone(rig), bone(rig, "Arm")], SCREW)
+    _remove(bone(rig))
+    _mute(bone(rig, "Arm"))
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="Before")
+    operators.mend("EXEC_DEFAULT", True)
+    bpy.ops.ed.undo()
+    rig = bpy.data.objects["Rig"]
+    assert (constraint_trouble(bone(rig)), constraint_trouble(bone(rig, "Arm"))) == (REMOVED, MUTED)
+
+
+def test_strips_that_are_blended_are_noted(rig):
+    set_mode(bone(rig), SCREW)
+    data = rig.animation_data
+    action, data.action = data.action, None
+    strip = data.nla_tracks.new().strips.new("Strip", 1, action)
+    assert ("INFO", BLENDED) not in notes_on(bone(rig))[0]
+    strip.blend_in = 10.0
+    assert ("INFO", BLENDED) in notes_on(bone(rig))[0]
+    assert ("INFO", BLENDED) not in notes_on(bone(rig, "Arm"))[0]
