@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from addon.animation import bake, problem_of, set_mode
-from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig
+from tests.animation.bones.poses import assert_posed
+from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, with_edit_bones
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object
 
@@ -61,6 +62,23 @@ def test_a_mode_that_is_keyed_before_anything_else_changes_nothing(live_file, ca
     moved.keyframe_insert("rotation_euler", frame=1)
     bpy.context.view_layer.update()
     assert problem_of(moved) == ""
+
+
+def duplicate_hand(edit_bones: bpy.types.ArmatureEditBones) -> None:
+    for bone in edit_bones:
+        bone.select = bone.select_head = bone.select_tail = bone.name == "Hand"
+    bpy.ops.armature.duplicate()
+    bpy.context.view_layer.update()
+
+
+def test_a_bone_that_is_duplicated_rests_and_has_no_constraint_of_the_first(live_file):
+    rig = moving_rig("dq_sclerp")
+    with_edit_bones(rig, duplicate_hand)
+    bpy.context.view_layer.update()
+    assert len(rig.pose.bones["Hand"].constraints) == 1
+    assert len(rig.pose.bones["Hand.001"].constraints) == 0
+    assert rig.pose.bones["Hand.001"].rigid_motion.mode == "BLENDER"
+    assert_posed(rig, PLAYED)
 
 
 @pytest.mark.parametrize("carrier", ["object", "bone"])
