@@ -49,6 +49,19 @@ def test_the_frame_range_of_an_action_follows_keys_of_a_bone_without_a_mode(live
     assert frame_range(body) == (-19.0, 23.0)
 
 
+def test_the_frame_range_of_an_action_is_that_of_its_keys_when_those_that_samples_lay_within_go(live_file):
+    rig = new_rig("Rig", ARM[:2])
+    body, upper = rig.pose.bones
+    key_bone(body, (-19.0, 44.0))
+    key_bone(upper, (-19.0, -7.0, 17.0))
+    set_mode(upper, "dq_sclerp")
+    assert frame_range(body) == (-19.0, 44.0)
+    for fcurve in curves_of(body).values():
+        fcurve.keyframe_points.remove(fcurve.keyframe_points[-1])
+    bpy.context.view_layer.update()
+    assert frame_range(body) == (-19.0, 17.0)
+
+
 @pytest.mark.parametrize("carrier", ["object", "bone"])
 def test_a_mode_that_is_keyed_before_anything_else_changes_nothing(live_file, carrier):
     owner = new_object() if carrier == "object" else new_rig("Rig", ARM[:1])
