@@ -187,7 +187,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         hold(place)
     for place in _in_nla_with(editable):
         hold(place)
-    for slot in {place.slot: None for place in editable if place.prefix}:
+    # A bone was renamed or deleted: then it is no edit of a single one.
+    for slot in {place.slot: None for place in editable if place.prefix} if len(editable) > 1 else ():
         remove_orphans(slot)
     return len(stale)
 
