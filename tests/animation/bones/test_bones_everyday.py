@@ -8,7 +8,7 @@ import pytest
 
 from addon.animation import bake, problem_of, set_mode
 from tests.animation.bones.poses import assert_posed
-from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, with_edit_bones
+from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, with_edit_bones, write_bone
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object
 
@@ -91,6 +91,30 @@ def test_a_bone_that_is_duplicated_rests_and_has_no_constraint_of_the_first(live
     assert len(rig.pose.bones["Hand"].constraints) == 1
     assert len(rig.pose.bones["Hand.001"].constraints) == 0
     assert rig.pose.bones["Hand.001"].rigid_motion.mode == "BLENDER"
+    assert_posed(rig, PLAYED)
+
+
+def slide(bone: bpy.types.PoseBone) -> None:
+    """Key it along a straight line, at an even pace: all modes move it as Blender does."""
+    write_bone(bone, "location", np.array((1.0, 21.0, 40.0)), np.array(((0.0,) * 3, (1.0,) * 3, (1.95,) * 3)))
+
+
+def test_an_action_whose_mode_has_nothing_to_add_takes_the_constraint_of_the_one_before_off(live_file):
+    rig = new_rig("Rig", ARM[:1])
+    body = rig.pose.bones["Body"]
+    slide(body)
+    set_mode(body, "dq_sclerp")
+    bpy.context.view_layer.update()
+    sliding = rig.animation_data.action
+    assert len(body.constraints) == 0
+    rig.animation_data.action = None
+    key_bone(body)
+    set_mode(body, "dq_sclerp")
+    live_file.scene.frame_set(17)
+    assert len(body.constraints) == 1
+    rig.animation_data.action = sliding
+    bpy.context.view_layer.update()
+    assert len(body.constraints) == 0
     assert_posed(rig, PLAYED)
 
 

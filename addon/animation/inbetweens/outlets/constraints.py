@@ -82,9 +82,9 @@ class Constraints(Outlet):
         return time is not None and _says(time, layout) and all(_is_mounted(user, place) for user in place.users)
 
     def show(self, place: SlotTransform) -> None:
-        for user in place.users if place.filled else ():
+        for user in place.users:
             if user.animated.is_editable:
-                if not _is_mounted(user, place):
+                if place.filled and not _is_mounted(user, place):
                     mount(user, place)
                 if _has_stale(user):
                     self.release([user])
@@ -197,7 +197,7 @@ def _is_mounted(user: Transform, place: SlotTransform) -> bool:
 def _has_stale(user: BoneTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
     shown = [shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
-    return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
+    return len(set(shown)) < len(shown) or (bool(shown) and not set(shown) <= _in_use(user.animated))
 
 
 def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
