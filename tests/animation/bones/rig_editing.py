@@ -37,12 +37,6 @@ Name = tuple[str, str]
 """Of a rig, and of a bone of it."""
 
 
-def mode_channel(bone: bpy.types.PoseBone) -> bpy.types.FCurve | None:
-    """The mode channel where it has keys, muted or not."""
-    fcurve = curves_of(bone).get(("rigid_motion.mode", 0))
-    return fcurve if fcurve is not None and len(fcurve.keyframe_points) else None
-
-
 def has_live_segments(bone: bpy.types.PoseBone) -> bool:
     return any(mode_at(bone, frame) != "BLENDER" for frame in key_frames(bone)[:-1])
 
@@ -151,14 +145,6 @@ class RigEditing(Editing):
         handles = {slot.handle for slot in slots_of_differences(action)} if action is not None else ()
         bags = [bag for bag in channelbags(action) if bag.slot_handle in handles] if handles else ()
         return any(curve.data_path.startswith(f"{bone.path_from_id()}.") for bag in bags for curve in bag.fcurves)
-
-    def _has_keys_for_any_pose(self, bone: bpy.types.PoseBone) -> bool:
-        """What is not keyed, or muted, beside other channels of the same property has no key to get a value."""
-        keyed = {name for name, fcurve in curves_of(bone).items() if len(fcurve.keyframe_points) and not fcurve.mute}
-        return all(
-            {(path, index) in keyed for index in range(WIDTHS[path])} in ({True}, {False})
-            for path in transform_paths(bone)
-        )
 
     @staticmethod
     def _linked(obj: bpy.types.Object) -> tuple:

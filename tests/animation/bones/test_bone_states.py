@@ -19,11 +19,10 @@ from tests.animation.bones.rig_editing import (
     RigEditing,
     as_blender_has_it,
     has_live_segments,
-    mode_channel,
     own_constraints,
 )
 from tests.animation.bones.rigs import new_rig, with_edit_bones, write_bone
-from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
+from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, mode_channel, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
     expected_bases,
@@ -94,22 +93,6 @@ class EditingBones(RigEditing):
         frame = round(frame + self.shift)
         self._edit(lambda: bpy.data.objects[rig].keyframe_insert(path, frame=frame) and None)
 
-    @rule(who=shares, at=shares, mode=st.none() | st.sampled_from(MODE_IDS))
-    def mute_the_mode_channel_or_change_a_key_of_it(self, who, at, mode):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = mode_channel(self._found(name))
-            if fcurve is None:
-                return
-            if mode is None:
-                fcurve.mute = not fcurve.mute
-            else:
-                fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))].co_ui.y = MODE_IDS.index(mode)
-                fcurve.update()
-
-        self._edit(change)
-
     # Keys
 
     @precondition(lambda self: self.on)
@@ -122,17 +105,6 @@ class EditingBones(RigEditing):
             for path in transform_paths(bone)[:count]:
                 setattr(bone, path, random_values(bone, path, 1, seed)[0])
                 bone.keyframe_insert(path, frame=frame)
-
-        self._edit(change)
-
-    @rule(who=shares, which=shares)
-    def mute_a_channel(self, who, which):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                fcurve.mute = not fcurve.mute
 
         self._edit(change)
 
