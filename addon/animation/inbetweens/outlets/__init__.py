@@ -1,8 +1,9 @@
 """Where differences go: into the delta transforms of objects, and on top of pose bones by a constraint.
 
-outlet   the interface                                  sampled      F-curves without keys
-deltas   objects                                        constraints  pose bones
-                                                        restoring    their constraints
+outlet       the interface                              sampled     F-curves without keys
+deltas       objects                                    times       which frame a constraint shows, and how much of it
+constraints  pose bones                                 restoring   what may be amiss with a constraint
+mounting     constraints on bones
 """
 
 from __future__ import annotations

@@ -6,7 +6,8 @@ import bpy
 
 from ...actions.slots import SlotTransform
 from ...transforms import BoneTransform, Transform, is_ours
-from .constraints import SETTINGS, constraint_of, mount, name_of, shown_by, slot_of_differences
+from .mounting import SETTINGS, constraint_of, mount, shown_by, slot_of_differences
+from .times import name_of
 
 REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
 """What may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows another slot, is
