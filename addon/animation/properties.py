@@ -64,6 +64,10 @@ class ActionMotion(bpy.types.PropertyGroup):
         description="Whether the manual frame range was set for samples that lie behind the keys",
         options={"HIDDEN"},
     )
+    has_longer: BoolProperty(
+        description="Whether samples lie outside of the keys that they are for, within those of others or not",
+        options={"HIDDEN"},
+    )
 
 
 class ChangedAction(bpy.types.PropertyGroup):

@@ -1,7 +1,4 @@
-"""An animator at work on keys, modes and frames, in whatever order: what machines that edit have in common.
-
-Every edit is an operator with undo, as in a window: Blender pushes its undo step before handlers get to see the edit.
-"""
+"""An animator at work on keys, modes and frames, in whatever order: what machines that edit have in common."""
 
 from __future__ import annotations
 
@@ -17,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from addon import animation
+from tests.animation.edit_steps import Complaints, Edit
 from tests.animation.oracle import (
     MODE_IDS,
     WIDTHS,
@@ -49,30 +47,6 @@ periods = st.just(0.0) | st.floats(0.1, 10.0)
 """Of ELASTIC, in frames. Of many thousand swings in a segment, single precision makes noise, also in Blender itself."""
 
 
-class Edit(bpy.types.Operator):
-    """Any change, as an operator with undo."""
-
-    bl_idname = "test.edit"
-    bl_label = "Edit"
-    bl_options: ClassVar = {"REGISTER", "UNDO"}
-    change: ClassVar[Callable[[], None]]
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        Edit.change()
-        return {"FINISHED"}
-
-
-class Complaints(logging.Handler):
-    """Errors that handlers wrote down instead of raising them into Blender."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.ERROR)
-        self.found: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.found.append(self.format(record))
-
-
 def goes_on(obj: Carrier) -> bool:
     """Whether any of its channels goes on at its slope outside of its keys."""
     curves = curves_of(obj).items()
@@ -81,6 +55,12 @@ def goes_on(obj: Carrier) -> bool:
         for (path, _), fcurve in curves
         if path in WIDTHS and len(fcurve.keyframe_points)
     )
+
+
+def mode_channel(carrier: Carrier) -> bpy.types.FCurve | None:
+    """The mode channel where it has keys, muted or not."""
+    fcurve = curves_of(carrier).get(("rigid_motion.mode", 0))
+    return fcurve if fcurve is not None and len(fcurve.keyframe_points) else None
 
 
 def assert_only_a_key_more(made: dict, after: dict, frame: float) -> None:
@@ -144,9 +124,13 @@ class Editing(RuleBasedStateMachine):
         """The names of what moves by the same channels as this one, itself among them."""
         raise NotImplementedError
 
-    def _has_keys_for_any_pose(self, _carrier: Carrier) -> bool:
-        """Whether whatever is to be seen can be keyed."""
-        return True
+    def _has_keys_for_any_pose(self, carrier: Carrier) -> bool:
+        """What is not keyed, or muted, beside other channels of the same property has no key to get a value."""
+        keyed = {name for name, fcurve in curves_of(carrier).items() if len(fcurve.keyframe_points) and not fcurve.mute}
+        return all(
+            {(path, index) in keyed for index in range(WIDTHS[path])} in ({True}, {False})
+            for path in transform_paths(carrier)
+        )
 
     def _named(self, share: float) -> Name:
         return self.names[int(share * len(self.names))]
@@ -358,6 +342,35 @@ class Editing(RuleBasedStateMachine):
             fcurve = self._curve(self._found(name), which)
             if fcurve is not None:
                 fcurve.extrapolation = "LINEAR" if linear else "CONSTANT"
+                fcurve.update()
+
+        self._edit(change)
+
+    @rule(who=shares, which=shares)
+    def mute_a_channel(self, who, which):
+        name = self._named(who)
+        if len(self._sharing(name)) > 1:
+            return
+
+        def change() -> None:
+            fcurve = self._curve(self._found(name), which)
+            if fcurve is not None:
+                fcurve.mute = not fcurve.mute
+
+        self._edit(change)
+
+    @rule(who=shares, at=shares, mode=st.none() | st.sampled_from(MODE_IDS))
+    def mute_the_mode_channel_or_change_a_key_of_it(self, who, at, mode):
+        name = self._named(who)
+
+        def change() -> None:
+            fcurve = mode_channel(self._found(name))
+            if fcurve is None:
+                return
+            if mode is None:
+                fcurve.mute = not fcurve.mute
+            else:
+                fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))].co_ui.y = MODE_IDS.index(mode)
                 fcurve.update()
 
         self._edit(change)

@@ -157,11 +157,14 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
     `longer` are those in which samples were just written there. A range that the animator has set stays.
     """
     for action in actions:
-        is_ours = action.rigid_motion.range_is_ours
-        if (action.use_frame_range and not is_ours) or not (is_ours or action in longer):
+        motion = action.rigid_motion
+        if action in longer and not motion.has_longer:
+            motion.has_longer = True
+        is_ours = motion.range_is_ours
+        if (action.use_frame_range and not is_ours) or not (is_ours or motion.has_longer):
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-        of_bones = {pair.differences for pair in action.rigid_motion.bone_slots}
+        of_bones = {pair.differences for pair in motion.bone_slots}
         samples, keyed = [], []
         for bag in bags:
             for fcurve in bag.fcurves:
@@ -174,9 +177,11 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
-            action.rigid_motion.range_is_ours = True
+            motion.range_is_ours = True
         elif is_ours:
-            action.use_frame_range = action.rigid_motion.range_is_ours = False
+            action.use_frame_range = motion.range_is_ours = False
+        if not samples and motion.has_longer:
+            motion.has_longer = False
 
 
 def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -42,7 +42,8 @@ class BoneTransform(Transform):
     def location_axes(self) -> np.ndarray | None:
         """Without *Local Location* a bone is moved along the axes of its parent, and still turns about its own."""
         bone = self.carrier.bone
-        if bone.use_local_location:
+        # What was just made in Edit Mode has no bone before that is left.
+        if bone is None or bone.use_local_location:
             return None
         axes = bone.matrix_local.to_3x3().transposed()
         return np.array(axes @ bone.parent.matrix_local.to_3x3() if bone.parent else axes)

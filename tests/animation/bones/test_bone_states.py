@@ -19,11 +19,10 @@ from tests.animation.bones.rig_editing import (
     RigEditing,
     as_blender_has_it,
     has_live_segments,
-    mode_channel,
     own_constraints,
 )
 from tests.animation.bones.rigs import new_rig, with_edit_bones, write_bone
-from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
+from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, mode_channel, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
     expected_bases,
@@ -43,10 +42,11 @@ class EditingBones(RigEditing):
         scales=st.lists(st.sampled_from((None, "even", "uneven")), min_size=3, max_size=3),
         modes=st.lists(st.sampled_from(MODE_IDS), min_size=3, max_size=3),
         rig_mode=st.none() | st.sampled_from(MODE_IDS),
+        second=st.sampled_from((None, None, "with the same Action", "with a copy of it")),
         shift=st.sampled_from((0.0, 0.0, -20.0, -60.0)),
         seed=seeds,
     )
-    def begin(self, orders, scales, modes, rig_mode, shift, seed):
+    def begin(self, orders, scales, modes, rig_mode, second, shift, seed):
         bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, LAST
         self.shift = shift
         rig = new_rig("Rig", BONES)
@@ -61,6 +61,8 @@ class EditingBones(RigEditing):
                 write_bone(bone, path, frames, values, "BEZIER")
             animation.set_mode(bone, mode)
         self.names = [(rig.name, bone.name) for bone in rig.pose.bones]
+        if second is not None:
+            self._copy(rig.name, "Second", copied=second == "with a copy of it")
         bpy.context.view_layer.update()
         self._start_history()
 
@@ -91,22 +93,6 @@ class EditingBones(RigEditing):
         frame = round(frame + self.shift)
         self._edit(lambda: bpy.data.objects[rig].keyframe_insert(path, frame=frame) and None)
 
-    @rule(who=shares, at=shares, mode=st.none() | st.sampled_from(MODE_IDS))
-    def mute_the_mode_channel_or_change_a_key_of_it(self, who, at, mode):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = mode_channel(self._found(name))
-            if fcurve is None:
-                return
-            if mode is None:
-                fcurve.mute = not fcurve.mute
-            else:
-                fcurve.keyframe_points[int(at * len(fcurve.keyframe_points))].co_ui.y = MODE_IDS.index(mode)
-                fcurve.update()
-
-        self._edit(change)
-
     # Keys
 
     @precondition(lambda self: self.on)
@@ -119,17 +105,6 @@ class EditingBones(RigEditing):
             for path in transform_paths(bone)[:count]:
                 setattr(bone, path, random_values(bone, path, 1, seed)[0])
                 bone.keyframe_insert(path, frame=frame)
-
-        self._edit(change)
-
-    @rule(who=shares, which=shares)
-    def mute_a_channel(self, who, which):
-        name = self._named(who)
-
-        def change() -> None:
-            fcurve = self._curve(self._found(name), which)
-            if fcurve is not None:
-                fcurve.mute = not fcurve.mute
 
         self._edit(change)
 
@@ -249,6 +224,14 @@ class EditingBones(RigEditing):
             self.taken_off.add(name)
         self._edit(change)
 
+    @precondition(lambda self: self.on and self.taken_off)
+    @rule(who=shares, mode=st.sampled_from(MODE_IDS))
+    def choose_a_mode_anew_where_it_was_taken_off(self, who, mode):
+        name = sorted(self.taken_off)[int(who * len(self.taken_off))]
+        self._edit(lambda: animation.set_mode(self._found(name), "BLENDER"))
+        assert len(self._sharing(name)) > 1 or name not in self.taken_off
+        self._edit(lambda: animation.set_mode(self._found(name), mode))
+
     @precondition(lambda self: self.on)
     @rule(who=shares, influence=st.sampled_from((0.0, 0.25, 0.75)))
     def weaken_the_constraint_and_back(self, who, influence):
@@ -288,7 +271,7 @@ class EditingBones(RigEditing):
         self._edit(change)
         assert self._keyed()[rig, new] == keyed
 
-    @precondition(lambda self: self.on and len(self.names) < 7)
+    @precondition(lambda self: self.on and len(self.names) < 8)
     @rule(who=shares)
     def duplicate_a_bone(self, who):
         rig, bone = self._named(who)
@@ -321,26 +304,26 @@ class EditingBones(RigEditing):
 
         self._edit(change)
 
-    @precondition(lambda self: self.on and len(self.names) < 6)
+    @precondition(lambda self: self.on and len(self.names) < 5)
     @rule(who=shares, copied=st.booleans())
     def copy_a_rig(self, who, copied):
         rig, _ = self._named(who)
         if not self._is_free(rig):
             return
         new, self.fresh = f"Copy {self.fresh}", self.fresh + 1
+        self._edit(lambda: self._copy(rig, new, copied))
 
-        def change() -> None:
-            obj = bpy.data.objects[rig]
-            made = obj.copy()
-            made.name, made.data = new, obj.data.copy()
-            bpy.context.scene.collection.objects.link(made)
-            action, slot = self._linked(obj)
-            if copied and action is not None:
-                made.animation_data.action = action.copy()
-                made.animation_data.action_slot = made.animation_data.action.slots[slot.identifier]
-            self.names += [(new, bone.name) for bone in made.pose.bones]
-
-        self._edit(change)
+    def _copy(self, rig: str, new: str, copied: bool) -> None:
+        """The same rig once more, with the same Action or with a copy of it."""
+        obj = bpy.data.objects[rig]
+        made = obj.copy()
+        made.name, made.data = new, obj.data.copy()
+        bpy.context.scene.collection.objects.link(made)
+        action, slot = self._linked(obj)
+        if copied and action is not None:
+            made.animation_data.action = action.copy()
+            made.animation_data.action_slot = made.animation_data.action.slots[slot.identifier]
+        self.names += [(new, bone.name) for bone in made.pose.bones]
 
     # Actions that go and come
 
@@ -405,6 +388,8 @@ class EditingBones(RigEditing):
         assert not any(own_constraints(bone) for bone in rig.pose.bones)
         self._link(rig, action, slot)
         bpy.context.view_layer.update()
+        # What was edited needs an undo step of its own.
+        self._edit(lambda: None)
 
 
 EditingBones.TestCase.settings = settings(

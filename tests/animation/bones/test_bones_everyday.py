@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from addon.animation import bake, problem_of, set_mode
-from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig
+from tests.animation.bones.poses import assert_posed
+from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, with_edit_bones, write_bone
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object
 
@@ -48,6 +49,19 @@ def test_the_frame_range_of_an_action_follows_keys_of_a_bone_without_a_mode(live
     assert frame_range(body) == (-19.0, 23.0)
 
 
+def test_the_frame_range_of_an_action_is_that_of_its_keys_when_those_that_samples_lay_within_go(live_file):
+    rig = new_rig("Rig", ARM[:2])
+    body, upper = rig.pose.bones
+    key_bone(body, (-19.0, 44.0))
+    key_bone(upper, (-19.0, -7.0, 17.0))
+    set_mode(upper, "dq_sclerp")
+    assert frame_range(body) == (-19.0, 44.0)
+    for fcurve in curves_of(body).values():
+        fcurve.keyframe_points.remove(fcurve.keyframe_points[-1])
+    bpy.context.view_layer.update()
+    assert frame_range(body) == (-19.0, 17.0)
+
+
 @pytest.mark.parametrize("carrier", ["object", "bone"])
 def test_a_mode_that_is_keyed_before_anything_else_changes_nothing(live_file, carrier):
     owner = new_object() if carrier == "object" else new_rig("Rig", ARM[:1])
@@ -61,6 +75,47 @@ def test_a_mode_that_is_keyed_before_anything_else_changes_nothing(live_file, ca
     moved.keyframe_insert("rotation_euler", frame=1)
     bpy.context.view_layer.update()
     assert problem_of(moved) == ""
+
+
+def duplicate_hand(edit_bones: bpy.types.ArmatureEditBones) -> None:
+    for bone in edit_bones:
+        bone.select = bone.select_head = bone.select_tail = bone.name == "Hand"
+    bpy.ops.armature.duplicate()
+    bpy.context.view_layer.update()
+
+
+def test_a_bone_that_is_duplicated_rests_and_has_no_constraint_of_the_first(live_file):
+    rig = moving_rig("dq_sclerp")
+    with_edit_bones(rig, duplicate_hand)
+    bpy.context.view_layer.update()
+    assert len(rig.pose.bones["Hand"].constraints) == 1
+    assert len(rig.pose.bones["Hand.001"].constraints) == 0
+    assert rig.pose.bones["Hand.001"].rigid_motion.mode == "BLENDER"
+    assert_posed(rig, PLAYED)
+
+
+def slide(bone: bpy.types.PoseBone) -> None:
+    """Key it along a straight line, at an even pace: all modes move it as Blender does."""
+    write_bone(bone, "location", np.array((1.0, 21.0, 40.0)), np.array(((0.0,) * 3, (1.0,) * 3, (1.95,) * 3)))
+
+
+def test_an_action_whose_mode_has_nothing_to_add_takes_the_constraint_of_the_one_before_off(live_file):
+    rig = new_rig("Rig", ARM[:1])
+    body = rig.pose.bones["Body"]
+    slide(body)
+    set_mode(body, "dq_sclerp")
+    bpy.context.view_layer.update()
+    sliding = rig.animation_data.action
+    assert len(body.constraints) == 0
+    rig.animation_data.action = None
+    key_bone(body)
+    set_mode(body, "dq_sclerp")
+    live_file.scene.frame_set(17)
+    assert len(body.constraints) == 1
+    rig.animation_data.action = sliding
+    bpy.context.view_layer.update()
+    assert len(body.constraints) == 0
+    assert_posed(rig, PLAYED)
 
 
 @pytest.mark.parametrize("carrier", ["object", "bone"])

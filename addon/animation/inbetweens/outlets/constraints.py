@@ -74,9 +74,9 @@ class Constraints(Outlet):
         return time is not None and says(time, layout) and all(is_mounted(user, place) for user in place.users)
 
     def show(self, place: SlotTransform) -> None:
-        for user in place.users if place.filled else ():
+        for user in place.users:
             if user.animated.is_editable:
-                if not is_mounted(user, place):
+                if place.filled and not is_mounted(user, place):
                     mount(user, place)
                 if has_stale(user):
                     self.release([user])
