@@ -12,14 +12,6 @@ NOTHING = 2e-4
 """Metres. IK itself leaves the hand 0.1 mm from its control."""
 
 
-@pytest.fixture
-def rig(human):
-    """Rigify's human, edits followed."""
-    animation.register()
-    yield human
-    animation.unregister()
-
-
 def strays_of(scene: scenes.Scene) -> tuple[float, float]:
     """How far at most, in metres, with Blender's in-betweens and by the screw."""
     native = scene.farthest()

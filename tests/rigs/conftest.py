@@ -1,0 +1,18 @@
+"""The human of Rigify, edits followed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+import pytest
+
+from addon import animation
+
+
+@pytest.fixture
+def rig(human: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """Rigify's human, edits followed."""
+    animation.register()
+    yield human
+    animation.unregister()
