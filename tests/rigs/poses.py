@@ -1,0 +1,38 @@
+"""Rigs posed at random, and where that takes their bones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+from mathutils import Quaternion
+
+KEYS = (1, 15, 31)
+
+
+def key_at_random(bones: Iterable[bpy.types.PoseBone]) -> None:
+    """Keys on three frames, moved and turned a little, where bones may be moved."""
+    random, bones = np.random.default_rng(0), list(bones)
+    for frame in KEYS:
+        for bone in bones:
+            moved = random.normal(size=3) * 0.02
+            bone.location = [0.0 if locked else value for locked, value in zip(bone.lock_location, moved, strict=True)]
+            turned = Quaternion((1.0, *(random.normal(size=3) * 0.15))).normalized()
+            bone.keyframe_insert("location", frame=frame, group=bone.name)
+            if bone.rotation_mode == "QUATERNION":
+                bone.rotation_quaternion = turned
+                bone.keyframe_insert("rotation_quaternion", frame=frame, group=bone.name)
+            else:
+                bone.rotation_euler = turned.to_euler(bone.rotation_mode)
+                bone.keyframe_insert("rotation_euler", frame=frame, group=bone.name)
+    bpy.context.view_layer.update()
+
+
+def ends_of_bones(rig: bpy.types.Object) -> np.ndarray:
+    """Where all bones begin and end on some frames, in armature space."""
+    found = []
+    for frame in range(KEYS[0], KEYS[-1] + 1, 4):
+        bpy.context.scene.frame_set(frame)
+        found.append([(*bone.head, *bone.tail) for bone in rig.pose.bones])
+    return np.array(found)
