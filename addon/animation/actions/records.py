@@ -7,6 +7,7 @@ mode channel where there is one with keys, and in its record otherwise; nowhere 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import bpy
 
@@ -14,31 +15,51 @@ from .slots import SlotTransform
 from .sources import MODE_NAMES, MODE_NUMBERS, UNKNOWN
 
 
+class Recorded(NamedTuple):
+    """What a record says."""
+
+    mode: str | None = None
+    """None where none was chosen for the whole, "" for one that this version does not know."""
+
+    digest: str = ""
+    rows: str = ""
+    constraint: str = ""
+
+
+def recorded(place: SlotTransform) -> Recorded:
+    """What is kept about a transform in a slot: looked up once, and again after it was changed by way of here."""
+    found = place.__dict__.get("recorded")
+    if found is None:
+        record = _record_of(place)
+        if record is None:
+            found = Recorded()
+        else:
+            mode = record.mode if record.is_property_set("mode") else None
+            found = Recorded(mode, record.digest, record.rows, record.constraint)
+        place.__dict__["recorded"] = found
+    return found
+
+
 def recorded_digest(place: SlotTransform) -> str:
     """The digest of the source that a transform was filled in from, "" where it was not."""
-    record = record_of(place)
-    return "" if record is None else record.digest
+    return recorded(place).digest
 
 
 def recorded_rows(place: SlotTransform) -> list[int]:
     """The rows of the components that in-betweens were written for."""
-    record = record_of(place)
-    return [] if record is None else [int(row, 16) for row in record.rows]
+    return [int(row, 16) for row in recorded(place).rows]
 
 
 def recorded_mode(place: SlotTransform) -> int:
     """The number of the mode that a transform has throughout, `UNKNOWN` where it is none that is known."""
-    record = record_of(place)
-    if record is not None and record.is_property_set("mode"):
-        # A number that is no mode, from a damaged file or a later version, reads as an empty name.
-        return MODE_NUMBERS.get(record.mode, UNKNOWN)
-    return 0
+    mode = recorded(place).mode
+    # A number that is no mode, from a damaged file or a later version, reads as an empty name.
+    return 0 if mode is None else MODE_NUMBERS.get(mode, UNKNOWN)
 
 
 def has_mode(place: SlotTransform) -> bool:
     """Whether a mode other than Blender's was chosen for all segments of a transform in this slot."""
-    record = record_of(place)
-    return record is not None and record.is_property_set("mode")
+    return recorded(place).mode is not None
 
 
 def has_in_betweens(place: SlotTransform) -> bool:
@@ -49,15 +70,13 @@ def has_in_betweens(place: SlotTransform) -> bool:
 def record_mode(place: SlotTransform, number: int) -> None:
     """Keep the mode that a transform has throughout, and have its users show it."""
     mode = MODE_NAMES[number]
-    record = record_of(place)
     if number == 0:
-        if record is not None:
+        if (record := _record_of(place)) is not None:
             record.property_unset("mode")
-            _tidy(place)
-    else:
-        record = ensure_record(place)
-        if record.mode != mode:
-            record.mode = mode
+            _tidy(place, record)
+    elif recorded(place).mode != mode:
+        _ensure_record(place).mode = mode
+    place.__dict__.pop("recorded", None)
     for user in place.users:
         if user.motion.mode != mode and user.animated.is_editable:
             user.motion.mode = mode
@@ -65,16 +84,22 @@ def record_mode(place: SlotTransform, number: int) -> None:
 
 def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -> None:
     """Keep what in-betweens were made from, and which components they are in."""
-    record = record_of(place)
     if digest:
-        record = ensure_record(place)
+        record = _ensure_record(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
-    elif record is not None and record.digest:
+    elif recorded(place).digest and (record := _record_of(place)) is not None:
         record.digest = record.rows = ""
-        _tidy(place)
+        _tidy(place, record)
+    place.__dict__.pop("recorded", None)
 
 
-def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
+def record_constraint(place: SlotTransform, name: str) -> None:
+    """Keep what the constraint of a bone is called, where that is not its usual name."""
+    _ensure_record(place).constraint = name
+    place.__dict__.pop("recorded", None)
+
+
+def _record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
     records, key = place.slot.action.rigid_motion.slots, _key_of(place)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
@@ -97,9 +122,9 @@ def _key_of(place: SlotTransform) -> str:
     return f"{place.slot.handle} {place.prefix}"
 
 
-def ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
+def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
     """The record of a transform in a slot, made where there is none yet."""
-    record = record_of(place)
+    record = _record_of(place)
     if record is not None:
         return record
     record = place.slot.action.rigid_motion.slots.add()
@@ -107,9 +132,8 @@ def ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
     return record
 
 
-def _tidy(place: SlotTransform) -> None:
+def _tidy(place: SlotTransform, record: bpy.types.PropertyGroup) -> None:
     """Take out a record that says nothing."""
-    record = record_of(place)
-    if record is not None and not record.digest and not record.is_property_set("mode"):
+    if not record.digest and not record.is_property_set("mode"):
         records = place.slot.action.rigid_motion.slots
         records.remove(next(number for number, one in enumerate(records) if one == record))

@@ -41,7 +41,9 @@ def changed_in(slot: Slot) -> set[str] | None:
     for row, name in zip(flags, ("mute", "extrapolation", "array_index"), strict=True):
         fcurves.foreach_get(name, row)
     channels = list(zip([fcurve.data_path for fcurve in fcurves], flags[2].tolist(), strict=True))
-    contents = list(zip(map(_keys_of, fcurves), *flags[:2].tolist(), strict=True))
+    memory = _Memory()
+    keys = [_keys_of(fcurve, memory) for fcurve in fcurves]
+    contents = list(zip(keys, *flags[:2].tolist(), strict=True))
     before = _slots.get(key)
     _slots[key] = channels, contents
     if before is None or before[0] != channels:
@@ -53,22 +55,30 @@ def changed_in(slot: Slot) -> set[str] | None:
 _MODIFIED = object()
 
 
-def _keys_of(fcurve: bpy.types.FCurve) -> object:
-    """The keys of an F-curve as they are in memory, where they lie one behind the other."""
-    keys = fcurve.keyframe_points
-    if (count := len(keys)) > 1:
-        if fcurve.modifiers and split_path(fcurve.data_path)[1] in WIDTHS:
-            return _MODIFIED
-        first = keys[0].as_pointer()
-        return np.asarray(_Memory(first, count * (keys[1].as_pointer() - first))).tobytes()
-    return _MODIFIED if count else None
-
-
 class _Memory:
     """A stretch of memory that NumPy can read. Property by property the same takes four times as long."""
 
-    def __init__(self, address: int, size: int) -> None:
-        self.__array_interface__ = {"data": (address, True), "shape": (size,), "typestr": "|V1", "version": 3}
+    __array_interface__: dict[str, object]
+
+
+_key_size = 0
+"""How many bytes a key takes, as soon as two were seen one behind the other."""
+
+
+def _keys_of(fcurve: bpy.types.FCurve, memory: _Memory) -> object:
+    """The keys of an F-curve as they are in memory, where they lie one behind the other."""
+    global _key_size
+    keys = fcurve.keyframe_points
+    count = len(keys)
+    if count < 2:
+        return _MODIFIED if count else None
+    if fcurve.modifiers and split_path(fcurve.data_path)[1] in WIDTHS:
+        return _MODIFIED
+    first = keys[0].as_pointer()
+    _key_size = _key_size or keys[1].as_pointer() - first
+    shape = (count * _key_size,)
+    memory.__array_interface__ = {"data": (first, True), "shape": shape, "typestr": "|V1", "version": 3}
+    return np.asarray(memory).tobytes()
 
 
 def changed_bones(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:

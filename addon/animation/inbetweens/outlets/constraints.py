@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from ...actions.records import ensure_record, recorded_digest
+from ...actions.records import record_constraint, recorded_digest
 from ...actions.slots import Slot, SlotTransform, slot_transforms_of
 from ...actions.sources import Source
 from ...transforms import (
@@ -59,7 +59,9 @@ class Constraints(Outlet):
             curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
             place.has_filled(curves)
             write_time(place, layout)
-            self.show(place)
+            for user in place.users:
+                if user.animated.is_editable and not is_mounted(user, place):
+                    mount(user, place)
         elif present:
             remove_time(place)
             replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
@@ -173,7 +175,7 @@ def _avoid_names(place: SlotTransform) -> None:
         remove_time(place)
         numbers = (f"{CONSTRAINT}.{number:03d}" for number in range(1, 1000))
         name = next(name for name in (CONSTRAINT, *numbers) if name not in taken)
-        ensure_record(place).constraint = name
+        record_constraint(place, name)
 
 
 def _channelbag(place: SlotTransform) -> bpy.types.ActionChannelbag:

@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from ...actions.channels import add_cycles, replace_keys
-from ...actions.records import record_of
+from ...actions.records import recorded
 from ...actions.slots import Slot, SlotTransform, slot_transforms_of, strips_of
 from ...curves import Cycles
 from ...transforms import (
@@ -37,8 +37,7 @@ Line = tuple[float, float]
 
 def name_of(place: SlotTransform) -> str:
     """What the constraint of a slot is called."""
-    record = record_of(place)
-    return (record is not None and record.constraint) or CONSTRAINT
+    return recorded(place).constraint or CONSTRAINT
 
 
 def constraint_path(place: SlotTransform, name: str) -> str:
