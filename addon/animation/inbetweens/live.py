@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import ClassVar
 
@@ -237,8 +237,10 @@ def _turn() -> Iterator[bool]:
             _State.busy = False
 
 
-def _follow(actions: Iterable[bpy.types.Action]) -> set[Transform]:
+def _follow(actions: Collection[bpy.types.Action]) -> set[Transform]:
     """Refresh what these Actions, which were edited, move; and say what that is."""
+    if not actions:
+        return set()
     places = [place for slot in slots_in(actions) for place in transforms_in(slot, glances.changed_in(slot))]
     with _turn() as ours:
         if ours:
@@ -370,7 +372,7 @@ def _before_update(scene: bpy.types.Scene, *_: object) -> None:
     # In-betweens that are there by now are evaluated with the edit; later they would cost an evaluation of their own.
     edited = {action for layer in scene.view_layers for action in _edited_actions(layer.depsgraph)}
     _State.followed = {action.session_uid for action in edited}
-    _State.moved = _follow(edited) if edited else set()
+    _State.moved = _follow(edited)
     insertion.forget_poses(_State.moved)
 
 

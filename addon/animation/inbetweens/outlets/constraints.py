@@ -80,7 +80,7 @@ class Constraints(Outlet):
             if user.animated.is_editable:
                 if place.filled and not is_mounted(user, place):
                     mount(user, place)
-                if has_stale(user):
+                if has_stale(user, place):
                     self.release([user])
 
     def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:

@@ -47,10 +47,12 @@ def is_mounted(user: Transform, place: SlotTransform) -> bool:
     return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(place), *span_of(place))
 
 
-def has_stale(user: BoneTransform) -> bool:
+def has_stale(user: BoneTransform, place: SlotTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
     shown = [shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
-    return len(set(shown)) < len(shown) or (bool(shown) and not set(shown) <= _in_use(user.animated))
+    if not shown or shown == [slot_of_differences(place)]:
+        return False
+    return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
 
 
 def _is_free_to_mount(user: Transform, place: SlotTransform) -> bool:
