@@ -11,7 +11,8 @@ which of the two its value is:
   *Align*, *Move*), or more than one of location, rotation and scale of an object have changed, then a pose was computed
   for the world, and Blender has taken the difference off: `matrix_world = M` sets all three of them. The key gets that
   pose. A single property (`location = v`, a value typed with Auto Key) is the value that somebody wanted, and stays as
-  it is; so does a pose that is set on a bone (`matrix = M`, *Apply Pose Asset*), which knows nothing of constraints.
+  it is; so does a pose that is set on a bone (`matrix = M`), which knows nothing of constraints.
+- A pose from elsewhere was put on a bone (*Paste Pose*, a pose asset): it is meant as it is, and so keyed later, too.
 
 Where a key gets a pose, so do all keyed channels of the transform.
 """
@@ -52,6 +53,9 @@ class _Posed:
     on_top: bool
     """Whether the pose is that with the difference on top."""
 
+    is_stored: bool = False
+    """Whether a pose from elsewhere was put on it, which is meant as it is, whatever the difference makes of it."""
+
 
 _posed: dict[tuple[int, str], _Posed] = {}
 _inserted: OrderedDict[tuple[str, str], np.ndarray] = OrderedDict()
@@ -66,7 +70,15 @@ def forget_file() -> None:
 
 def notice_pose(transform: Transform, frame: float) -> None:
     """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
-    _posed[_identity(transform)] = _Posed(frame, transform.components(), True)
+    components, before = transform.components(), _posed.get(_identity(transform))
+    if before is not None and before.is_stored and np.array_equal(before.components, components):
+        return
+    _posed[_identity(transform)] = _Posed(frame, components, True)
+
+
+def posed_of(animated: bpy.types.ID) -> set[str]:
+    """The prefixes of what was posed of a data-block, and has no key yet."""
+    return {prefix for uid, prefix in _posed if uid == animated.session_uid}
 
 
 def notice_assignment(
@@ -83,7 +95,8 @@ def notice_assignment(
     )
     if changed:
         on_top = operator.startswith(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
-        _posed[_identity(transform)] = _Posed(frame, transform.components(), on_top)
+        is_stored = operator.startswith(transform.stored_by)
+        _posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_stored)
 
 
 def forget_poses(transforms: Iterable[Transform] | None = None) -> None:

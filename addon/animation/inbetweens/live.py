@@ -29,7 +29,7 @@ from ..actions.slots import (
     transforms_in,
 )
 from ..actions.sources import Source
-from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, transform_of
+from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
@@ -119,8 +119,10 @@ def _edited_in(obj: bpy.types.Object) -> list[Transform]:
     """An object that was edited, and of a rig the bones that were."""
     if obj.pose is None or not _has_bones(obj):
         return [transform_of(obj)]
+    changed, posed = glances.changed_bones(obj), insertion.posed_of(obj)
+    also = [bone for bone in obj.pose.bones if prefix_of(bone.name) in posed] if posed else []
     itself = (obj,) if _has_mode(obj) else ()
-    return [transform_of(carrier) for carrier in (*itself, *glances.changed_bones(obj))]
+    return list(dict.fromkeys(map(transform_of, (*itself, *changed, *also))))
 
 
 def _has_bones(obj: bpy.types.Object) -> bool:

@@ -25,6 +25,7 @@ class BoneTransform(Transform):
     """A pose bone. The difference is put on top of it by a constraint."""
 
     placed_by = ("TRANSFORM_OT_",)
+    stored_by = ("POSE_OT_paste", "POSELIB_OT_")
     matrix_lacks_difference = False
 
     def __init__(self, bone: bpy.types.PoseBone) -> None:

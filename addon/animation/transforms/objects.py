@@ -42,6 +42,7 @@ class ObjectTransform(Transform):
     """An object. The difference goes into its delta transforms."""
 
     placed_by = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
+    stored_by = ()
     matrix_lacks_difference = True
 
     def __init__(self, obj: bpy.types.Object) -> None:

@@ -39,6 +39,9 @@ class Transform(ABC):
     placed_by: ClassVar[tuple[str, ...]]
     """How the names of operators begin that set its properties to bring what is on the screen to a certain place."""
 
+    stored_by: ClassVar[tuple[str, ...]]
+    """How the names of operators begin that set its properties to a pose that was kept elsewhere."""
+
     matrix_lacks_difference: ClassVar[bool]
     """Whether Blender takes the difference off where the properties are set from a matrix."""
 
