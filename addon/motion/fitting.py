@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from . import twists
-from .measures import shell_point
 from .modes import MODES, interpolate
 from .poses import Poses
-from .quaternions import align_signs, multiply, normalise, rotate
+from .quaternions import align_signs, conjugate, multiply, normalise, rotate
 
 STEP = 1e-5
 """Of differences that stand for derivatives: in radians, and as a part of the radius."""
@@ -45,8 +44,9 @@ def fit_keys(
     Returns
     -------
     Poses, shape (k,)
-        The squared displacements of the shell's points, over all samples, have no larger sum than with the samples
-        themselves for keys. Scales stay as they are.
+        With d how far the origin is off at a sample and theta the angle that the body is off by, the squares of d and
+        of the chord 2 radius sin(theta / 2) have no larger sum, over all samples, than with the samples themselves for
+        keys. That is the square of the shell error, but for what the two may have in common. Scales stay as they are.
 
     Raises
     ------
@@ -77,14 +77,18 @@ class _Fitting:
         self.times, self.key_times, self.mode, self.radius = times, times[keys], mode, radius
         self.first_samples = np.append(0, keys[1:-1])
         """Of each segment."""
-        self.truth = _shell_points(poses, radius)
+        self.truth = poses
         self.fitted = poses[keys]
         self.residuals = self.displacements(self.fitted)
 
     def displacements(self, keys: Poses) -> np.ndarray:
-        """Of the shell's points at all samples, shape (9, n)."""
+        """Of the origin, and chords of the shell along the axis that it is turned about, at all samples: (6, n)."""
         shown = interpolate(self.key_times, keys, self.times, self.mode)
-        return _shell_points(shown, self.radius) - self.truth
+        turn = multiply(shown.quaternions, conjugate(self.truth.quaternions)).T
+        chords = 2.0 * self.radius * np.where(turn[0] < 0.0, -turn[1:], turn[1:])
+        if shown.scales is not None:
+            chords *= np.sqrt(shown.scales * self.truth.scales)
+        return np.concatenate(((shown.positions - self.truth.positions).T, chords))
 
     def improve(self, chosen: np.ndarray) -> None:
         """Move some keys (c,), of which no segment depends on two."""
@@ -125,8 +129,3 @@ def _moved(keys: Poses, chosen: np.ndarray, steps: np.ndarray) -> Poses:
     positions[chosen] += rotate(quaternions[chosen], advances.T)
     quaternions[chosen] = normalise(multiply(quaternions[chosen], turns.T))
     return Poses(positions, quaternions, keys.scales)
-
-
-def _shell_points(poses: Poses, radius: float) -> np.ndarray:
-    """The points that the shell error goes by, shape (9, n)."""
-    return np.concatenate([shell_point(poses, axis, radius).T for axis in range(3)])

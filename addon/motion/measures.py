@@ -1,9 +1,11 @@
 """Measures: how far a motion is from the recording it stands for.
 
 Lengths are in the unit of the positions, rotations in radians, velocities in units per second. The shell error is the
-measure of the Animation Compression Library (`docs/error_metrics.md` there): the largest displacement of the three
-points at `radius` from the body's origin along its axes. It counts position and rotation together, as the surface
-of a body of that size shows them.
+largest displacement of any point of the body within `radius` of its origin: position and rotation together, as a body
+of that size shows them. A tolerance in it is a promise for all of these points, however the body's axes lie.
+
+The Animation Compression Library has the name, and the reason for it (`docs/error_metrics.md` there); it looks at three
+points of the shell, which may move by less than half of it (0.41 in 20 000 random pairs).
 """
 
 from __future__ import annotations
@@ -13,7 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from .poses import Poses
-from .quaternions import angle_between, rotate
+from .quaternions import angle_between, cross
+
+TINY = 1e-150
+"""Stands for zero, where only ratios count; its square is still above the smallest float."""
+
+NEWTON_STEPS = 6
+"""To all digits: the first guess is within a factor of 1.5, and each step doubles the digits."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +43,8 @@ def measure(times: np.ndarray, poses: Poses, truth: Poses, radius: float = 0.1) 
         Seconds, rising.
     poses, truth : Poses, shape (..., n)
     radius : float
-        Of the shell, in the unit of the positions.
+        Of the ball around the origin in which no point is off by more than the shell error, in the unit of the
+        positions.
 
     Notes
     -----
@@ -53,18 +62,75 @@ def measure(times: np.ndarray, poses: Poses, truth: Poses, radius: float = 0.1) 
         )
 
 
-def shell_error(poses: Poses, truth: Poses, radius: float = 0.1) -> np.ndarray:
-    """The largest displacement, shape (..., n), of the points at `radius` along the body's axes."""
-    displacement = np.stack([shell_point(poses, axis, radius) - shell_point(truth, axis, radius) for axis in range(3)])
-    return np.sqrt(np.einsum("a...i,a...i->a...", displacement, displacement).max(axis=0))
+def shell_error(poses: Poses, truth: Poses, radius: float | np.ndarray = 0.1) -> np.ndarray:
+    """The largest displacement, shape (..., n), of any point within `radius` of the body's origin.
+
+    Parameters
+    ----------
+    poses, truth : Poses, shape (..., n)
+        With unit quaternions.
+    radius : float or array, shape (..., n)
+        Of the ball around the origin, in the unit of the positions, before the body's own scale.
+
+    Notes
+    -----
+    From one pose to the other the origin moves by d, and the body turns by theta about the axis n. A point of the shell
+    moves by d and by a chord across the axis, of 2 radius sin(theta / 2) at most, in any direction across: the largest
+    displacement is the length of d_along + d_across (1 + chord / |d_across|). With v = n sin(theta / 2), the vector
+    part of the quaternion, its square is d.d + 4 radius |d x v| + 4 radius^2 v.v, where nothing is divided.
+    """
+    (w, *xyz), (true_w, *true_xyz) = (np.moveaxis(some.quaternions, -1, 0) for some in (poses, truth))
+    d, v = np.moveaxis(poses.positions - truth.positions, -1, 0), cross(true_xyz, xyz)
+    for axis in range(3):
+        v[axis] += true_w * xyz[axis]
+        v[axis] -= w * true_xyz[axis]
+    if poses.scales is None and truth.scales is None:
+        v *= 2.0 * radius
+        squared = _dot(d, d)
+        squared += _dot(v, v)
+        squared += 2.0 * _length(cross(d, v))
+        return np.sqrt(squared, out=squared)
+    one = np.ones(poses.shape)
+    scales = [one if scales is None else scales for scales in (poses.scales, truth.scales)]
+    return _displacement_of_growing(d, v, *(radius * scale for scale in scales))
 
 
-def shell_point(poses: Poses, axis: int, radius: float) -> np.ndarray:
-    """Where the point at `radius` along one of the body's axes is, shape (..., 3)."""
-    arm = radius * np.eye(3)[axis] * (1.0 if poses.scales is None else poses.scales[..., None])
-    return poses.positions + rotate(poses.quaternions, np.broadcast_to(arm, poses.positions.shape))
+def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray) -> np.ndarray:
+    """The same of a ball of two sizes, shape (..., n), from d and v (3, ..., n).
+
+    It is the longest sum of d and a vector to an ellipsoid about the axis: the difference of the radii along the axis,
+    and across it the third side of the triangle that they make with theta between them. Of the multiplier that belongs
+    to it, what it is above the square of the larger half-axis is found by Newton's method, from below.
+
+    Source: Conn, Gould and Toint, "Trust-Region Methods", 2000, section 7.3.
+    """
+    v = np.where(_length(v) > TINY, v, np.array((TINY, 0.0, 0.0)).reshape(3, *[1] * (v.ndim - 1)))  # Any axis will do.
+    sine = _length(v)
+    axis_along, squared_growth = np.abs(radius - true_radius), (radius - true_radius) ** 2
+    squared_chord = 4.0 * radius * true_radius * sine * sine
+    axis_across = np.sqrt(squared_growth + squared_chord)
+    along, across = np.abs(_dot(d, v)) / sine, _length(cross(d, v)) / sine
+    pull_along, pull_across = axis_along * along, axis_across * across
+    least = np.maximum(np.maximum(pull_across, pull_along - squared_chord), TINY)
+    above = least
+    for _ in range(NEWTON_STEPS):
+        share_along, share_across = pull_along / (above + squared_chord), pull_across / above
+        squared = share_along**2 + share_across**2
+        slope = share_along**2 / (above + squared_chord) + share_across**2 / above
+        above = np.maximum(above + squared / np.maximum(slope, TINY) * (np.sqrt(squared) - 1.0), least)
+    share = np.minimum(pull_along / (above + squared_chord), 1.0)
+    return np.hypot(along + axis_along * share, across + axis_across * np.sqrt(1.0 - share * share))
 
 
 def rms(errors: np.ndarray) -> float:
     """The root of the mean square over all samples; 0 where there are none."""
     return float(np.sqrt(np.mean(np.square(errors)))) if np.size(errors) else 0.0
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of vectors (3, ...)."""
+    return np.einsum("i...,i...->...", a, b)
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt(_dot(vectors, vectors))

@@ -75,6 +75,40 @@ class Poses:
         )
 
 
+class PackedPoses:
+    """Poses (..., n) whose components are apart in memory, as what is picked from them is: quicker to work on."""
+
+    def __init__(self, poses: Poses) -> None:
+        rows = [np.moveaxis(poses.positions, -1, 0), np.moveaxis(poses.quaternions, -1, 0)]
+        if poses.scales is not None:
+            rows.append(poses.scales[None])
+        self._rows = np.concatenate(rows)
+
+    def __getitem__(self, samples: np.ndarray) -> Poses:
+        """Those at some numbers (m,) of the last axis, shape (..., m)."""
+        rows = self._rows.take(samples, axis=-1)
+        return Poses(np.moveaxis(rows[:3], 0, -1), np.moveaxis(rows[3:7], 0, -1), rows[7] if len(rows) > 7 else None)
+
+
+def placed(above: Poses, poses: Poses) -> Poses:
+    """Where poses (...) are that are given in the space of others (...), with a scale where either has one."""
+    arms = rotate(above.quaternions, poses.positions)
+    scales = poses.scales if above.scales is None else above.scales
+    if above.scales is not None:
+        arms *= above.scales[..., None]
+        scales = above.scales if poses.scales is None else above.scales * poses.scales
+    return Poses(above.positions + arms, multiply(above.quaternions, poses.quaternions), scales)
+
+
+def inverse(poses: Poses) -> Poses:
+    """What takes poses (...) back to where they came from."""
+    back = conjugate(poses.quaternions)
+    arms = -rotate(back, poses.positions)
+    if poses.scales is None:
+        return Poses(arms, back)
+    return Poses(arms / poses.scales[..., None], back, 1.0 / poses.scales)
+
+
 def beyond(last: Poses, before: Poses) -> Poses:
     """Where a motion gets that goes on from `last` (...) as it went there from `before` (...): last before^-1 last."""
     turn = multiply(last.quaternions, conjugate(before.quaternions))

@@ -12,10 +12,12 @@ def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.
 
     `out`, an array for the product, has none of its memory in common with a and b.
     """
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape))) if out is None else np.moveaxis(out, -1, 0)
-    w, x, y, z = (components[row, ...] for row in range(4))
+    aw, ax, ay, az = (a[..., row] for row in range(4))
+    bw, bx, by, bz = (b[..., row] for row in range(4))
+    if out is None:
+        components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape)))
+        out = components.transpose(*range(1, components.ndim), 0)
+    w, x, y, z = (out[..., row] for row in range(4))
     np.subtract(aw * bw, ax * bx, out=w)
     w -= ay * by
     w -= az * bz
@@ -28,7 +30,7 @@ def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.
     np.add(aw * bz, az * bw, out=z)
     z += ax * by
     z -= ay * bx
-    return np.moveaxis(components, 0, -1)
+    return out
 
 
 def conjugate(q: np.ndarray) -> np.ndarray:
@@ -38,18 +40,25 @@ def conjugate(q: np.ndarray) -> np.ndarray:
 
 def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points of shape (..., 3) turned by unit quaternions of shape (..., 4). A view, components apart in memory."""
-    w, *xyz = np.moveaxis(q, -1, 0)
-    points = np.moveaxis(points, -1, 0)
-    across = 2.0 * cross(xyz, points)
-    turned = w * across + cross(xyz, across)
+    w, *xyz = (q[..., row] for row in range(4))
+    points = [points[..., row] for row in range(3)]
+    across = cross(xyz, points)
+    across *= 2.0
+    turned = cross(xyz, across)
+    across *= w
+    turned += across
     for axis in range(3):
         turned[axis] += points[axis]
-    return np.moveaxis(turned, 0, -1)
+    return turned.transpose(*range(1, turned.ndim), 0)
 
 
 def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
     """The vector product of vectors (3, ...), components first."""
-    return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
+    product = np.empty((3, *np.broadcast_shapes(np.shape(a[0]), np.shape(b[0]))))
+    for axis in range(3):
+        after, last = (axis + 1) % 3, (axis + 2) % 3
+        np.subtract(a[after] * b[last], a[last] * b[after], out=product[axis, ...])
+    return product
 
 
 def normalise(q: np.ndarray) -> np.ndarray:

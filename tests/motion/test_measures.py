@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from addon.motion import Poses, measure, rms, shell_error
+from addon.motion.quaternions import multiply, normalise
 from tests.motion.cases import random_quaternions
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
@@ -31,19 +32,69 @@ def test_a_turn_moves_the_shell_by_the_chord(angle):
     assert errors.position[0] == 0.0
 
 
-def test_the_shell_is_that_of_three_points_moved_by_scipys_rotations():
-    random = np.random.default_rng(2)
-    a, b = (Poses(random.normal(size=(50, 3)), random_quaternions(random, 50)) for _ in range(2))
-    expected = np.zeros(50)
-    for axis in np.eye(3):
-        points = [p.positions + Rotation.from_quat(p.quaternions, scalar_first=True).apply(0.1 * axis) for p in (a, b)]
-        expected = np.maximum(expected, np.linalg.norm(points[0] - points[1], axis=1))
-    assert shell_error(a, b) == pytest.approx(expected, rel=1e-12)
+def pairs(count: int, seed: int, growing: bool) -> tuple[Poses, Poses]:
+    """Poses near one another and far apart, in place, in rotation and in scale."""
+    random = np.random.default_rng(seed)
+    near, nearer, nearest = 10.0 ** random.uniform((-6, -6, -8), (1, 1, 0), (count, 3)).T[..., None]
+    truth = random.normal(size=(count, 3)), random_quaternions(random, count)
+    quaternions = normalise(truth[1] + nearer * random.normal(size=(count, 4)))
+    scales = np.exp(random.normal(size=count)) if growing else None
+    grown = scales * np.exp(nearest[:, 0] * random.normal(size=count)) if growing else None
+    return Poses(truth[0] + near * random.normal(size=(count, 3)), quaternions, grown), Poses(*truth, scales)
 
 
-def test_growth_moves_the_shell():
-    truth = Poses([[0, 0, 0]], [IDENTITY], [1.0])
-    assert shell_error(Poses([[0, 0, 0]], [IDENTITY], [3.0]), truth, radius=0.5)[0] == pytest.approx(1.0)
+def displacements(poses: Poses, truth: Poses, points: np.ndarray) -> np.ndarray:
+    """How far points (m, 3) of the body, the same for all poses (n,), are off by SciPy's rotations, shape (n, m)."""
+
+    def placed(some: Poses) -> np.ndarray:
+        matrices = Rotation.from_quat(some.quaternions, scalar_first=True).as_matrix()
+        scales = np.ones(len(some)) if some.scales is None else some.scales
+        return some.positions[:, None] + np.einsum("n,nij,mj->nmi", scales, matrices, points)
+
+    return np.linalg.norm(placed(poses) - placed(truth), axis=-1)
+
+
+@pytest.mark.parametrize("growing", [False, True])
+def test_no_point_of_the_ball_is_off_by_more_and_one_is_off_by_as_much(growing):
+    poses, truth = pairs(300, 2, growing)
+    random = np.random.default_rng(3)
+    directions = random.normal(size=(20000, 3))
+    points = 0.7 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    error = shell_error(poses, truth, radius=0.7)
+    found = displacements(poses, truth, points)
+    assert np.all(found.max(axis=1) <= error * (1.0 + 1e-12) + 1e-15)
+    assert np.all(found.max(axis=1) >= 0.999 * error)
+    inside = displacements(poses, truth, points * random.uniform(size=(20000, 1)))
+    assert np.all(inside.max(axis=1) <= error * (1.0 + 1e-12) + 1e-15)
+
+
+@pytest.mark.parametrize("growing", [False, True])
+def test_how_the_bodys_axes_lie_does_not_matter(growing):
+    poses, truth = pairs(500, 4, growing)
+    turn = random_quaternions(np.random.default_rng(5), 1)
+    turned = [Poses(some.positions, multiply(some.quaternions, turn), some.scales) for some in (poses, truth)]
+    assert shell_error(*turned) == pytest.approx(shell_error(poses, truth), rel=1e-9, abs=1e-15)
+
+
+def test_the_three_points_along_the_axes_miss_more_than_half_of_it():
+    poses, truth = pairs(20000, 6, growing=False)
+    share = displacements(poses, truth, 0.1 * np.eye(3)).max(axis=1) / shell_error(poses, truth)
+    assert share.max() <= 1.0 + 1e-12
+    assert 0.40 < share.min() < 0.42
+
+
+@pytest.mark.parametrize("growing", [False, True])
+def test_a_radius_for_each_pose(growing):
+    poses, truth = pairs(50, 7, growing)
+    radii = np.random.default_rng(8).uniform(0.0, 2.0, 50)
+    each = [shell_error(poses[[i]], truth[[i]], radius)[0] for i, radius in enumerate(radii)]
+    assert shell_error(poses, truth, radii) == pytest.approx(each, rel=1e-14)
+
+
+def test_what_does_not_grow_is_off_as_without_scales():
+    poses, truth = pairs(500, 9, growing=False)
+    scaled = [Poses(some.positions, some.quaternions, np.full(500, 1.7)) for some in (poses, truth)]
+    assert shell_error(*scaled, radius=0.1) == pytest.approx(shell_error(poses, truth, radius=0.17), rel=1e-12)
 
 
 def test_the_sign_of_a_quaternion_is_no_error():

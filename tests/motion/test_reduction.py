@@ -24,14 +24,16 @@ HANDS = (
 
 
 def shell_errors(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, radius: float = RADIUS) -> np.ndarray:
-    """The largest displacement of the three shell points on every sample, by matrices."""
+    """The largest displacement of any point within the radius on every sample, by singular values of matrices."""
     shown = interpolate(times[keys], poses[keys], times, mode)
-    points = np.vstack((radius * np.eye(3), np.ones(3)))
     a, b = (
-        np.array([pose_matrix(*pose) for pose in zip(some.quaternions, some.positions, strict=True)]) @ points
+        np.array([pose_matrix(*pose) for pose in zip(some.quaternions, some.positions, strict=True)])
         for some in (shown, poses)
     )
-    return np.linalg.norm((a - b)[:, :3], axis=1).max(axis=1)
+    # The ball becomes a disc: all of its points move across the axis of the turn.
+    axes, sizes, _ = np.linalg.svd(radius * (a - b)[:, :3, :3])
+    moved = np.einsum("nij,ni->nj", axes, (a - b)[:, :3, 3])
+    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
 
 
 def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> tuple[np.ndarray, Poses]:

@@ -1,0 +1,421 @@
+"""The search for few keys among the samples of recordings.
+
+Keys are taken out as long as the motion stays near enough to the recording, those first that matter least, many at a
+time where they do not influence the same segments; then the rest are moved along the recording to where the error is
+smallest, which lets more of them go, and so on. A key changes the segments around it alone, so that all keys can be
+tried at once, and a key is tried again only after one near it has changed: the work grows with the length of the
+recordings and not with its square.
+
+Source: keys are taken out as knots are from splines in Lyche and Mørken, "Knot removal for parametric B-spline curves
+and surfaces", 1987.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .key_links import linked_keys
+from .measures import shell_error
+from .modes import MODES
+from .poses import PackedPoses, Poses, beyond
+from .segments import prepare_within
+
+PEAK = 8
+"""The power of errors whose sum stands for the largest of them."""
+
+STEPS = np.array((1, -1, 2, -2, 4, -4, 8, -8))
+"""By how many samples keys are moved, on trial."""
+
+ROUNDS = 12
+"""Of moving keys and taking out more of them, at most."""
+
+NEAR = np.arange(-1, 2)
+"""The keys that are moved anew after one of them has changed."""
+
+MOVES = 4
+"""How often keys are moved in a round."""
+
+GAIN = 1e-4
+"""The least that moving a key has to gain, as a part of the mean cost of a segment."""
+
+LOOSER = (1.6, 1.3, 1.15)
+"""How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
+
+WORST = 1e30
+"""Errors are clipped to this, so that their powers stay finite."""
+
+BATCH = 2**14
+"""Poses looked at in one go: few enough for the processor's caches."""
+
+
+class Recording:
+    """What keys are searched for: tracks of samples, one behind the other, each of which gets keys of its own.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Rising within each track.
+    poses : Poses, shape (..., n)
+        At these times; what has leading axes moves together and has the same keys.
+    mode : str
+        What fills in between keys.
+    radius, tolerance : float or array, shape (n,)
+        Of the shell error. Errors are counted in tolerances.
+    starts : array of int, optional
+        The first sample of each track; one track, otherwise.
+    """
+
+    def __init__(
+        self,
+        times: np.ndarray,
+        poses: Poses,
+        mode: str,
+        radius: float | np.ndarray,
+        tolerance: float | np.ndarray = 1.0,
+        starts: np.ndarray | None = None,
+    ) -> None:
+        self.times, self.poses, self.mode = times, poses, mode
+        self.radius, self.tolerance = (np.broadcast_to(number, times.shape) for number in (radius, tolerance))
+        self.starts = np.zeros(1, dtype=np.int64) if starts is None else starts
+        self.ends = np.append(self.starts[1:], len(times)) - 1
+        self.truth = PackedPoses(poses)
+
+    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
+        """How far what is shown (..., m) is off at some samples (m,), in tolerances, shape (m,)."""
+        return shell_error(shown, self.truth[samples], self.radius[samples]) / self.tolerance[samples]
+
+
+@dataclass(eq=False)
+class Keys:
+    """Keys among the samples, and what lies between them."""
+
+    indices: np.ndarray
+    """Samples, shape (k,)."""
+
+    first: np.ndarray
+    """The number of the first key of each key's track, shape (k,)."""
+
+    last: np.ndarray
+    """That of the last, shape (k,)."""
+
+    cost: np.ndarray
+    """The sum of powers of the errors from each key to the next, shape (k,), zero behind a track's last."""
+
+    peak: np.ndarray
+    """The largest error there, shape (k,)."""
+
+    stale: np.ndarray
+    """Whether anything has changed near a key since moving it was tried, shape (k,)."""
+
+    @property
+    def inner(self) -> np.ndarray:
+        """The numbers of those that can be moved and removed."""
+        numbers = np.arange(len(self.indices))
+        return numbers[(numbers > self.first) & (numbers < self.last)]
+
+    def around(self, numbers: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The keys in these columns from each of some keys, (c, m), and whether they belong to its track."""
+        found = numbers[:, None] + columns
+        inside = (found >= self.first[numbers][:, None]) & (found <= self.last[numbers][:, None])
+        return np.clip(found, 0, len(self.indices) - 1), inside
+
+    def windows(self, numbers: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """The samples of the keys in these columns from each of some keys, -1 where the track has none, (c, m)."""
+        found, inside = self.around(numbers, columns)
+        return np.where(inside, self.indices[found], -1)
+
+
+class Search:
+    """The search for keys of recordings under one mode: for the largest error, or with `rms` for its mean square."""
+
+    def __init__(self, recording: Recording, *, rms: bool = False) -> None:
+        self.recording, self.power = recording, 2 if rms else PEAK
+        mode = MODES[recording.mode]
+        self.reach = max(mode.behind, mode.ahead)
+        """How many segments beyond the two next to it a key influences, on either side."""
+        self.spacing = 2 + 2 * self.reach
+        """Keys this far from one another, or further, can be tried without regard to each other."""
+
+    def within(self, tries: int) -> np.ndarray:
+        """Few samples that, as keys, keep to the tolerance."""
+        best = self.refined(self.thinned(self.measured(np.arange(len(self.recording.times))), 1.0))
+        if self.power == 2:
+            return best.indices
+        found = [best.indices]
+        for looser in LOOSER[:tries]:
+            # Keys that are too few find better places, also when some are put back between them.
+            fewer = self.moved(self.thinned(self.measured(best.indices), looser), looser)
+            keys = self.refined(self.densified(fewer))
+            best = self._better(best, keys)
+            found.append(keys.indices)
+        if self.reach <= 1 and tries and len(self.recording.starts) == 1:
+            linked = linked_keys(self, found)
+            if len(linked) < len(best.indices):
+                best = self.refined(self.measured(linked))
+        return best.indices
+
+    def within_budget(self, budget: int) -> np.ndarray:
+        """So many samples that are keys with as small an error as can be found."""
+        keys = self.thinned(self.measured(np.arange(len(self.recording.times))), math.inf, budget)
+        for _ in range(ROUNDS):
+            before = keys.cost.sum()
+            keys = self.moved(keys, math.inf)
+            if not keys.cost.sum() < 0.99 * before:
+                break
+        return keys.indices
+
+    def measured(self, indices: np.ndarray) -> Keys:
+        """Keys at these samples, rising, the outermost of each track among them, and everything between them."""
+        recording = self.recording
+        first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
+        counts = end - first + 1
+        keys = Keys(
+            indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
+        )
+        numbers = np.flatnonzero(np.arange(len(indices)) < keys.last)
+        windows = keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
+        cost, peak = self.evaluate(windows, slice(self.reach, self.reach + 1))
+        keys.cost[numbers], keys.peak[numbers] = cost[:, 0], peak[:, 0]
+        return keys
+
+    def errors(self, keys: Keys) -> np.ndarray:
+        """The error at every sample, in tolerances, shape (n,)."""
+        numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
+        windows = keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
+        errors = np.zeros(len(self.recording.times))
+        for batch, counts in self._batches(windows, slice(self.reach, self.reach + 1)):
+            samples, found, _ = self._errors(batch, self.reach, counts)
+            errors[samples] = found
+        return errors
+
+    def densified(self, keys: Keys) -> Keys:
+        """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
+        while keys.peak.max() > 1.0:
+            errors = self.errors(keys)
+            of_segments = np.maximum.reduceat(errors, keys.indices)
+            counts = np.diff(keys.indices, append=len(errors))
+            worst = (errors == of_segments.repeat(counts)) & (errors > 1.0)
+            more = np.union1d(keys.indices, np.flatnonzero(worst))
+            if len(more) == len(keys.indices):
+                break  # It is off by no more than rounding.
+            keys = self.measured(more)
+        return keys
+
+    def _better(self, best: Keys, other: Keys) -> Keys:
+        """Of each track the keys that are fewer."""
+        chosen = []
+        for start, end in zip(self.recording.starts, self.recording.ends, strict=True):
+            rows = [slice(*np.searchsorted(keys.indices, (start, end + 1))) for keys in (best, other)]
+            fewer = rows[1].stop - rows[1].start < rows[0].stop - rows[0].start
+            takes_other = fewer and other.peak[rows[1]].max() <= 1.0
+            chosen.append(other.indices[rows[1]] if takes_other else best.indices[rows[0]])
+        return self.measured(np.concatenate(chosen))
+
+    def refined(self, keys: Keys, tolerance: float = 1.0) -> Keys:
+        """Keys moved and thinned until none can be removed."""
+        for _ in range(ROUNDS):
+            before = len(keys.indices)
+            keys = self.thinned(self.moved(keys, tolerance), tolerance)
+            if len(keys.indices) == before:
+                break
+        return keys
+
+    def thinned(self, keys: Keys, tolerance: float, fewest: int = 2) -> Keys:
+        """Keys without all those that can be removed, down to the fewest that are wanted."""
+        reach = self.reach
+        columns = np.concatenate((np.arange(-1 - 2 * reach, 0), np.arange(1, 2 + 2 * reach)))
+        seen = np.zeros(len(keys.indices), dtype=bool)
+        cost, peak = np.zeros((2, len(keys.indices), 1 + 2 * reach))
+        while len(keys.indices) > fewest:
+            inner = keys.inner
+            unseen = inner[~seen[inner]]
+            if len(unseen):
+                found = self.evaluate(keys.windows(unseen, columns), slice(reach, 1 + 3 * reach))
+                cost[unseen], peak[unseen] = found
+                seen[unseen] = True
+            rise = cost[inner].sum(axis=1) - self._cost_around(keys, inner)
+            most = len(keys.indices) - fewest
+            picked = inner[self._removable(rise, peak[inner].max(axis=1), keys, tolerance, most)]
+            if not len(picked):
+                break
+            self._remove(keys, picked, cost, peak)
+            left = np.ones(len(seen), dtype=bool)
+            left[picked] = False
+            near = (picked[:, None] + np.arange(-2 - 3 * reach, 3 + 3 * reach)).ravel()
+            seen[near[(near >= 0) & (near < len(seen))]] = False
+            seen, cost, peak = seen[left], cost[left], peak[left]
+        return keys
+
+    def _removable(self, rise: np.ndarray, peak: np.ndarray, keys: Keys, tolerance: float, most: int) -> np.ndarray:
+        """Which of the inner keys go next: those whose removal raises the cost least, far enough from one another."""
+        order = np.argsort(rise, kind="stable")
+        order = order[: max(1, len(order) // 4)] if self.power == 2 or not math.isfinite(tolerance) else order
+        if self.power != 2:
+            order = order[peak[order] <= tolerance]
+            order = order[: max(1, len(rise) // 4)]
+        picked = _spaced(order, self.spacing, len(rise))[:most]
+        if self.power == 2 and math.isfinite(tolerance):
+            allowed = tolerance**2 * len(self.recording.times)
+            picked = picked[keys.cost.sum() + np.cumsum(rise[picked]) <= allowed]
+        return picked
+
+    def _remove(self, keys: Keys, picked: np.ndarray, cost: np.ndarray, peak: np.ndarray) -> None:
+        """Remove these keys, and set the costs and peaks of the segments that take their place."""
+        # The segment from the key before takes the place of two.
+        columns = np.concatenate((np.arange(-1 - self.reach, 0), np.arange(1, 1 + self.reach)))
+        segments, inside = keys.around(picked, columns)
+        keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[picked][inside], peak[picked][inside]
+        near, inside = keys.around(picked, NEAR)
+        keys.stale[near[inside]] = True
+        removed = np.zeros(len(keys.indices), dtype=np.int64)
+        removed[picked] = 1
+        before = np.cumsum(removed)
+        left = removed == 0
+        keys.first, keys.last = ((ends - before[ends])[left] for ends in (keys.first, keys.last))
+        for name in ("indices", "cost", "peak", "stale"):
+            setattr(keys, name, getattr(keys, name)[left])
+
+    def moved(self, keys: Keys, tolerance: float) -> Keys:
+        """As many keys, moved along the recording as long as that lowers the cost by much."""
+        reach = self.reach
+        columns, of_segments = np.arange(-1 - 2 * reach, 2 + 2 * reach), np.arange(-1 - reach, 1 + reach)
+        for _ in range(MOVES):
+            inner = keys.inner
+            inner = inner[keys.stale[inner]]
+            trials = keys.indices[inner, None] + STEPS
+            possible = (trials > keys.indices[inner - 1, None]) & (trials < keys.indices[inner + 1, None])
+            rows, steps = np.nonzero(possible)
+            if not len(rows):
+                break
+            windows = keys.windows(inner[rows], columns)
+            windows[:, 1 + 2 * reach] += STEPS[steps]
+            cost, peak = self.evaluate(windows, slice(reach, 2 + 3 * reach))
+            rise = cost.sum(axis=1) - self._cost_around(keys, inner[rows])
+            if self.power != 2:
+                rise[peak.max(axis=1) > tolerance] = math.inf
+            order = np.lexsort((rise, rows))
+            best = order[np.flatnonzero(np.diff(rows[order], prepend=-1))]
+            keys.stale[inner] = False
+            best = best[rise[best] < -GAIN * keys.cost.sum() / len(keys.cost)]
+            if not len(best):
+                break
+            best = best[np.argsort(rise[best], kind="stable")]
+            numbers = inner[rows[best]]
+            keys.stale[numbers] = True
+            picked = _spaced(numbers, self.spacing, len(keys.indices))
+            chosen = best[np.argsort(numbers)[np.searchsorted(np.sort(numbers), picked)]]
+            segments, inside = keys.around(picked, of_segments)
+            keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[chosen][inside], peak[chosen][inside]
+            keys.indices = keys.indices.copy()
+            keys.indices[picked] += STEPS[steps[chosen]]
+            near, inside = keys.around(picked, NEAR)
+            keys.stale[near[inside]] = True
+        return keys
+
+    def _cost_around(self, keys: Keys, numbers: np.ndarray) -> np.ndarray:
+        """The sum over the segments that each key influences."""
+        segments, inside = keys.around(numbers, np.arange(-1 - self.reach, 1 + self.reach))
+        return np.where(inside, keys.cost[segments], 0.0).sum(axis=1)
+
+    def evaluate(self, windows: np.ndarray, segments: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Costs and peaks, each (c, s), of some of the segments between the keys of windows (c, m)."""
+        cost, peak = np.zeros((2, len(windows) * (segments.stop - segments.start)))
+        done = 0
+        for batch, counts in self._batches(windows, segments):
+            _, errors, filled = self._errors(batch, segments.start, counts)
+            if len(filled):
+                begins = (np.cumsum(counts.ravel()) - counts.ravel())[filled]
+                cost[done + filled] = np.add.reduceat(errors**self.power, begins)
+                peak[done + filled] = np.maximum.reduceat(errors, begins)
+            done += counts.size
+        return cost.reshape(len(windows), -1), peak.reshape(len(windows), -1)
+
+    def _batches(self, windows: np.ndarray, segments: slice) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Windows, a batch at a time, and how many samples there are in these of their segments, (c, s)."""
+        wanted = windows[:, segments], windows[:, segments.start + 1 : segments.stop + 1]
+        counts = np.where((wanted[0] >= 0) & (wanted[1] >= 0), wanted[1] - wanted[0] - 1, 0)
+        together = math.prod(self.recording.poses.shape[:-1])
+        ends = np.cumsum(together * counts.sum(axis=1))
+        cuts = np.unique(np.append(np.searchsorted(ends, np.arange(0, ends[-1], BATCH)), len(windows)))
+        for first, last in itertools.pairwise(cuts.tolist()):
+            yield windows[first:last], counts[first:last]
+
+    def _errors(self, windows: np.ndarray, start: int, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Samples (n,), their errors (n,), and which of the segments (c, s) have any, of windows (c, m)."""
+        filled = np.flatnonzero(counts)
+        nonempty = np.unique(filled // counts.shape[1])
+        all_counts = np.zeros((len(nonempty), windows.shape[1] - 1), dtype=np.int64)
+        all_counts[:, start : start + counts.shape[1]] = counts[nonempty]
+        flat_counts = all_counts.ravel()
+        segment = np.repeat(np.arange(flat_counts.size), flat_counts)
+        if not len(segment):
+            return segment, np.empty(0), filled
+        recording = self.recording
+        first = np.cumsum(flat_counts) - flat_counts
+        samples = (windows[nonempty, :-1].ravel() + 1 - first)[segment] + np.arange(len(segment))
+        key_times, keys = _with_ends(recording.times, recording.poses, windows[nonempty])
+        starts, rates = key_times[:, :-1].ravel(), 1.0 / np.diff(key_times).ravel()
+        progress = (recording.times[samples] - starts[segment]) * rates[segment]
+        together = math.prod(keys.shape[:-2])
+        within = prepare_within(MODES[recording.mode].curves, key_times, keys)
+        shown = within(np.tile(flat_counts, together), np.tile(progress, together), slice(None))
+        if len(keys.shape) > 2:
+            shown = Poses(
+                *(
+                    None if rows is None else rows.reshape(*keys.shape[:-2], -1, *rows.shape[1:])
+                    for rows in (shown.positions, shown.quaternions, shown.scales)
+                )
+            )
+        return samples, np.minimum(recording.errors(samples, shown), WORST), filled
+
+
+def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
+    """Of the numbers below `count`, in the order of their worth, those that are `distance` from any better one."""
+    rank = np.full(count + 2 * distance, len(order))
+    rank[order + distance] = np.arange(len(order))
+    picked: list[np.ndarray] = []
+    # All at once that are the best in their neighbourhood, and again with what is left.
+    while True:
+        windows = np.lib.stride_tricks.sliding_window_view(rank, 2 * distance - 1)
+        best = windows.min(axis=1)
+        centre = rank[distance - 1 : distance - 1 + len(best)]
+        chosen = np.flatnonzero((centre == best) & (centre < len(order)))
+        if not len(chosen):
+            break
+        picked.append(chosen - 1)
+        near = chosen[:, None] + distance - 1 + np.arange(1 - distance, distance)
+        rank[near.ravel()] = len(order)
+    found = np.concatenate(picked) if picked else np.empty(0, dtype=np.int64)
+    ranks = np.empty(count, dtype=np.int64)
+    ranks[order] = np.arange(len(order))
+    return found[np.argsort(ranks[found])]
+
+
+def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray) -> tuple[np.ndarray, Poses]:
+    """Times (c, m) and poses (..., c, m) of these samples; where there are none, the outermost segment's motion goes on."""
+    outside = windows < 0
+    key_times, keys = times[windows], poses[..., windows]
+    rows = np.flatnonzero(outside.any(axis=1))
+    if not len(rows):
+        return key_times, keys
+    outside = outside[rows]
+    last = windows.shape[1] - 1
+    columns = [(column, 1) for column in range(last - 2, -1, -1)] + [(column, -1) for column in range(2, last + 1)]
+    for column, inwards in columns:
+        # Outside on this side, where the key next to it is one or has been made one.
+        side = slice(None, column + 1) if inwards > 0 else slice(column, None)
+        here = rows[outside[:, side].all(axis=1)]
+        if len(here):
+            end, before = column + inwards, column + 2 * inwards
+            key_times[here, column] = 2.0 * key_times[here, end] - key_times[here, before]
+            made = beyond(keys[..., here, end], keys[..., here, before])
+            keys.positions[..., here, column, :] = made.positions
+            keys.quaternions[..., here, column, :] = made.quaternions
+            if keys.scales is not None:
+                keys.scales[..., here, column] = made.scales
+    return key_times, keys

@@ -1,0 +1,399 @@
+"""Key reduction of whole bodies: few keys for joints that hang on one another.
+
+What counts is where everything gets: an error of a joint moves all that hangs on it. The error is therefore looked at in
+the root's space, through the hierarchy, at every joint and sample. Joints have keys of their own, or all of them share
+*key poses*, as animators work from pose to pose.
+
+Source: the error in the space of the whole object is that of the Animation Compression Library; key poses that bodies
+share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .key_search import Keys, Recording, Search
+from .measures import shell_error
+from .modes import MODES, interpolate
+from .poses import PackedPoses, Poses, inverse, placed
+from .quaternions import align_signs, normalise
+from .reduction import check_recording, check_wishes
+from .skeletons import Skeleton
+
+SWEEPS = (0.8, 1.0)
+"""How much of the tolerance may be used up by then, each time that keys of every joint are taken out, from the roots on.
+What is left for later is shared by the joints further down."""
+
+BUDGET_STEPS = 8
+"""Of a search for the tolerance that a budget of keys of their own can keep to."""
+
+
+def reduce_skeleton_keys(
+    times: ArrayLike,
+    poses: Poses,
+    parents: ArrayLike,
+    mode: str = "motor_spline",
+    *,
+    tolerance: float | None = None,
+    radius: float | ArrayLike = 0.03,
+    shared: bool = False,
+    budget: int | None = None,
+    weights: ArrayLike | None = None,
+    tries: int = 2,
+) -> tuple[np.ndarray, ...]:
+    """The fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
+
+    Parameters
+    ----------
+    times : array-like, shape (n,)
+        Seconds, strictly rising.
+    poses : Poses, shape (joints, n)
+        The recording: each joint in its parent's space, with unit quaternions.
+    parents : array-like of int, shape (joints,)
+        The number of each joint's parent, -1 for roots.
+    mode : str
+        What fills in between keys, one of `MODES`.
+    tolerance : float, optional
+        The largest shell error of any joint at any sample, in the root's space and in the unit of the positions.
+    radius : float or array-like, shape (joints,)
+        Of the ball at each joint that the shell error is of.
+    shared : bool
+        Key poses: all joints have keys at the same samples. Otherwise each has its own, the fewest in all.
+    budget : int, optional
+        The most keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at least 2 for
+        each. The error is then as small as can be found.
+    weights : array-like, shape (joints,), optional
+        How many times the error of each joint counts: more for feet that stand and hands that hold, 0 for joints that
+        do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
+    tries : int
+        With `shared`, as in `reduce_keys`.
+
+    Returns
+    -------
+    tuple of array of int, one for each joint
+        Rising samples. A joint that need not move has a single one; the others have the first and the last among them.
+
+    Raises
+    ------
+    ValueError
+        As `reduce_keys` does, and where joints hang on one another in a circle, or radii or weights make no sense. The
+        message names the joint.
+    """
+    check_wishes(mode, tolerance, budget)
+    skeleton, times = Skeleton(parents), np.asarray(times, dtype=np.float64)
+    if poses.shape != (len(skeleton), *times.shape):
+        raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
+    for joint in range(len(skeleton)):
+        check_recording(times, poses[joint], f"joint {joint}, ")
+    radii, weights = (
+        _one_for_each(numbers, len(skeleton), name) for numbers, name in ((radius, "radius"), (weights, "weight"))
+    )
+    if not np.any(weights > 0.0):
+        raise ValueError("every joint has a weight of 0: nothing would matter")
+    poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
+    body = _Body(times, poses, skeleton, mode, radii, weights)
+    if shared:
+        keys = body.key_poses(tolerance, budget, tries)
+        return (keys,) * len(skeleton)
+    if tolerance is not None:
+        return body.own_keys(tolerance)
+    if budget < 2 * len(skeleton):
+        raise ValueError(f"a budget of {budget} keys is too small for {len(skeleton)} joints: each may need 2")
+    return body.own_keys_within(budget)
+
+
+class _Body:
+    """The recording of a body, and what it is measured by. Errors are weighted."""
+
+    def __init__(
+        self, times: np.ndarray, poses: Poses, skeleton: Skeleton, mode: str, radii: np.ndarray, weights: np.ndarray
+    ) -> None:
+        self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
+        self.radii, self.weights = radii, weights
+        self.truth = skeleton.in_root_space(poses)
+
+    def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """Of all joints (joints, m), at some samples where these poses (joints, m) are shown in their parents' space."""
+        there = self.skeleton.in_root_space(shown)
+        return shell_error(there, self.truth[:, samples], self.radii[:, None]) * self.weights[:, None]
+
+    def shown(self, joint: int, keys: np.ndarray) -> Poses:
+        """What a joint does between keys (k,), shape (n,)."""
+        return interpolate(self.times[keys], self.poses[joint][keys], self.times, self.mode)
+
+    def key_poses(self, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
+        if len(self.times) <= 2:
+            return np.arange(len(self.times))
+        search = Search(_WholeBody(self, tolerance or 1.0))
+        return search.within(tries) if tolerance is not None else search.within_budget(budget)
+
+    def own_keys_within(self, budget: int) -> tuple[np.ndarray, ...]:
+        """The keys of the smallest tolerance that so many can keep to, by bisection."""
+        rest = tuple(np.array([key]) for key in self.middles)
+        largest = float(self.errors(self.poses[np.arange(len(rest))[:, None], np.array(rest)]).max())
+        low, high, best = math.log(max(largest, 1e-9)) - 16.0, math.log(max(largest, 1e-9)), rest
+        for _ in range(BUDGET_STEPS):
+            middle = 0.5 * (low + high)
+            keys = self.own_keys(math.exp(middle))
+            if sum(map(len, keys)) <= budget:
+                high, best = middle, keys
+            else:
+                low = middle
+        return best
+
+    def own_keys(self, tolerance: float) -> tuple[np.ndarray, ...]:
+        return _OwnKeys(self, tolerance).found()
+
+    @property
+    def middles(self) -> np.ndarray:
+        """The sample of each joint that is nearest to its mean pose, shape (joints,)."""
+        means = Poses(
+            self.poses.positions.mean(axis=1, keepdims=True),
+            normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + 1e-12),
+            None if self.poses.scales is None else self.poses.scales.mean(axis=1, keepdims=True),
+        )
+        whole = Poses(
+            *(
+                None if rows is None else np.broadcast_to(rows, all_rows.shape)
+                for rows, all_rows in zip(
+                    (means.positions, means.quaternions, means.scales),
+                    (self.poses.positions, self.poses.quaternions, self.poses.scales),
+                    strict=True,
+                )
+            )
+        )
+        return np.argmin(shell_error(self.poses, whole, self.radii[:, None] + self.sizes), axis=1)
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
+        found = np.empty(self.poses.shape)
+        for joint, below in enumerate(self.skeleton.below):
+            away = self.truth.positions[below] - self.truth.positions[joint]
+            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + self.radii[below, None]).max(axis=0)
+        return found
+
+
+class _WholeBody(Recording):
+    """All joints at once, with the same keys: the error of a sample is the largest of any joint."""
+
+    def __init__(self, body: _Body, tolerance: float) -> None:
+        # What stands still in its parent's space is the same between any keys.
+        moves = _moves(body.poses)
+        moves[0] |= not moves.any()
+        super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
+        self.body, self.moving = body, np.flatnonzero(moves)
+
+    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
+        everything = self.body.poses[:, samples]
+        everything.positions[self.moving], everything.quaternions[self.moving] = shown.positions, shown.quaternions
+        if everything.scales is not None:
+            everything.scales[self.moving] = shown.scales
+        return self.body.errors(everything, samples).max(axis=0) / self.tolerance[samples]
+
+
+class _OwnKeys:
+    """The search for keys that each joint has of its own.
+
+    First every joint on a chain gets its share of the tolerance, for the largest displacement that its own error gives
+    to anything that hangs on it: by the triangle inequality that is enough. Errors of joints seldom add up, though, so
+    then keys are taken out for as long as the error in the root's space allows it: of all joints of a depth at once,
+    since these do not move one another, with what hangs on them and what they hang on as it is shown by then.
+    """
+
+    def __init__(self, body: _Body, tolerance: float) -> None:
+        self.body, self.tolerance = body, tolerance
+        self.shown = Poses(
+            body.poses.positions.copy(),
+            body.poses.quaternions.copy(),
+            None if body.poses.scales is None else body.poses.scales.copy(),
+        )
+        self.keys = [np.array([key]) for key in body.middles]
+
+    def found(self) -> tuple[np.ndarray, ...]:
+        if len(self.body.times) <= 2:
+            return tuple(np.arange(len(self.body.times)) for _ in self.keys)
+        self._share_out()
+        for allowed in SWEEPS:
+            for joints in self.body.skeleton.levels:
+                self._take_out(joints, allowed)
+        self._prove()
+        return tuple(self.keys)
+
+    def _share_out(self) -> None:
+        """Keys of all joints, each within its share of the tolerance."""
+        body = self.body
+        moves, parents = _moves(body.poses), body.skeleton.parents
+        above, beneath = moves.astype(int), moves.astype(int)
+        for joints in body.skeleton.levels[1:]:
+            above[joints] += above[parents[joints]]
+        for joints in body.skeleton.levels[:0:-1]:
+            np.maximum.at(beneath, parents[joints], moves[parents[joints]] + beneath[joints])
+        weights = np.array([body.weights[below].max() for below in body.skeleton.below])
+        shares = self.tolerance / np.maximum(above + beneath - moves, 1)
+        sizes = body.sizes
+        if body.truth.scales is not None:
+            own = body.truth.scales
+            size = np.where((parents >= 0)[:, None], own[parents], 1.0)
+            sizes, shares = sizes / own, shares[:, None] / size
+        shares = np.broadcast_to(shares if np.ndim(shares) == 2 else shares[:, None], body.poses.shape)
+        still = Poses(
+            *(
+                None if rows is None else rows[np.arange(len(weights)), body.middles][:, None]
+                for rows in (body.poses.positions, body.poses.quaternions, body.poses.scales)
+            )
+        )
+        still = Poses(
+            *(
+                None if r is None else np.broadcast_to(r, w.shape)
+                for r, w in zip(
+                    (still.positions, still.quaternions, still.scales),
+                    (body.poses.positions, body.poses.quaternions, body.poses.scales),
+                    strict=True,
+                )
+            )
+        )
+        rests = np.all(shell_error(still, body.poses, sizes) * weights[:, None] <= shares, axis=1) | (weights == 0.0)
+        moving = np.flatnonzero(~rests)
+        for joint in np.flatnonzero(rests).tolist():
+            self._show(joint, self.keys[joint])
+        if not len(moving):
+            return
+        tolerances = shares[moving] / weights[moving, None]
+        tracks = _tracks(body.poses[moving])
+        recording = Recording(
+            np.tile(body.times, len(moving)),
+            tracks,
+            body.mode,
+            sizes[moving].ravel(),
+            tolerances.ravel(),
+            len(body.times) * np.arange(len(moving)),
+        )
+        search = Search(recording)
+        self._take(moving, search.thinned(search.measured(np.arange(tracks.shape[-1])), 1.0))
+
+    def _take(self, joints: np.ndarray, keys: Keys) -> None:
+        """Note and show the keys of joints that were tracks."""
+        count = len(self.body.times)
+        bounds = np.searchsorted(keys.indices, count * np.arange(len(joints) + 1))
+        for place, joint in enumerate(joints.tolist()):
+            self._show(joint, keys.indices[bounds[place] : bounds[place + 1]] - count * place)
+
+    def _show(self, joint: int, keys: np.ndarray) -> None:
+        self.keys[joint] = keys
+        shown = self.body.shown(joint, keys)
+        self.shown.positions[joint], self.shown.quaternions[joint] = shown.positions, shown.quaternions
+        if shown.scales is not None:
+            self.shown.scales[joint] = shown.scales
+
+    def _take_out(self, joints: np.ndarray, allowed: float) -> None:
+        """Take out keys of joints that do not hang on one another, as far as the error in the root's space allows it."""
+        joints = np.array([joint for joint in joints.tolist() if len(self.keys[joint]) > 1], dtype=np.int64)
+        if not len(joints):
+            return
+        level = _Level(self, joints)
+        count = len(self.body.times)
+        rests = level.rests(allowed)
+        for joint in joints[rests].tolist():
+            self._show(joint, np.array([self.body.middles[joint]]))
+        joints = joints[~rests]
+        if not len(joints):
+            return
+        level = _Level(self, joints)
+        search = Search(level)
+        keys = search.measured(np.concatenate([count * i + self.keys[j] for i, j in enumerate(joints.tolist())]))
+        keys = search.thinned(keys, allowed)
+        self._take(joints, keys if allowed < 1.0 else search.refined(keys))
+
+    def _prove(self) -> None:
+        """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
+        while True:
+            errors = self.body.errors(self.shown)
+            if errors.max() <= self.tolerance * (1.0 + 1e-9):
+                return
+            joint, sample = np.unravel_index(np.argmax(errors), errors.shape)
+            while joint >= 0:
+                more = np.union1d(self.keys[joint], [0, sample, len(self.body.times) - 1])
+                self._show(int(joint), more)
+                joint = self.body.skeleton.parents[joint]
+
+
+class _Level(Recording):
+    """Joints that do not hang on one another, as tracks: the error of a sample is the largest of what hangs on one."""
+
+    def __init__(self, keys: _OwnKeys, joints: np.ndarray) -> None:
+        self.body, self.joints = keys.body, joints
+        times, below = self.body.times, self.body.skeleton.below
+        poses = _tracks(self.body.poses[joints])
+        starts = len(times) * np.arange(len(joints))
+        super().__init__(np.tile(times, len(joints)), poses, self.body.mode, 0.0, keys.tolerance, starts)
+        weighty = [below[joint][self.body.weights[below[joint]] > 0.0] for joint in joints.tolist()]
+        self.counts = np.array([len(hanging) for hanging in weighty])
+        self.hanging = np.concatenate(weighty)
+        self.first = np.cumsum(self.counts) - self.counts
+        there = self.body.skeleton.in_root_space(keys.shown)
+        above = self.body.skeleton.parents[joints]
+        on_roots = above < 0
+        parents = there[np.where(on_roots, 0, above)]
+        parents.positions[on_roots], parents.quaternions[on_roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
+        if parents.scales is not None:
+            parents.scales[on_roots] = 1.0
+        self.parents, self.back, self.there, self.wanted = (
+            PackedPoses(_tracks(poses)) for poses in (parents, inverse(there[joints]), there, self.body.truth)
+        )
+
+    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
+        count = len(self.body.times)
+        track, moment = np.divmod(samples, count)
+        # What moves a joint from where it is to where it would be moves all that hangs on it.
+        moved_by = PackedPoses(placed(placed(self.parents[samples], shown), self.back[samples]))
+        counts = self.counts[track]
+        first = np.cumsum(counts) - counts
+        pair = np.repeat(np.arange(len(samples)), counts)
+        joint = self.hanging[(self.first[track] - first)[pair] + np.arange(len(pair))]
+        there = count * joint + moment[pair]
+        moved = placed(moved_by[pair], self.there[there])
+        errors = shell_error(moved, self.wanted[there], self.body.radii[joint]) * self.body.weights[joint]
+        found = np.zeros(len(samples))
+        some = counts > 0
+        found[some] = np.maximum.reduceat(errors, first[some]) if len(errors) else 0.0
+        return found / self.tolerance[samples]
+
+    def rests(self, allowed: float) -> np.ndarray:
+        """Which of the joints need not move, shape (joints,)."""
+        count = len(self.body.times)
+        every = np.arange(len(self.joints) * count)
+        middles = (count * np.arange(len(self.joints)) + self.body.middles[self.joints]).repeat(count)
+        errors = self.errors(every, self.poses[middles])
+        return errors.reshape(-1, count).max(axis=1) <= allowed
+
+
+def _tracks(poses: Poses) -> Poses:
+    """Poses (joints, n) one joint behind the other, (joints * n,)."""
+    return Poses(
+        poses.positions.reshape(-1, 3),
+        poses.quaternions.reshape(-1, 4),
+        None if poses.scales is None else poses.scales.ravel(),
+    )
+
+
+def _moves(poses: Poses) -> np.ndarray:
+    """Which joints (joints, n) ever change in their parents' space, shape (joints,)."""
+    changes = (np.ptp(poses.positions, axis=1) > 0.0).any(axis=1) | (np.ptp(poses.quaternions, axis=1) > 0.0).any(
+        axis=1
+    )
+    return changes if poses.scales is None else changes | (np.ptp(poses.scales, axis=1) > 0.0)
+
+
+def _one_for_each(numbers: ArrayLike | None, count: int, name: str) -> np.ndarray:
+    """A number for each joint, finite and not below zero."""
+    numbers = np.asarray(1.0 if numbers is None else numbers, dtype=np.float64)
+    if numbers.shape not in ((), (count,)):
+        raise ValueError(f"{name}: {numbers.size} numbers do not fit {count} joints; give one, or one for each")
+    numbers = np.broadcast_to(numbers, (count,))
+    if not (valid := np.isfinite(numbers) & (numbers >= 0.0)).all():
+        raise ValueError(f"joint {int(np.argmin(valid))} has a {name} of {numbers[np.argmin(valid)]}")
+    return numbers

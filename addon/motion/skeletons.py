@@ -1,0 +1,79 @@
+"""Skeletons: joints in their parents' space, and where that puts them.
+
+Arrays of a skeleton have the joints first: poses of shape (joints, n). `parents` has the number of each joint's parent,
+-1 for roots, in any order. The root's space is the one that the poses of roots are given in.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .poses import Poses, placed
+
+
+class Skeleton:
+    """Who hangs on whom.
+
+    Parameters
+    ----------
+    parents : array-like of int, shape (joints,)
+
+    Raises
+    ------
+    ValueError
+        Where a parent is no joint, or joints hang on one another in a circle. The message names the joint.
+    """
+
+    def __init__(self, parents: ArrayLike) -> None:
+        parents = np.asarray(parents)
+        if parents.ndim != 1 or not (len(parents) and np.issubdtype(parents.dtype, np.integer)):
+            raise ValueError("parents need to be whole numbers, one for each joint")
+        wrong = (parents < -1) | (parents >= len(parents))
+        if wrong.any():
+            joint = int(np.argmax(wrong))
+            raise ValueError(f"joint {joint} has the parent {parents[joint]}: there are joints 0 to {len(parents) - 1}")
+        self.parents = parents.astype(np.int64)
+        self.depths = self._depths()
+        """How many joints each hangs on, shape (joints,)."""
+
+    def __len__(self) -> int:
+        return len(self.parents)
+
+    def _depths(self) -> np.ndarray:
+        depths, above = np.zeros(len(self.parents), dtype=np.int64), self.parents
+        for _ in range(len(self.parents)):
+            if np.all(above < 0):
+                return depths
+            depths += above >= 0
+            above = np.where(above >= 0, self.parents[above], -1)
+        raise ValueError(f"joint {int(np.argmax(above >= 0))} hangs on itself, through its parents")
+
+    @cached_property
+    def levels(self) -> list[np.ndarray]:
+        """The joints of each depth, from the roots on. No two of a level hang on one another."""
+        return [np.flatnonzero(self.depths == depth) for depth in range(self.depths.max() + 1)]
+
+    @cached_property
+    def below(self) -> list[np.ndarray]:
+        """Of each joint, itself and all that hang on it, rising."""
+        hangs = np.eye(len(self), dtype=bool)
+        for joints in self.levels[:0:-1]:
+            for joint in joints.tolist():
+                hangs[self.parents[joint]] |= hangs[joint]
+        return [np.flatnonzero(row) for row in hangs]
+
+    def in_root_space(self, poses: Poses) -> Poses:
+        """Where joints are that have these poses (joints, ...) in their parents' space."""
+        positions, quaternions = poses.positions.copy(), poses.quaternions.copy()
+        scales = None if poses.scales is None else poses.scales.copy()
+        for joints in self.levels[1:]:
+            above = self.parents[joints]
+            parents = Poses(positions[above], quaternions[above], None if scales is None else scales[above])
+            there = placed(parents, poses[joints])
+            positions[joints], quaternions[joints] = there.positions, there.quaternions
+            if scales is not None:
+                scales[joints] = there.scales
+        return Poses(positions, quaternions, scales)
