@@ -74,12 +74,13 @@ def motor_lerp(segments: Segments) -> Curves:
 def motor_spline(segments: Segments) -> Curves:
     """A screw from key to key, bent so that its twist goes on through every key.
 
-    A key has the twist of the parabola through it and its neighbours, the outermost ones that of their segment, and
-    none where the body rests before or after.
+    A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their
+    segment, and none has any where the body rests before or after.
     """
 
     def at_keys(twists, before, after, rests):
-        inner = (after * twists[..., :-1] + before * twists[..., 1:]) / (before + after)
+        share = _shares(before, after)
+        inner = share * twists[..., :-1] + (1.0 - share) * twists[..., 1:]
         inner[:, rests[:, :-1] | rests[:, 1:]] = 0.0
         return np.concatenate((twists[..., :1], inner, twists[..., -1:]), axis=-1)
 
@@ -89,16 +90,32 @@ def motor_spline(segments: Segments) -> Curves:
 def motor_spline_causal(segments: Segments) -> Curves:
     """The same for streams, from no key after the segment.
 
-    A key has the twist of the screw that led to it, and half of what the parabola through it and the two keys before it
-    would add to that: all of it overshoots. A rest is kept, although nothing told of it when the body arrived there.
+    A key has the twist of the screw that led to it, and half of what the same share of the screw before would add to
+    that: all of it overshoots. A rest is kept, although nothing told of it when the body arrived there.
     """
 
     def at_keys(twists, before, after, rests):
-        inner = twists[..., 1:] + 0.5 * after / (before + after) * (twists[..., 1:] - twists[..., :-1])
+        share = np.minimum(after / (before + after), before / after)
+        inner = twists[..., 1:] + 0.5 * share * (twists[..., 1:] - twists[..., :-1])
         inner[:, rests[:, 1:]] = 0.0
         return np.concatenate((twists[..., :1], twists[..., :1], inner), axis=-1)
 
     return _bent(segments, at_keys)
+
+
+def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """What the twist before a key counts for that of the key; the twist after it counts for the rest.
+
+    The parabola through the key and its neighbours would have
+
+        h1 / (h0 + h1)
+
+    for segments of durations h0 and h1: nearly all for the shorter one, whose twist, kept up for as long as the longer
+    one takes, leads any distance away. So the shorter one's share is at most short / long: neither segment, in its own
+    time, is then given more than |r0| + |r1| of the two screws, wherever on the body that is measured. Durations alone
+    decide, for a screw has no length that is the same for all choices of the body's origin.
+    """
+    return np.clip(after / (before + after), 1.0 - after / before, before / after)
 
 
 def _bent(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:

@@ -100,8 +100,10 @@ def best_of(obj: bpy.types.Object, mode: str = "motor_spline", tolerance: float 
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
-@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
-@pytest.mark.parametrize("name", ["pivot", "throw"])
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [("reach", "motor_spline"), ("throw", "motor_spline"), ("pivot", "lerp_slerp"), ("throw", "lerp_slerp")],
+)
 def test_the_best_mode_of_each_segment_is_keyed_and_blender_shows_it(live_file, name, mode, rotation_mode):
     obj = recorded(name, rotation_mode)
     frames = key_frames(obj)

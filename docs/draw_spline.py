@@ -1,0 +1,110 @@
+"""Draw what the bound on the twists at keys does: the same keys at uneven times, without it and with it.
+
+python docs/draw_spline.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+DOCS = Path(__file__).resolve().parent
+sys.path.insert(0, str(DOCS.parent))
+
+from addon.motion import Poses, curves, interpolate
+from scripts.comparison.markup import Markup, element
+from scripts.files import write_text
+
+FRAMES = np.array((1.0, 13.0, 14.0, 26.0, 38.0))
+POINTS = np.array(((0.0, 0.0), (0.25, 0.16), (0.5, 0.2), (0.75, 0.16), (1.0, 0.0)))
+DEGREES = 25.0 - 12.5 * np.arange(5)
+
+WIDTH, HEIGHT = 720, 320
+SCALE = 400.0
+"""Pixels to a metre."""
+
+LEFT, BASE = 160.0, 230.0
+"""Where the first key stands, in pixels."""
+
+HALF = 0.045
+"""Of the bar that stands for the body, in metres."""
+
+STYLE = """
+.paper{fill:#fff}.ink{fill:#1b2026}.key{stroke:#1b2026;stroke-width:3}
+.before{stroke:#c8322b;fill:none}.after{stroke:#1f6fb2;fill:none}.path{stroke-width:2.5}.body{stroke-width:1;opacity:.6}
+.before-words{fill:#c8322b}.after-words{fill:#1f6fb2}
+text{font:14px system-ui,"Segoe UI",Roboto,"Liberation Sans",sans-serif}
+.halo{paint-order:stroke;stroke:#fff;stroke-width:4}
+@media(prefers-color-scheme:dark){.paper{fill:#14181d}.ink{fill:#e6eaee}.key{stroke:#e6eaee}.halo{stroke:#14181d}
+.before{stroke:#ff7a70}.after{stroke:#62b0f0}.before-words{fill:#ff7a70}.after-words{fill:#62b0f0}}
+"""
+
+
+def keys() -> Poses:
+    """An arch, walked at a steady pace but for the step from the second key to the third, which takes one frame."""
+    half = 0.5 * np.radians(DEGREES)
+    turned = np.stack((np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)), axis=1)
+    return Poses(np.column_stack((POINTS, np.zeros(len(POINTS)))), turned)
+
+
+def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The share of the twist before a key without a bound."""
+    return after / (before + after)
+
+
+def main() -> None:
+    """Write docs/spline.svg."""
+    with mock.patch.object(curves, "_shares", parabola):
+        before = motion("before")
+    parts = [before, motion("after"), [_key(frame, pose) for frame, pose in zip(FRAMES, _bars(keys()), strict=True)]]
+    picture = element(
+        "svg",
+        element("title", "The same keys with the parabola's twists, which loop out, and with bounded ones"),
+        element("style", Markup(STYLE)),
+        element("rect", width=WIDTH, height=HEIGHT, class_="paper"),
+        parts,
+        element("text", "before: the twists of the parabola through three keys", x=20, y=28, class_="before-words"),
+        element("text", "now: the short segment counts no more than short / long", x=20, y=50, class_="after-words"),
+        element("text", "keys at frames 1, 13, 14, 26 and 38; a bar a frame", x=20, y=HEIGHT - 16, class_="ink"),
+        xmlns="http://www.w3.org/2000/svg",
+        viewBox=f"0 0 {WIDTH} {HEIGHT}",
+        width=WIDTH,
+        height=HEIGHT,
+        role="img",
+    )
+    write_text(DOCS / "spline.svg", picture + "\n")
+
+
+def motion(name: str) -> list[Markup]:
+    """The path of the body's middle, and the body on every frame."""
+    fine = interpolate(FRAMES, keys(), np.linspace(FRAMES[0], FRAMES[-1], 600), "motor_spline")
+    frames = interpolate(FRAMES, keys(), np.arange(FRAMES[0], FRAMES[-1] + 1.0), "motor_spline")
+    bars = "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in _bars(frames))
+    path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in _on_paper(fine.positions))
+    return [element("path", d=bars, class_=f"{name} body"), element("path", d=path, class_=f"{name} path")]
+
+
+def _key(frame: float, bar: np.ndarray) -> list[Markup]:
+    (x0, y0), (x1, y1) = bar.round(1).tolist()
+    return [
+        element("path", d=f"M{x0} {y0}L{x1} {y1}", class_="key"),
+        element("text", f"{frame:.0f}", x=x0, y=y0 + 18, class_="ink halo", text_anchor="middle"),
+    ]
+
+
+def _bars(poses: Poses) -> np.ndarray:
+    """Both ends of the bar, along the body's y axis, shape (n, 2, 2)."""
+    angles = 2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0])
+    along = HALF * np.stack((-np.sin(angles), np.cos(angles)), axis=1)
+    return np.stack([_on_paper(poses.positions[:, :2] + sign * along) for sign in (-1.0, 1.0)], axis=1)
+
+
+def _on_paper(points: np.ndarray) -> np.ndarray:
+    return np.stack((LEFT + SCALE * points[:, 0], BASE - SCALE * points[:, 1]), axis=1)
+
+
+if __name__ == "__main__":
+    main()
