@@ -36,6 +36,9 @@ QUICK, SMOOTH = "OFF", "8"
 """How edges are smoothed in 3D Views while the hand works, and in what an eye sees, as Blender comes: it draws a view
 as often, which without a graphics card is two thirds of the time."""
 
+PATIENCE = 30.0
+"""Seconds that something may take to become true, where other windows and tests keep the processors busy as well."""
+
 PIE_RADIUS = 150
 """Pixels from the middle of a pie menu to one of its items."""
 
@@ -240,7 +243,7 @@ class Hand:
 
     # What an eye does
 
-    def wait_until(self, condition: Callable[[], object], what: str, seconds: float = 10.0) -> Steps[None]:
+    def wait_until(self, condition: Callable[[], object], what: str, seconds: float = PATIENCE) -> Steps[None]:
         """Wait for something to become true; an AssertionError that says what where it does not in that time."""
         end = time.monotonic() + seconds
         while not condition():
