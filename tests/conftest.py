@@ -16,6 +16,7 @@ import pytest
 from scripts.build_extension import build
 from scripts.workplan.processes import processors
 from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
+from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.rigs import human as rigify
 
@@ -125,8 +126,7 @@ def pytest_runtest_makereport(item: pytest.Item):
 @pytest.fixture
 def empty_file() -> bpy.types.Context:
     """A new file without objects, at factory settings."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    return bpy.context
+    return blank()
 
 
 @pytest.fixture

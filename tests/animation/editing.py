@@ -28,6 +28,7 @@ from tests.animation.oracle import (
     transform_paths,
 )
 from tests.animation.scenes import random_values
+from tests.blank import blank
 
 Name = Hashable
 """What the carriers of keys are told apart by, in a machine."""
@@ -89,7 +90,7 @@ class Editing(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        blank()
         bpy.utils.register_class(Edit)
         animation.register()
         self.on = True

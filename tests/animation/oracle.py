@@ -42,20 +42,27 @@ class Own:
 
 def curves_of(carrier: Carrier) -> dict[tuple[str, int], bpy.types.FCurve]:
     """The F-curves of an object's slot, or those of a pose bone in it. Data paths are from object or bone on."""
+    channelbag, prefix = _channelbag(carrier), _prefix(carrier)
+    curves = () if channelbag is None else ((curve.data_path, curve) for curve in channelbag.fcurves)
+    return {(path.removeprefix(prefix), c.array_index): c for path, c in curves if path.startswith(prefix)}
+
+
+def curve_of(carrier: Carrier, path: str, index: int = 0) -> bpy.types.FCurve | None:
+    """One of them, which Blender finds much sooner than all."""
+    channelbag = _channelbag(carrier)
+    return None if channelbag is None else channelbag.fcurves.find(f"{_prefix(carrier)}{path}", index=index)
+
+
+def _channelbag(carrier: Carrier) -> bpy.types.ActionChannelbag | None:
     data = carrier.id_data.animation_data
     if data is None or data.action is None or data.action_slot is None:
-        return {}
-    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
-    if channelbag is None:
-        return {}
-    if isinstance(carrier, bpy.types.Object):
-        return {(c.data_path, c.array_index): c for c in channelbag.fcurves}
-    prefix = f"{carrier.path_from_id()}."
-    return {
-        (c.data_path.removeprefix(prefix), c.array_index): c
-        for c in channelbag.fcurves
-        if c.data_path.startswith(prefix)
-    }
+        return None
+    return action_get_channelbag_for_slot(data.action, data.action_slot)
+
+
+def _prefix(carrier: Carrier) -> str:
+    """What the data paths of a pose bone begin with."""
+    return "" if isinstance(carrier, bpy.types.Object) else f"{carrier.path_from_id()}."
 
 
 def rotation_path(obj: Carrier) -> str:
@@ -85,22 +92,14 @@ def snapshot(obj: Carrier) -> dict[tuple[str, int], tuple]:
 
 def key_frames(obj: Carrier) -> np.ndarray:
     """Where any transform channel has a key; keys less than a hundredth of a frame apart are one."""
-    curves = curves_of(obj)
-    frames = sorted(
-        {
-            key.co[0]
-            for path in transform_paths(obj)
-            for index in range(WIDTHS[path])
-            if (path, index) in curves and not curves[path, index].mute
-            for key in curves[path, index].keyframe_points
-        }
-    )
+    curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
+    frames = sorted({key.co[0] for curve in curves if curve and not curve.mute for key in curve.keyframe_points})
     return np.array([frame for i, frame in enumerate(frames) if i == 0 or frame - frames[i - 1] > 0.01])
 
 
 def mode_at(obj: Carrier, frame: float) -> str:
     """The mode of the segment that begins on this frame."""
-    fcurve = curves_of(obj).get(("rigid_motion.mode", 0))
+    fcurve = curve_of(obj, "rigid_motion.mode")
     if fcurve is None or fcurve.mute or not len(fcurve.keyframe_points):
         return obj.rigid_motion.mode
     return MODE_IDS[round(fcurve.evaluate(frame + 0.002))]
@@ -210,7 +209,7 @@ def _codes(obj: Carrier, frame: float) -> set[str]:
     found = set()
     for path in transform_paths(obj):
         for index in range(WIDTHS[path]):
-            fcurve = curves_of(obj).get((path, index))
+            fcurve = curve_of(obj, path, index)
             if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
                 points = fcurve.keyframe_points
                 earlier = [point for point in points if point.co[0] < frame + 0.005]
@@ -232,11 +231,10 @@ def expected_worlds(
 def progress(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
     """How far the channels have come between two keys: the share of the chord that they make up together."""
     done, whole = np.zeros(len(frames)), 0.0
-    curves = curves_of(obj)
     for path in transform_paths(obj):
         weight = 4.0 if path == "rotation_quaternion" else 1.0
         for index in range(WIDTHS[path]):
-            fcurve = curves.get((path, index))
+            fcurve = curve_of(obj, path, index)
             if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
                 begin, end, *values = _timing(fcurve, [first, last, *frames])
                 done += weight * (end - begin) * (np.array(values) - begin)
@@ -307,7 +305,7 @@ def shortest_quaternion(obj: Carrier, frames: Sequence[float]) -> np.ndarray:
 
 def _native(obj: Carrier, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Location, unit quaternion and scale from the object's channels alone."""
-    turned = _channels(obj, rotation_path(obj), frames)
+    location, turned, scale = (_channels(obj, path, frames) for path in transform_paths(obj))
     if obj.rotation_mode == "QUATERNION":
         lengths = np.linalg.norm(turned, axis=1)
         # Blender's own way with a quaternion that has no length.
@@ -315,7 +313,7 @@ def _native(obj: Carrier, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
         turned /= np.where(lengths == 0.0, 1.0, lengths)[:, None]
     else:
         turned = _from_eulers(turned, obj.rotation_mode)
-    return _channels(obj, "location", frames), turned, _channels(obj, "scale", frames)
+    return location, turned, scale
 
 
 def _from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
@@ -330,10 +328,9 @@ def _from_eulers(angles: np.ndarray, order: str) -> np.ndarray:
 
 
 def _channels(obj: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
-    curves = curves_of(obj)
     values = np.empty((len(frames), WIDTHS[path]))
     for index, rest in enumerate(getattr(obj, path)):
-        fcurve = curves.get((path, index))
+        fcurve = curve_of(obj, path, index)
         keyed = fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute
         values[:, index] = [fcurve.evaluate(frame) for frame in frames] if keyed else rest
     return values
@@ -373,8 +370,8 @@ def _elastic(key: bpy.types.Keyframe, end: float, frames: Sequence[float]) -> li
 
 def _scales_evenly(obj: Carrier, keys: np.ndarray) -> bool:
     """Whether scale is animated, and on every key the same along all axes and positive."""
-    curves = curves_of(obj)
-    if len(keys) < 2 or not any(len(c.keyframe_points) for (path, _), c in curves.items() if path == "scale"):
+    curves = [curve_of(obj, "scale", axis) for axis in range(3)]
+    if len(keys) < 2 or not any(curve and len(curve.keyframe_points) for curve in curves):
         return False
     scales = _channels(obj, "scale", keys)
     return bool(np.allclose(scales, scales[:, :1]) and np.all(scales > 0.0) and np.ptp(scales[:, 0]) > 0.0)

@@ -20,6 +20,7 @@ from addon import animation
 from addon.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
 from tests.animation.oracle import WIDTHS, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, key, new_object
+from tests.blank import blank
 
 SEEN = range(-2, 46)
 
@@ -48,7 +49,7 @@ def following(live_file: bpy.types.Context) -> Iterator[None]:
 def make(damage: Damage, mode: str = "dq_sclerp", name: str = "Broken") -> None:
     """A new file with an object that gets damaged, and one that does not."""
     animation.set_enabled(True)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    blank()
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 40
     broken, whole = key(new_object(name), seed=1, scale="even"), key(new_object("Whole"), seed=2)
     set_mode(broken, mode)

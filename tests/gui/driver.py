@@ -32,6 +32,13 @@ TURNS = 4
 PAUSE = 0.1
 """Seconds between two steps: a button that is pressed flashes for a moment before it does what it is for."""
 
+QUICK, SMOOTH = "OFF", "8"
+"""How edges are smoothed in 3D Views while the hand works, and in what an eye sees, as Blender comes: it draws a view
+as often, which without a graphics card is two thirds of the time."""
+
+PATIENCE = 30.0
+"""Seconds that something may take to become true, where other windows and tests keep the processors busy as well."""
+
 PIE_RADIUS = 150
 """Pixels from the middle of a pie menu to one of its items."""
 
@@ -236,7 +243,7 @@ class Hand:
 
     # What an eye does
 
-    def wait_until(self, condition: Callable[[], object], what: str, seconds: float = 10.0) -> Steps[None]:
+    def wait_until(self, condition: Callable[[], object], what: str, seconds: float = PATIENCE) -> Steps[None]:
         """Wait for something to become true; an AssertionError that says what where it does not in that time."""
         end = time.monotonic() + seconds
         while not condition():
@@ -244,12 +251,16 @@ class Hand:
             yield
 
     def look(self) -> Steps[np.ndarray]:
-        """What is on the screen, drawn anew: pixels as in `tests.gui.pictures`."""
+        """What is on the screen, drawn anew and with smooth edges: pixels as in `tests.gui.pictures`."""
+        system = bpy.context.preferences.system
+        system.viewport_aa = SMOOTH
         for area in self.window.screen.areas:
             area.tag_redraw()
         yield 0.5  # the screen is the affair of another process, which may be behind
         screen = os.environ.get("BLENDER_GUI_SCREEN")
-        return read_screen(Path(screen).read_bytes()) if screen else self._screenshot()
+        pixels = read_screen(Path(screen).read_bytes()) if screen else self._screenshot()
+        system.viewport_aa = QUICK
+        return pixels
 
     def picture(self, name: str, box: Box | None = None) -> Steps[np.ndarray]:
         """Keep what is on the screen, or the part of it in a box, as NAME.png; and have its pixels."""

@@ -18,7 +18,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from tests.gui.driver import Hand, run
+from tests.gui.driver import QUICK, Hand, run
 
 SECONDS = 180.0
 """What one scenario may take, in a Blender that draws without a graphics card."""
@@ -43,8 +43,9 @@ def main(name: str, package: str, pictures: str, result: str) -> None:
 
 
 def _settle(temporary: Path) -> None:
-    """Let nothing pop up, move by itself, or be written outside the folder of this run."""
+    """Let nothing pop up, move by itself, be drawn for longer than it takes to work with, or be written elsewhere."""
     preferences = bpy.context.preferences
+    preferences.system.viewport_aa = QUICK
     preferences.view.show_splash = False
     preferences.view.smooth_view = 0
     preferences.view.use_save_prompt = False

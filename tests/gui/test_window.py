@@ -32,15 +32,21 @@ def blender() -> str:
     return str(Path(found).absolute())
 
 
+@pytest.fixture(scope="module")
+def shaders(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where Mesa keeps shaders that were compiled, which without a graphics card takes ten seconds of each Blender."""
+    return tmp_path_factory.mktemp("shaders")
+
+
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_scenario(scenario, blender, extension_zip, tmp_path):
+def test_scenario(scenario, blender, extension_zip, shaders, tmp_path):
     pictures = ROOT / "renders" / "gui" / scenario
     shutil.rmtree(pictures, ignore_errors=True)
     pictures.mkdir(parents=True)
     result = tmp_path / "result.json"
     options = ["--factory-startup", "--enable-event-simulate", "-noaudio", "--python"]
     inside = [ROOT / "tests" / "gui" / "inside.py", "--", scenario, extension_zip, pictures, result]
-    said = run([blender, *options, *inside], tmp_path / "user")
+    said = run([blender, *options, *inside], tmp_path / "user", shaders)
     last_words = said[-4000:]
     assert result.exists(), f"Blender ended before the scenario did:\n{last_words}"
     failure = json.loads(result.read_text(encoding="utf-8"))["failure"]
@@ -48,10 +54,11 @@ def test_scenario(scenario, blender, extension_zip, tmp_path):
     assert "Traceback" not in said, f"an error that no one but the console heard of:\n{last_words}"
 
 
-def run(command: list[str | Path], user: Path) -> str:
+def run(command: list[str | Path], user: Path, shaders: Path) -> str:
     """What a program says on both its channels; it and what it started are ended when its time is up."""
     user.mkdir()
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(user), "PYTHONDONTWRITEBYTECODE": "1"}
+    folders = {"BLENDER_USER_RESOURCES": str(user), "MESA_SHADER_CACHE_DIR": str(shaders)}
+    environment = os.environ | folders | {"PYTHONDONTWRITEBYTECODE": "1"}
     with subprocess.Popen(
         command,
         stdout=subprocess.PIPE,

@@ -14,6 +14,7 @@ from addon.animation import set_mode
 from scripts import bake
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import key, new_object
+from tests.blank import blank
 
 LAST = 103
 """The last frame of the scenes: after the last key and the last strip."""
@@ -40,7 +41,7 @@ def extension() -> Iterator[None]:
 
 
 def new_file() -> None:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    blank()
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, LAST
 
 

@@ -68,8 +68,8 @@ def pairs(order: str, scale: str | None, setting: str) -> bpy.types.Object:
     for pose_bone in rig.pose.bones:
         key_bone(pose_bone, scale=scale, location="use_connect" not in SETTINGS[setting] or pose_bone.parent is None)
     for place, mode in enumerate(MODES):
-        set_mode(rig.pose.bones[mode], mode)
-        set_mode(rig.pose.bones[f"{mode} parent"], MODES[place - 3])
+        other = f"{MODES[(place + 3) % len(MODES)]} parent"
+        set_mode([rig.pose.bones[mode], rig.pose.bones[other]], mode)
     return rig
 
 

@@ -43,24 +43,26 @@ def refusal() -> Callable[[str], tuple[int | None, str]]:
 def scene() -> Iterator[object]:
     """An empty scene to fill, and nothing of it left afterwards."""
     bpy = pytest.importorskip("bpy")
+    from tests.blank import blank
     from tests.scripts.trajectories.blends import FPS
 
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    blank()
     bpy.context.scene.render.fps = FPS
     bpy.context.scene.frame_end = 30
     yield bpy.context.scene
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    blank()
 
 
 @pytest.fixture
 def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
     """Save the scene, leave it, and return the path."""
     bpy = pytest.importorskip("bpy")
+    from tests.blank import blank
 
     def _saved(name: str = "scene.blend") -> str:
         path = str(tmp_path / name)
         bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        blank()
         return path
 
     return _saved
