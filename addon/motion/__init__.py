@@ -11,6 +11,8 @@ from .modes import KEYFRAME_MODES, MODES, Mode, in_betweens, interpolate, prepar
 from .poses import Poses
 from .reduction import reduce_keys
 from .repair import Repair, repair
+from .skeleton_reduction import reduce_skeleton_keys
+from .skeletons import Skeleton
 
 __all__ = [
     "KEYFRAME_MODES",
@@ -19,6 +21,7 @@ __all__ = [
     "Mode",
     "Poses",
     "Repair",
+    "Skeleton",
     "best_modes",
     "decimate",
     "fit_keys",
@@ -28,6 +31,7 @@ __all__ = [
     "measure",
     "prepare",
     "reduce_keys",
+    "reduce_skeleton_keys",
     "repair",
     "rms",
     "shell_error",

@@ -64,14 +64,11 @@ def _pairs(search: Search, candidates: np.ndarray, found: list[np.ndarray]) -> n
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in found]
     first, gap = np.arange(last), 1
     while len(first):
-        windows = first[:, None] + gap * np.arange(-search.reach, 2 + search.reach)
-        inside = (windows >= 0) & (windows <= last)
         # A segment at the end has no neighbour there; all others have one, if not as far away.
-        near = np.clip(windows, 0, last)
-        ends = (first == 0, first + gap == last)
-        for side, at_end in zip((slice(None, search.reach), slice(2 + search.reach, None)), ends, strict=True):
-            inside[:, side] = ~at_end[:, None]
-        _, peak = search.evaluate(np.where(inside, candidates[near], -1), slice(search.reach, search.reach + 1))
+        windows = candidates[np.clip(first[:, None] + gap * np.arange(-search.reach, 2 + search.reach), 0, last)]
+        windows[first == 0, : search.reach] = -1
+        windows[first + gap == last, 2 + search.reach :] = -1
+        _, peak = search.evaluate(windows, slice(search.reach, search.reach + 1))
         good = first[peak[:, 0] <= (1.0 if search.reach == 0 else ALIVE)]
         pairs.append(np.stack((good, good + gap), axis=1))
         first, gap = first[peak[:, 0] <= ALIVE**2], gap + 1

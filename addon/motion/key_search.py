@@ -13,8 +13,8 @@ and surfaces", 1987.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,10 +26,10 @@ from .poses import PackedPoses, Poses, beyond
 from .segments import prepare_within
 
 PEAK = 8
-"""The power of errors whose sum stands for the largest of them."""
+"""The power of errors whose sum stands for the largest of them: one of two."""
 
-STEPS = np.array((1, -1, 2, -2, 4, -4, 8, -8))
-"""By how many samples keys are moved, on trial."""
+STEPS = {PEAK: np.array((1, -1, 3, -3)), 2: np.array((1, -1, 2, -2, 4, -4, 8, -8))}
+"""By how many samples keys are moved, on trial, for the largest error and for its mean square."""
 
 ROUNDS = 12
 """Of moving keys and taking out more of them, at most."""
@@ -282,18 +282,18 @@ class Search:
 
     def moved(self, keys: Keys, tolerance: float) -> Keys:
         """As many keys, moved along the recording as long as that lowers the cost by much."""
-        reach = self.reach
+        reach, steps = self.reach, STEPS[self.power]
         columns, of_segments = np.arange(-1 - 2 * reach, 2 + 2 * reach), np.arange(-1 - reach, 1 + reach)
         for _ in range(MOVES):
             inner = keys.inner
             inner = inner[keys.stale[inner]]
-            trials = keys.indices[inner, None] + STEPS
+            trials = keys.indices[inner, None] + steps
             possible = (trials > keys.indices[inner - 1, None]) & (trials < keys.indices[inner + 1, None])
-            rows, steps = np.nonzero(possible)
+            rows, ways = np.nonzero(possible)
             if not len(rows):
                 break
             windows = keys.windows(inner[rows], columns)
-            windows[:, 1 + 2 * reach] += STEPS[steps]
+            windows[:, 1 + 2 * reach] += steps[ways]
             cost, peak = self.evaluate(windows, slice(reach, 2 + 3 * reach))
             rise = cost.sum(axis=1) - self._cost_around(keys, inner[rows])
             if self.power != 2:
@@ -312,7 +312,7 @@ class Search:
             segments, inside = keys.around(picked, of_segments)
             keys.cost[segments[inside]], keys.peak[segments[inside]] = cost[chosen][inside], peak[chosen][inside]
             keys.indices = keys.indices.copy()
-            keys.indices[picked] += STEPS[steps[chosen]]
+            keys.indices[picked] += steps[ways[chosen]]
             near, inside = keys.around(picked, NEAR)
             keys.stale[near[inside]] = True
         return keys
@@ -330,10 +330,16 @@ class Search:
             _, errors, filled = self._errors(batch, segments.start, counts)
             if len(filled):
                 begins = (np.cumsum(counts.ravel()) - counts.ravel())[filled]
-                cost[done + filled] = np.add.reduceat(errors**self.power, begins)
+                cost[done + filled] = np.add.reduceat(self._power(errors), begins)
                 peak[done + filled] = np.maximum.reduceat(errors, begins)
             done += counts.size
         return cost.reshape(len(windows), -1), peak.reshape(len(windows), -1)
+
+    def _power(self, errors: np.ndarray) -> np.ndarray:
+        """By squaring, which is quicker than a power."""
+        for _ in range(self.power.bit_length() - 1):
+            errors = errors * errors
+        return errors
 
     def _batches(self, windows: np.ndarray, segments: slice) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Windows, a batch at a time, and how many samples there are in these of their segments, (c, s)."""
@@ -358,7 +364,7 @@ class Search:
         recording = self.recording
         first = np.cumsum(flat_counts) - flat_counts
         samples = (windows[nonempty, :-1].ravel() + 1 - first)[segment] + np.arange(len(segment))
-        key_times, keys = _with_ends(recording.times, recording.poses, windows[nonempty])
+        key_times, keys = _with_ends(recording.times, recording.poses, windows[nonempty], self.reach)
         starts, rates = key_times[:, :-1].ravel(), 1.0 / np.diff(key_times).ravel()
         progress = (recording.times[samples] - starts[segment]) * rates[segment]
         together = math.prod(keys.shape[:-2])
@@ -396,24 +402,31 @@ def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     return found[np.argsort(ranks[found])]
 
 
-def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray) -> tuple[np.ndarray, Poses]:
-    """Times (c, m) and poses (..., c, m) of these samples; where there are none, the outermost segment's motion goes on."""
-    outside = windows < 0
-    key_times, keys = times[windows], poses[..., windows]
-    rows = np.flatnonzero(outside.any(axis=1))
+def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
+    """Times (c, m) and poses (..., c, m) of samples; where there are none, the motion of the outermost segment goes on.
+
+    It does for as many keys as have a say, and rests beyond.
+    """
+    rows = np.flatnonzero((windows < 0).any(axis=1))
     if not len(rows):
-        return key_times, keys
-    outside = outside[rows]
-    last = windows.shape[1] - 1
-    columns = [(column, 1) for column in range(last - 2, -1, -1)] + [(column, -1) for column in range(2, last + 1)]
-    for column, inwards in columns:
-        # Outside on this side, where the key next to it is one or has been made one.
-        side = slice(None, column + 1) if inwards > 0 else slice(column, None)
-        here = rows[outside[:, side].all(axis=1)]
-        if len(here):
-            end, before = column + inwards, column + 2 * inwards
-            key_times[here, column] = 2.0 * key_times[here, end] - key_times[here, before]
-            made = beyond(keys[..., here, end], keys[..., here, before])
+        return times[windows], poses[..., windows]
+    inside, columns = windows[rows] >= 0, np.arange(windows.shape[1])
+    first = np.argmax(inside, axis=1)
+    last = windows.shape[1] - 1 - np.argmax(inside[:, ::-1], axis=1)
+    nearest = np.clip(columns, first[:, None], last[:, None])
+    windows = windows.copy()
+    windows[rows] = np.take_along_axis(windows[rows], nearest, axis=1)
+    key_times, keys = times[windows], poses[..., windows]
+    for end, inwards in ((first, 1), (last, -1)):
+        beside = key_times[rows, end + inwards]
+        way = (columns - end[:, None]) * inwards
+        moments = key_times[rows, end, None] + way * (beside - key_times[rows, end])[:, None]
+        key_times[rows] = np.where(way < 0, moments, key_times[rows])
+        for step in range(1, 1 + reach):
+            column = end - step * inwards
+            some = (column >= 0) & (column < windows.shape[1])
+            here, column = rows[some], column[some]
+            made = beyond(keys[..., here, column + inwards], keys[..., here, column + 2 * inwards])
             keys.positions[..., here, column, :] = made.positions
             keys.quaternions[..., here, column, :] = made.quaternions
             if keys.scales is not None:

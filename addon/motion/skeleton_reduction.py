@@ -1,8 +1,8 @@
 """Key reduction of whole bodies: few keys for joints that hang on one another.
 
-What counts is where everything gets: an error of a joint moves all that hangs on it. The error is therefore looked at in
-the root's space, through the hierarchy, at every joint and sample. Joints have keys of their own, or all of them share
-*key poses*, as animators work from pose to pose.
+What counts is where everything gets: an error of a joint moves all that hangs on it. The error is therefore looked at
+in the root's space, through the hierarchy, at every joint and sample. Joints have keys of their own, or all of them
+share *key poses*, as animators work from pose to pose.
 
 Source: the error in the space of the whole object is that of the Animation Compression Library; key poses that bodies
 share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
@@ -11,24 +11,30 @@ share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe s
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .key_search import Keys, Recording, Search
 from .measures import shell_error
-from .modes import MODES, interpolate
+from .modes import interpolate
 from .poses import PackedPoses, Poses, inverse, placed
 from .quaternions import align_signs, normalise
 from .reduction import check_recording, check_wishes
 from .skeletons import Skeleton
 
-SWEEPS = (0.8, 1.0)
-"""How much of the tolerance may be used up by then, each time that keys of every joint are taken out, from the roots on.
-What is left for later is shared by the joints further down."""
+SOME_TURN = 1e-12
+"""What a mean of quaternions is turned by, so that it has a length."""
 
-BUDGET_STEPS = 8
+TINY = 1e-30
+"""Stands for a weight of zero."""
+
+BUDGET_STEPS = 9
 """Of a search for the tolerance that a budget of keys of their own can keep to."""
+
+LEAST = 12.0
+"""How much smaller than that of a body at rest the tolerance may be, by its logarithm."""
 
 
 def reduce_skeleton_keys(
@@ -116,7 +122,7 @@ class _Body:
         self.truth = skeleton.in_root_space(poses)
 
     def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Of all joints (joints, m), at some samples where these poses (joints, m) are shown in their parents' space."""
+        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown."""
         there = self.skeleton.in_root_space(shown)
         return shell_error(there, self.truth[:, samples], self.radii[:, None]) * self.weights[:, None]
 
@@ -132,9 +138,9 @@ class _Body:
 
     def own_keys_within(self, budget: int) -> tuple[np.ndarray, ...]:
         """The keys of the smallest tolerance that so many can keep to, by bisection."""
-        rest = tuple(np.array([key]) for key in self.middles)
-        largest = float(self.errors(self.poses[np.arange(len(rest))[:, None], np.array(rest)]).max())
-        low, high, best = math.log(max(largest, 1e-9)) - 16.0, math.log(max(largest, 1e-9)), rest
+        best = tuple(np.array([key]) for key in self.middles)
+        high = math.log(max(float(self.errors(self.at_rest()).max()), TINY))
+        low = high - LEAST
         for _ in range(BUDGET_STEPS):
             middle = 0.5 * (low + high)
             keys = self.own_keys(math.exp(middle))
@@ -147,27 +153,23 @@ class _Body:
     def own_keys(self, tolerance: float) -> tuple[np.ndarray, ...]:
         return _OwnKeys(self, tolerance).found()
 
-    @property
+    @cached_property
     def middles(self) -> np.ndarray:
         """The sample of each joint that is nearest to its mean pose, shape (joints,)."""
+        scales = self.poses.scales
         means = Poses(
             self.poses.positions.mean(axis=1, keepdims=True),
-            normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + 1e-12),
-            None if self.poses.scales is None else self.poses.scales.mean(axis=1, keepdims=True),
+            normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + SOME_TURN),
+            None if scales is None else scales.mean(axis=1, keepdims=True),
         )
-        whole = Poses(
-            *(
-                None if rows is None else np.broadcast_to(rows, all_rows.shape)
-                for rows, all_rows in zip(
-                    (means.positions, means.quaternions, means.scales),
-                    (self.poses.positions, self.poses.quaternions, self.poses.scales),
-                    strict=True,
-                )
-            )
-        )
-        return np.argmin(shell_error(self.poses, whole, self.radii[:, None] + self.sizes), axis=1)
+        return np.argmin(shell_error(self.poses, _spread(means, self.poses), self.sizes), axis=1)
 
-    @property
+    def at_rest(self) -> Poses:
+        """Every joint in its middle pose all the time, shape (joints, n)."""
+        joints = np.arange(len(self.skeleton))
+        return _spread(self.poses[joints[:, None], self.middles[:, None]], self.poses)
+
+    @cached_property
     def sizes(self) -> np.ndarray:
         """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
         found = np.empty(self.poses.shape)
@@ -217,63 +219,46 @@ class _OwnKeys:
         if len(self.body.times) <= 2:
             return tuple(np.arange(len(self.body.times)) for _ in self.keys)
         self._share_out()
-        for allowed in SWEEPS:
-            for joints in self.body.skeleton.levels:
-                self._take_out(joints, allowed)
+        for joints in self.body.skeleton.levels:
+            self._take_out(joints)
         self._prove()
         return tuple(self.keys)
 
     def _share_out(self) -> None:
         """Keys of all joints, each within its share of the tolerance."""
-        body = self.body
-        moves, parents = _moves(body.poses), body.skeleton.parents
-        above, beneath = moves.astype(int), moves.astype(int)
-        for joints in body.skeleton.levels[1:]:
-            above[joints] += above[parents[joints]]
-        for joints in body.skeleton.levels[:0:-1]:
-            np.maximum.at(beneath, parents[joints], moves[parents[joints]] + beneath[joints])
-        weights = np.array([body.weights[below].max() for below in body.skeleton.below])
-        shares = self.tolerance / np.maximum(above + beneath - moves, 1)
-        sizes = body.sizes
-        if body.truth.scales is not None:
-            own = body.truth.scales
-            size = np.where((parents >= 0)[:, None], own[parents], 1.0)
-            sizes, shares = sizes / own, shares[:, None] / size
-        shares = np.broadcast_to(shares if np.ndim(shares) == 2 else shares[:, None], body.poses.shape)
-        still = Poses(
-            *(
-                None if rows is None else rows[np.arange(len(weights)), body.middles][:, None]
-                for rows in (body.poses.positions, body.poses.quaternions, body.poses.scales)
-            )
-        )
-        still = Poses(
-            *(
-                None if r is None else np.broadcast_to(r, w.shape)
-                for r, w in zip(
-                    (still.positions, still.quaternions, still.scales),
-                    (body.poses.positions, body.poses.quaternions, body.poses.scales),
-                    strict=True,
-                )
-            )
-        )
-        rests = np.all(shell_error(still, body.poses, sizes) * weights[:, None] <= shares, axis=1) | (weights == 0.0)
-        moving = np.flatnonzero(~rests)
+        body, count = self.body, len(self.body.times)
+        sizes, shares = self._sizes_and_shares()
+        rests = np.all(shell_error(body.at_rest(), body.poses, sizes) <= shares, axis=1)
         for joint in np.flatnonzero(rests).tolist():
             self._show(joint, self.keys[joint])
-        if not len(moving):
-            return
-        tolerances = shares[moving] / weights[moving, None]
-        tracks = _tracks(body.poses[moving])
-        recording = Recording(
-            np.tile(body.times, len(moving)),
-            tracks,
-            body.mode,
-            sizes[moving].ravel(),
-            tolerances.ravel(),
-            len(body.times) * np.arange(len(moving)),
-        )
-        search = Search(recording)
-        self._take(moving, search.thinned(search.measured(np.arange(tracks.shape[-1])), 1.0))
+        moving = np.flatnonzero(~rests)
+        if len(moving):
+            times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
+            size, share = sizes[moving].ravel(), shares[moving].ravel()
+            search = Search(Recording(times, _tracks(body.poses[moving]), body.mode, size, share, starts))
+            self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
+
+    def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
+        """How large what hangs on each joint is and how far it may be off by that joint, both (joints, n).
+
+        Both in the unit of the joint's parent. Joints that never move need no share.
+        """
+        body, skeleton = self.body, self.body.skeleton
+        moves = _moves(body.poses).astype(np.int64)
+        above, beneath = moves.copy(), moves.copy()
+        for joints in skeleton.levels[1:]:
+            above[joints] += above[skeleton.parents[joints]]
+        for joints in skeleton.levels[:0:-1]:
+            parents = skeleton.parents[joints]
+            np.maximum.at(beneath, parents, moves[parents] + beneath[joints])
+        weights = np.array([body.weights[below].max() for below in skeleton.below])
+        longest_chain = np.maximum(above + beneath - moves, 1)
+        shares = np.full(body.poses.shape, self.tolerance) / longest_chain[:, None]
+        shares /= np.maximum(weights, TINY)[:, None]
+        if body.truth.scales is None:
+            return body.sizes, shares
+        on_joints = (skeleton.parents >= 0)[:, None]
+        return body.sizes / body.truth.scales, shares / np.where(on_joints, body.truth.scales[skeleton.parents], 1.0)
 
     def _take(self, joints: np.ndarray, keys: Keys) -> None:
         """Note and show the keys of joints that were tracks."""
@@ -289,24 +274,20 @@ class _OwnKeys:
         if shown.scales is not None:
             self.shown.scales[joint] = shown.scales
 
-    def _take_out(self, joints: np.ndarray, allowed: float) -> None:
-        """Take out keys of joints that do not hang on one another, as far as the error in the root's space allows it."""
+    def _take_out(self, joints: np.ndarray) -> None:
+        """Take keys out of joints that do not hang on one another, as far as the error in the root's space allows."""
         joints = np.array([joint for joint in joints.tolist() if len(self.keys[joint]) > 1], dtype=np.int64)
         if not len(joints):
             return
-        level = _Level(self, joints)
-        count = len(self.body.times)
-        rests = level.rests(allowed)
+        rests = _Level(self, joints).may_rest()
         for joint in joints[rests].tolist():
-            self._show(joint, np.array([self.body.middles[joint]]))
+            self._show(joint, self.body.middles[[joint]])
         joints = joints[~rests]
-        if not len(joints):
-            return
-        level = _Level(self, joints)
-        search = Search(level)
-        keys = search.measured(np.concatenate([count * i + self.keys[j] for i, j in enumerate(joints.tolist())]))
-        keys = search.thinned(keys, allowed)
-        self._take(joints, keys if allowed < 1.0 else search.refined(keys))
+        if len(joints):
+            count = len(self.body.times)
+            search = Search(_Level(self, joints))
+            tracks = [count * place + self.keys[joint] for place, joint in enumerate(joints.tolist())]
+            self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
 
     def _prove(self) -> None:
         """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
@@ -362,13 +343,20 @@ class _Level(Recording):
         found[some] = np.maximum.reduceat(errors, first[some]) if len(errors) else 0.0
         return found / self.tolerance[samples]
 
-    def rests(self, allowed: float) -> np.ndarray:
-        """Which of the joints need not move, shape (joints,)."""
-        count = len(self.body.times)
-        every = np.arange(len(self.joints) * count)
-        middles = (count * np.arange(len(self.joints)) + self.body.middles[self.joints]).repeat(count)
-        errors = self.errors(every, self.poses[middles])
-        return errors.reshape(-1, count).max(axis=1) <= allowed
+    def may_rest(self) -> np.ndarray:
+        """Which of the joints need not move at all, shape (joints,)."""
+        still = _tracks(self.body.at_rest()[self.joints])
+        errors = self.errors(np.arange(len(self.times)), still)
+        return errors.reshape(len(self.joints), -1).max(axis=1) <= 1.0
+
+
+def _spread(one: Poses, over: Poses) -> Poses:
+    """Poses (joints, 1) for all moments of others (joints, n)."""
+    return Poses(
+        np.broadcast_to(one.positions, over.positions.shape),
+        np.broadcast_to(one.quaternions, over.quaternions.shape),
+        None if one.scales is None else np.broadcast_to(one.scales, over.scales.shape),
+    )
 
 
 def _tracks(poses: Poses) -> Poses:

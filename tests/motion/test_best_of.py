@@ -103,10 +103,10 @@ def test_modes_that_are_one_motion_are_not_told_apart_by_rounding():
     times, poses = wandering(400, 3)
     keys = decimate(times, 8.0)
     one = ("dq_sclerp", "pga_slerp", "cga_slerp")
+    screws = interpolate(times[keys], poses[keys], times, "dq_sclerp")
     for order in (one, one[::-1]):
         assert set(best_modes(times, poses, keys, order, RADIUS)) == {order[0]}
-        chosen = best_modes(times, poses, keys, ("lerp_slerp", *order, "motor_spline"), RADIUS)
-        assert set(chosen) & set(one) == {order[0]}
+        assert set(best_modes(times, screws, keys, ("lerp_slerp", *order, "motor_spline"), RADIUS)) == {order[0]}
 
 
 def test_a_body_at_rest_changes_no_mode():
@@ -173,17 +173,18 @@ def test_what_makes_no_sense_is_refused():
         interpolate_by_segments(times[:2], poses[:2], times, ("dq_sclerp", "dq_sclerp"))
 
 
-@pytest.mark.parametrize(
-    ("seed", "tolerance", "mode"), [(3, 0.01, "motor_spline"), (13, 0.01, "lerp_slerp"), (201, 0.01, "motor_spline")]
-)
-def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it(seed, tolerance, mode):
-    """There another mode is nearer on the whole, and passes it. The keys' own may be off by rounding more than it."""
-    times, poses = wandering(400, seed)
-    keys = reduce_keys(times, poses, mode, tolerance, RADIUS)
-    largest = shell_errors(times, poses, keys, mode).max()
-    free, bound = (
-        errors_by_segments(times, poses, keys, best_modes(times, poses, keys, KEYFRAME_MODES, RADIUS, allowed)).max()
-        for allowed in (None, largest * (1.0 - 1e-13))
-    )
-    assert free > 1.02 * tolerance
-    assert bound <= tolerance * (1.0 + 1e-9)
+@pytest.mark.parametrize(("tolerance", "mode"), [(0.01, "motor_spline"), (0.01, "lerp_slerp"), (0.01, "dq_sclerp")])
+def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it(tolerance, mode):
+    """Where another mode is nearer on the whole, and passes it. The keys' own may be off by rounding more than it."""
+    tempted = 0
+    for seed in range(16):
+        times, poses = wandering(300, seed)
+        keys = reduce_keys(times, poses, mode, tolerance, RADIUS, tries=0)
+        largest = shell_errors(times, poses, keys, mode).max()
+        free, bound = (
+            errors_by_segments(times, poses, keys, best_modes(times, poses, keys, KEYFRAME_MODES, RADIUS, most)).max()
+            for most in (None, largest * (1.0 - 1e-13))
+        )
+        tempted += free > 1.02 * tolerance
+        assert bound <= tolerance * (1.0 + 1e-9)
+    assert tempted
