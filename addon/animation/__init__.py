@@ -15,11 +15,11 @@ from .baking.reducing import (
     Reduction,
     discard_dense_keys,
     is_reduced,
-    radius_of,
     reduce_keys_of,
     reduction_of,
     restore_keys,
 )
+from .baking.sizes import radius_of
 from .inbetweens import live
 from .inbetweens.live import refresh, set_enabled
 from .inbetweens.mending import constraint_trouble, mend

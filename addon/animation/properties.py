@@ -88,6 +88,9 @@ class ChangedAction(bpy.types.PropertyGroup):
     largest_error: FloatProperty(
         description="How far the reduced motion is off where it is furthest, in Blender's units", options={"HIDDEN"}
     )
+    frames_after: IntProperty(description="On how many frames any bone of the rig has keys", options={"HIDDEN"})
+    slide_before: FloatProperty(description="How far what stands on the ground slid there", options={"HIDDEN"})
+    slide_after: FloatProperty(description="How far it slides there with fewer keys", options={"HIDDEN"})
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:

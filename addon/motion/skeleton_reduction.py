@@ -48,6 +48,7 @@ def reduce_skeleton_keys(
     shared: bool = False,
     budget: int | None = None,
     weights: ArrayLike | None = None,
+    fixed: ArrayLike | None = None,
     tries: int = 2,
 ) -> tuple[np.ndarray, ...]:
     """The fewest keys of a body's joints that keep every joint within a tolerance, or the best ones within a budget.
@@ -71,16 +72,19 @@ def reduce_skeleton_keys(
     budget : int, optional
         The most keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at least 2 for
         each. The error is then as small as can be found.
-    weights : array-like, shape (joints,), optional
-        How many times the error of each joint counts: more for feet that stand and hands that hold, 0 for joints that
-        do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
+    weights : array-like, shape (joints,) or (joints, n), optional
+        How many times the error of each joint counts, at each sample: more for feet that stand (see `standing`) and
+        hands that hold, 0 for joints that do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
+    fixed : array-like of bool, shape (joints,), optional
+        Joints that stay as they are recorded: they are carried along, and what hangs on them is measured.
     tries : int
         With `shared`, as in `reduce_keys`.
 
     Returns
     -------
     tuple of array of int, one for each joint
-        Rising samples. A joint that need not move has a single one; the others have the first and the last among them.
+        Rising samples. A joint that need not move has a single one; the others have the first and the last among them,
+        and all samples where they are fixed.
 
     Raises
     ------
@@ -94,20 +98,22 @@ def reduce_skeleton_keys(
         raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
     for joint in range(len(skeleton)):
         check_recording(times, poses[joint], f"joint {joint}, ")
-    radii, weights = (
-        _one_for_each(numbers, len(skeleton), name) for numbers, name in ((radius, "radius"), (weights, "weight"))
-    )
+    radii = _one_for_each(radius, "radius", (len(skeleton),))
+    weights = _one_for_each(1.0 if weights is None else weights, "weight", (len(skeleton),), poses.shape)
+    weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
+    free = ~np.broadcast_to(np.asarray(False if fixed is None else fixed, dtype=bool), (len(skeleton),))
     if not np.any(weights > 0.0):
         raise ValueError("every joint has a weight of 0: nothing would matter")
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    body = _Body(times, poses, skeleton, mode, radii, weights)
+    body = _Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
         keys = body.key_poses(tolerance, budget, tries)
-        return (keys,) * len(skeleton)
+        every = np.arange(len(times))
+        return tuple(keys if moves else every for moves in free.tolist())
     if tolerance is not None:
         return body.own_keys(tolerance)
-    if budget < 2 * len(skeleton):
-        raise ValueError(f"a budget of {budget} keys is too small for {len(skeleton)} joints: each may need 2")
+    if budget < 2 * np.count_nonzero(free):
+        raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     return body.own_keys_within(budget)
 
 
@@ -115,16 +121,23 @@ class _Body:
     """The recording of a body, and what it is measured by. Errors are weighted."""
 
     def __init__(
-        self, times: np.ndarray, poses: Poses, skeleton: Skeleton, mode: str, radii: np.ndarray, weights: np.ndarray
+        self,
+        times: np.ndarray,
+        poses: Poses,
+        skeleton: Skeleton,
+        mode: str,
+        radii: np.ndarray,
+        weights: np.ndarray,
+        free: np.ndarray,
     ) -> None:
         self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
-        self.radii, self.weights = radii, weights
+        self.radii, self.weights, self.free = radii, weights, free
         self.truth = skeleton.in_root_space(poses)
 
     def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown."""
         there = self.skeleton.in_root_space(shown)
-        return shell_error(there, self.truth[:, samples], self.radii[:, None]) * self.weights[:, None]
+        return shell_error(there, self.truth[:, samples], self.radii[:, None]) * self.weights[:, samples]
 
     def shown(self, joint: int, keys: np.ndarray) -> Poses:
         """What a joint does between keys (k,), shape (n,)."""
@@ -138,13 +151,13 @@ class _Body:
 
     def own_keys_within(self, budget: int) -> tuple[np.ndarray, ...]:
         """The keys of the smallest tolerance that so many can keep to, by bisection."""
-        best = tuple(np.array([key]) for key in self.middles)
+        best = tuple(_OwnKeys(self, math.inf).keys)
         high = math.log(max(float(self.errors(self.at_rest()).max()), TINY))
         low = high - LEAST
         for _ in range(BUDGET_STEPS):
             middle = 0.5 * (low + high)
             keys = self.own_keys(math.exp(middle))
-            if sum(map(len, keys)) <= budget:
+            if sum(len(keys[joint]) for joint in np.flatnonzero(self.free).tolist()) <= budget:
                 high, best = middle, keys
             else:
                 low = middle
@@ -184,7 +197,7 @@ class _WholeBody(Recording):
 
     def __init__(self, body: _Body, tolerance: float) -> None:
         # What stands still in its parent's space is the same between any keys.
-        moves = _moves(body.poses)
+        moves = _moves(body.poses) & body.free
         moves[0] |= not moves.any()
         super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
         self.body, self.moving = body, np.flatnonzero(moves)
@@ -213,7 +226,8 @@ class _OwnKeys:
             body.poses.quaternions.copy(),
             None if body.poses.scales is None else body.poses.scales.copy(),
         )
-        self.keys = [np.array([key]) for key in body.middles]
+        every = np.arange(len(body.times))
+        self.keys = [body.middles[[joint]] if free else every for joint, free in enumerate(body.free.tolist())]
 
     def found(self) -> tuple[np.ndarray, ...]:
         if len(self.body.times) <= 2:
@@ -229,9 +243,9 @@ class _OwnKeys:
         body, count = self.body, len(self.body.times)
         sizes, shares = self._sizes_and_shares()
         rests = np.all(shell_error(body.at_rest(), body.poses, sizes) <= shares, axis=1)
-        for joint in np.flatnonzero(rests).tolist():
+        for joint in np.flatnonzero(rests & body.free).tolist():
             self._show(joint, self.keys[joint])
-        moving = np.flatnonzero(~rests)
+        moving = np.flatnonzero(~rests & body.free)
         if len(moving):
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
             size, share = sizes[moving].ravel(), shares[moving].ravel()
@@ -244,17 +258,17 @@ class _OwnKeys:
         Both in the unit of the joint's parent. Joints that never move need no share.
         """
         body, skeleton = self.body, self.body.skeleton
-        moves = _moves(body.poses).astype(np.int64)
+        moves = (_moves(body.poses) & body.free).astype(np.int64)
         above, beneath = moves.copy(), moves.copy()
         for joints in skeleton.levels[1:]:
             above[joints] += above[skeleton.parents[joints]]
         for joints in skeleton.levels[:0:-1]:
             parents = skeleton.parents[joints]
             np.maximum.at(beneath, parents, moves[parents] + beneath[joints])
-        weights = np.array([body.weights[below].max() for below in skeleton.below])
+        weights = np.array([body.weights[below].max(axis=0) for below in skeleton.below])
         longest_chain = np.maximum(above + beneath - moves, 1)
         shares = np.full(body.poses.shape, self.tolerance) / longest_chain[:, None]
-        shares /= np.maximum(weights, TINY)[:, None]
+        shares /= np.maximum(weights, TINY)
         if body.truth.scales is None:
             return body.sizes, shares
         on_joints = (skeleton.parents >= 0)[:, None]
@@ -276,7 +290,8 @@ class _OwnKeys:
 
     def _take_out(self, joints: np.ndarray) -> None:
         """Take keys out of joints that do not hang on one another, as far as the error in the root's space allows."""
-        joints = np.array([joint for joint in joints.tolist() if len(self.keys[joint]) > 1], dtype=np.int64)
+        movable = [joint for joint in joints.tolist() if len(self.keys[joint]) > 1 and self.body.free[joint]]
+        joints = np.array(movable, dtype=np.int64)
         if not len(joints):
             return
         rests = _Level(self, joints).may_rest()
@@ -291,15 +306,18 @@ class _OwnKeys:
 
     def _prove(self) -> None:
         """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
-        while True:
-            errors = self.body.errors(self.shown)
-            if errors.max() <= self.tolerance * (1.0 + 1e-9):
-                return
+        ends = (0, len(self.body.times) - 1)
+        while (errors := self.body.errors(self.shown)).max() > self.tolerance:
             joint, sample = np.unravel_index(np.argmax(errors), errors.shape)
+            chain = []
             while joint >= 0:
-                more = np.union1d(self.keys[joint], [0, sample, len(self.body.times) - 1])
-                self._show(int(joint), more)
+                chain.append(int(joint))
                 joint = self.body.skeleton.parents[joint]
+            off = [joint for joint in chain if self.body.free[joint] and sample not in self.keys[joint]]
+            if not off:
+                return  # By rounding.
+            for joint in off:
+                self._show(joint, np.union1d(self.keys[joint], (*ends, sample)))
 
 
 class _Level(Recording):
@@ -311,7 +329,8 @@ class _Level(Recording):
         poses = _tracks(self.body.poses[joints])
         starts = len(times) * np.arange(len(joints))
         super().__init__(np.tile(times, len(joints)), poses, self.body.mode, 0.0, keys.tolerance, starts)
-        weighty = [below[joint][self.body.weights[below[joint]] > 0.0] for joint in joints.tolist()]
+        weighs, self.weights = self.body.weights.any(axis=1), self.body.weights.ravel()
+        weighty = [below[joint][weighs[below[joint]]] for joint in joints.tolist()]
         self.counts = np.array([len(hanging) for hanging in weighty])
         self.hanging = np.concatenate(weighty)
         self.first = np.cumsum(self.counts) - self.counts
@@ -337,7 +356,7 @@ class _Level(Recording):
         joint = self.hanging[(self.first[track] - first)[pair] + np.arange(len(pair))]
         there = count * joint + moment[pair]
         moved = placed(moved_by[pair], self.there[there])
-        errors = shell_error(moved, self.wanted[there], self.body.radii[joint]) * self.body.weights[joint]
+        errors = shell_error(moved, self.wanted[there], self.body.radii[joint]) * self.weights[there]
         found = np.zeros(len(samples))
         some = counts > 0
         found[some] = np.maximum.reduceat(errors, first[some]) if len(errors) else 0.0
@@ -376,12 +395,14 @@ def _moves(poses: Poses) -> np.ndarray:
     return changes if poses.scales is None else changes | (np.ptp(poses.scales, axis=1) > 0.0)
 
 
-def _one_for_each(numbers: ArrayLike | None, count: int, name: str) -> np.ndarray:
-    """A number for each joint, finite and not below zero."""
-    numbers = np.asarray(1.0 if numbers is None else numbers, dtype=np.float64)
-    if numbers.shape not in ((), (count,)):
-        raise ValueError(f"{name}: {numbers.size} numbers do not fit {count} joints; give one, or one for each")
-    numbers = np.broadcast_to(numbers, (count,))
+def _one_for_each(numbers: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
+    """A number for each joint or sample, or one for all: finite and not below zero."""
+    numbers = np.asarray(numbers, dtype=np.float64)
+    if numbers.shape not in ((), *shapes):
+        wanted = " or ".join(map(str, shapes))
+        raise ValueError(f"{name} of shape {numbers.shape}: give one number, or an array of shape {wanted}")
+    numbers = np.broadcast_to(numbers, shapes[0]) if numbers.ndim == 0 else numbers
     if not (valid := np.isfinite(numbers) & (numbers >= 0.0)).all():
-        raise ValueError(f"joint {int(np.argmin(valid))} has a {name} of {numbers[np.argmin(valid)]}")
+        joint = np.argwhere(~valid)[0]
+        raise ValueError(f"joint {joint[0]} has a {name} of {numbers[tuple(joint)]}")
     return numbers

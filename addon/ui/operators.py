@@ -14,7 +14,7 @@ from ..animation import Refused
 from ..animation.actions.slots import places_of
 from ..animation.baking.copies import BAKED, REDUCED, entries_in_use
 from ..animation.baking.originals import WAYS_BACK
-from ..animation.baking.reducing import metres_per_unit
+from ..animation.baking.sizes import metres_per_unit
 from ..animation.inbetweens.live import paused
 from ..animation.inbetweens.mending import with_troubles
 from ..animation.inbetweens.polls import with_in_betweens, with_modes, with_more_keys_than

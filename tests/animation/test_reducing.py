@@ -28,7 +28,7 @@ from addon.animation import (
     unbake,
     write_channel,
 )
-from addon.animation.baking import reducing
+from addon.animation.baking import fewer_keys
 from addon.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
 from addon.motion.quaternions import multiply
 from scripts.trajectories import read_trajectories
@@ -169,7 +169,7 @@ def test_what_grows_gets_its_best_modes_too(live_file):
 
 def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(live_file, monkeypatch):
     # Seen with no motion yet; only cycles of different lengths could come to it.
-    monkeypatch.setattr(reducing, "_with_best_modes", lambda source, *_: replace(source, mode=1))
+    monkeypatch.setattr(fewer_keys, "with_best_modes", lambda source, *_: replace(source, mode=1))
     obj = recorded()
     frames = key_frames(obj)
     truth = read_poses(obj, frames)
@@ -388,7 +388,7 @@ def test_cycles_go_on_as_before(live_file, best_of):
         fcurve.modifiers.new("CYCLES")
     seen = np.arange(0.0, 501.0)
     truth = read_poses(obj, seen)
-    reduction = reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS, best_of=best_of)
+    reduction = reduce_keys_of(obj, "lerp_slerp" if best_of else "motor_spline", TOLERANCE, RADIUS, best_of=best_of)
     assert reduction.after < 0.5 * reduction.before
     assert (len(reduction.segments) > 1) == best_of
     assert off(obj, seen, truth) <= TOLERANCE * (1.0 + 1e-5)

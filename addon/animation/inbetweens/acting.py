@@ -5,7 +5,7 @@ Every target says first whether it can be done, before anything is changed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import TypeVar
 
 import bpy
@@ -42,6 +42,7 @@ def act_on(
     act: Callable[[Transform, Plan], Result],
     refused: list[Refused] | None,
     becomes: Callable[[Source], Source] | None = None,
+    survey: Callable[[Mapping[Transform, Readings]], None] | None = None,
 ) -> dict[Transform, Result]:
     """Do something to each target.
 
@@ -56,6 +57,8 @@ def act_on(
         Takes the refusals; without it nothing is done where there is one, and it is raised.
     becomes
         What becomes of a source by it, where no F-curve of the animator's is touched: nothing is read again then.
+    survey
+        Is shown all readings before the first plan, where plans depend on one another.
 
     Returns
     -------
@@ -70,6 +73,8 @@ def act_on(
         for user, source in zip(place.users, sources, strict=True):
             if user in readings:
                 readings[user].append((place, source))
+    if survey is not None:
+        survey(readings)
     plans, refusals = [], []
     for transform, reading in readings.items():
         try:

@@ -1,0 +1,63 @@
+"""Contacts: which joints of a body stand on the ground, and how far they slide there.
+
+A foot that stands still in a recording is the first thing that is seen to move when it does not stand still any more.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+LOW = 0.12
+"""How far above the lowest place that any joint gets to what stands is at most, in heights of the body."""
+
+SLOW = 0.06
+"""How fast it is at most, in heights of the body a second: 10 cm a second for a grown-up."""
+
+SHORTEST = 0.1
+"""Seconds that something stands at least: what only turns back is not standing."""
+
+
+def standing(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Which joints stand on the ground, and when.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Seconds, strictly rising.
+    positions : array, shape (joints, n, 3)
+        In the world, the third axis upwards.
+
+    Returns
+    -------
+    array of bool, shape (joints, n)
+        Low and slow, for a while.
+    """
+    if len(times) < 2:
+        return np.zeros(positions.shape[:2], dtype=bool)
+    heights = positions[..., 2]
+    height = float(np.median(np.ptp(heights, axis=0)))
+    ways = np.linalg.norm(np.diff(positions, axis=1), axis=-1)
+    slow = ways <= SLOW * height * np.diff(times)
+    at_rest = np.concatenate((slow[:, :1], slow), axis=1) & np.concatenate((slow, slow[:, -1:]), axis=1)
+    stands = at_rest & (heights - heights.min() <= LOW * height)
+    for joint, first, last in _spans(stands):
+        if times[last] - times[first] < SHORTEST:
+            stands[joint, first : last + 1] = False
+    return stands
+
+
+def slide(positions: np.ndarray, stands: np.ndarray) -> float:
+    """The farthest that anything (joints, n, 3) gets, while it stands (joints, n), from where it stood at first."""
+    farthest = 0.0
+    for joint, first, last in _spans(stands):
+        away = positions[joint, first : last + 1] - positions[joint, first]
+        farthest = max(farthest, float(np.linalg.norm(away, axis=-1).max()))
+    return farthest
+
+
+def _spans(stands: np.ndarray) -> list[tuple[int, int, int]]:
+    """Joint, first and last sample of every stretch of time (joints, n) that is marked."""
+    edges = np.diff(stands.astype(np.int8), axis=1, prepend=0, append=0)
+    joints, firsts = np.nonzero(edges == 1)
+    _, ends = np.nonzero(edges == -1)
+    return list(zip(joints.tolist(), firsts.tolist(), (ends - 1).tolist(), strict=True))
