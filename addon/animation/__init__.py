@@ -13,11 +13,13 @@ from .actions.sources import MODE_IDS
 from .baking.bake import bake, bake_poses, is_baked, unbake
 from .baking.reducing import (
     Reduction,
+    WholeRig,
     discard_dense_keys,
     is_reduced,
     reduce_keys_of,
     reduction_of,
     restore_keys,
+    total_reduction,
 )
 from .baking.sizes import radius_of
 from .inbetweens import live
@@ -31,6 +33,7 @@ __all__ = [
     "MODE_IDS",
     "Reduction",
     "Refused",
+    "WholeRig",
     "bake",
     "bake_poses",
     "channelbag_of",
@@ -51,6 +54,7 @@ __all__ = [
     "restore_keys",
     "set_enabled",
     "set_mode",
+    "total_reduction",
     "unbake",
     "unregister",
     "write_channel",

@@ -34,6 +34,11 @@ class OnTargets:
     """Why the operator is greyed out where it has nothing to do on any target."""
 
     @classmethod
+    def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
+        """What the operator acts on here, one after the other."""
+        return each_target(context)
+
+    @classmethod
     def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
         """The targets on which there is something to do."""
         return targets
@@ -43,7 +48,7 @@ class OnTargets:
         seen: list[Transform] = []
 
         def noted() -> Iterator[Transform]:
-            for target in each_target(context):
+            for target in cls.each_target(context):
                 seen.append(target)
                 yield target
 

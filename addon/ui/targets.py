@@ -15,6 +15,7 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from ..animation import Refused, key_frames, modes_of
 from ..animation.inbetweens.describing import frame_in_action, segment_at
 from ..animation.inbetweens.mode_keys import source_of
+from ..animation.inbetweens.polls import with_more_keys_than
 from ..animation.transforms import MODE_PROPERTY, WIDTHS, Transform, bone_name, split_path, transform_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
@@ -55,6 +56,15 @@ def each_target(context: bpy.types.Context) -> Iterator[Transform]:
 def targets_of(context: bpy.types.Context) -> list[Transform]:
     """What an operator acts on here."""
     return list(each_target(context))
+
+
+def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform]) -> Iterator[Transform]:
+    """The targets, and in place of rigs whose bones have keys, outside of Pose Mode, all of theirs that have any."""
+    for target in targets:
+        obj = target.carrier
+        bones = () if target.prefix or obj.type != "ARMATURE" or is_key_editor(context) else obj.pose.bones
+        keyed = list(with_more_keys_than((target, *map(transform_of, bones)), 0)) if bones else []
+        yield from keyed if any(one.prefix for one in keyed) else (target,)
 
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import bpy
 
-from ..animation import Reduction
+from ..animation import Reduction, WholeRig
 from ..animation.inbetweens.describing import SegmentFacts
 from ..animation.inbetweens.outlets.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from ..animation.properties import MODE_ITEMS
@@ -84,9 +84,34 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     """What became of the keys of a target."""
     error = length(scene, reduction.largest_error, precision=3)
     summary = f"{reduction.before} keys became {reduction.after}, largest error {error}"
+    if reduction.rig is not None:
+        summary += f", keys on {reduction.rig.frames} frames"
+        if (feet := _slides(scene, reduction.rig)) is not None:
+            summary += f", feet that stand slide {feet}"
     if len(reduction.segments) > 1:
         summary += f"; segments: {', '.join(counted_modes(reduction.segments))}"
     return summary
+
+
+def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
+    """What became of the keys of a rig's bones, as labels and what belongs to them."""
+    rows = [
+        ("Keys", f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
+        ("Off By", f"{length(scene, reduction.largest_error, precision=3)} at most"),
+    ]
+    if reduction.rig is not None:
+        rows.insert(1, ("Frames", f"{reduction.rig.frames} with keys"))
+        if (feet := _slides(scene, reduction.rig)) is not None:
+            rows.append(("Feet", f"slide {feet}"))
+    return rows
+
+
+def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
+    """How far feet slide while they stand; None where none does."""
+    if rig.slide_before <= 0.0:
+        return None
+    before, after = (length(scene, slide, precision=2) for slide in (rig.slide_before, rig.slide_after))
+    return f"{after}, recorded {before}"
 
 
 def counted_modes(segments: Mapping[str, int]) -> list[str]:

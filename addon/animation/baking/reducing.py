@@ -12,13 +12,14 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..actions.channels import replace_keys
-from ..actions.slots import places_of, slots_of, transforms_in
+from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
 from ..actions.sources import MODE_NAMES, distinct
-from ..inbetweens.acting import Readings, Target, Targets, act_on, readable
+from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
 from ..inbetweens.mode_keys import segment_modes, set_mode_in
 from ..transforms import Refused, Transform, is_ours, transform_of
 from .bake import go_back
@@ -156,9 +157,33 @@ def reduction_of(target: Target) -> Reduction | None:
         sum(entry.keys_after for entry in entries),
         max(entry.largest_error for entry in entries),
         dict(Counter(modes)),
-        WholeRig(entries[0].frames_after, entries[0].slide_before, entries[0].slide_after)
-        if transform.prefix
-        else None,
+        _whole_rig(entries[0]) if transform.prefix else None,
+    )
+
+
+def _whole_rig(entry: bpy.types.PropertyGroup) -> WholeRig:
+    return WholeRig(entry.frames_after, entry.slide_before, entry.slide_after)
+
+
+def total_reduction(targets: Targets) -> Reduction | None:
+    """What became of the keys of several targets together, without their modes. None where none were reduced."""
+    places: dict[bpy.types.Object, list[SlotTransform]] = {}
+    entries = []
+    for transform in transforms_of(targets):
+        if len(transform.motion.bakes):
+            if transform.animated not in places:
+                places[transform.animated] = places_of(transform_of(transform.animated))
+            used = entries_in_use(transform, places[transform.animated])
+            entries += [(transform, entry) for entry in used if entry.kind == REDUCED]
+    if not entries:
+        return None
+    of_bones = [entry for transform, entry in entries if transform.prefix]
+    return Reduction(
+        sum(entry.keys_before for _, entry in entries),
+        sum(entry.keys_after for _, entry in entries),
+        max(entry.largest_error for _, entry in entries),
+        {},
+        _whole_rig(max(of_bones, key=lambda entry: entry.frames_after)) if of_bones else None,
     )
 
 

@@ -1,0 +1,246 @@
+"""The reduced keys of rigs, as Blender evaluates them: the tolerance holds at every bone, through all it hangs on."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.animation import (
+    Refused,
+    is_reduced,
+    key_frames,
+    modes_of,
+    reduce_keys_of,
+    reduction_of,
+    restore_keys,
+    set_mode,
+    total_reduction,
+    write_channel,
+)
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import new_object
+from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
+
+TOLERANCE, RADIUS = 0.01, 0.05
+
+
+def bones(rig: bpy.types.Object, *names: str) -> list[bpy.types.PoseBone]:
+    return [rig.pose.bones[name] for name in names or NAMES]
+
+
+def matrices(rig: bpy.types.Object, frames: np.ndarray = FRAMES) -> dict[str, np.ndarray]:
+    """Where Blender shows every bone in the world, (n, 4, 4)."""
+    found: dict[str, list[np.ndarray]] = {bone.name: [] for bone in rig.pose.bones}
+    for frame in frames:
+        bpy.context.scene.frame_set(int(frame), subframe=frame % 1.0)
+        for bone in rig.pose.bones:
+            found[bone.name].append(np.array(rig.matrix_world @ bone.matrix))
+    return {name: np.array(rows) for name, rows in found.items()}
+
+
+def largest(shown: np.ndarray, truth: np.ndarray, radius: float = RADIUS) -> np.ndarray:
+    """How far any point of the ball is off on each frame, by singular values."""
+    axes, sizes, _ = np.linalg.svd(radius * (shown - truth)[:, :3, :3])
+    moved = np.einsum("nij,ni->nj", axes, (shown - truth)[:, :3, 3])
+    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
+
+
+def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, float]:
+    return {name: float(largest(rows, truth[name]).max()) for name, rows in matrices(rig).items()}
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
+@pytest.mark.parametrize("best_of", [False, True])
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("mode", ["motor_spline", "lerp_slerp"])
+def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, best_of, rotation_mode):
+    rig = recorded_rig(rotation_mode)
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), mode, TOLERANCE, RADIUS, shared=shared, best_of=best_of)
+    off = errors(rig, truth)
+    assert max(off.values()) <= TOLERANCE * (1.0 + 1e-4)
+    for bone in bones(rig):
+        reduction = reduction_of(bone)
+        assert reduction.largest_error == pytest.approx(off[bone.name], abs=2e-6)
+        assert (reduction.before, reduction.after) == (len(FRAMES), len(key_frames(bone)))
+    keys = [key_frames(bone).tolist() for bone in bones(rig)]
+    assert all(len(some) < 0.6 * len(FRAMES) for some in keys)
+    if shared:
+        assert keys == keys[:1] * len(keys)
+    assert total_reduction(bones(rig)).rig.frames == len({frame for some in keys for frame in some})
+    if not best_of:
+        assert {one for bone in bones(rig) for one in modes_of(bone, key_frames(bone))} == {mode}
+
+
+def test_own_keys_are_fewer_than_key_poses_and_key_poses_are_on_fewer_frames(live_file):
+    counts, frames = {}, {}
+    for shared in (False, True):
+        rig = recorded_rig()
+        reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, shared=shared)
+        total = total_reduction(bones(rig))
+        counts[shared], frames[shared] = total.after, total.rig.frames
+    assert counts[False] < counts[True]
+    assert frames[True] < frames[False]
+
+
+def test_what_hangs_on_a_target_keeps_its_own_keys_and_to_the_tolerance(live_file):
+    rig = recorded_rig()
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig, "Spine"), "motor_spline", TOLERANCE, RADIUS)
+    assert len(key_frames(rig.pose.bones["Hand.L"])) == len(FRAMES)
+    off = errors(rig, truth)
+    assert off["Root"] == 0.0
+    assert 0.0 < off["Hand.L"] <= TOLERANCE * (1.0 + 1e-4)
+    together = len(key_frames(rig.pose.bones["Spine"]))
+    restore_keys(bones(rig, "Spine"))
+    # With nothing that hangs on it the spine needs fewer.
+    alone = recorded_rig()
+    bpy.context.view_layer.objects.active = alone
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name in NAMES[2:]:
+        alone.data.edit_bones[name].parent = None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    reduce_keys_of(bones(alone, "Spine"), "motor_spline", TOLERANCE, RADIUS)
+    assert len(key_frames(alone.pose.bones["Spine"])) < together
+
+
+def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
+    rig = recorded_rig(still=("Head",))
+    turns = np.tile((1.0, 0.0, 0.0, 0.0), (len(FRAMES), 1))
+    turns[:, 1] = 1e-4 * np.sin(FRAMES)
+    write_channel(rig, 'pose.bones["Head"].rotation_quaternion', FRAMES, turns)
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert len(key_frames(rig.pose.bones["Head"])) == 1
+    assert max(errors(rig, truth).values()) <= TOLERANCE * (1.0 + 1e-4)
+
+
+def test_everything_comes_back(live_file):
+    rig = recorded_rig()
+    action, truth = rig.animation_data.action, matrices(rig)
+    set_mode(bones(rig, "Arm.L"), "dq_sclerp")
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, shared=True)
+    assert all(map(is_reduced, bones(rig)))
+    restore_keys(bones(rig))
+    assert rig.animation_data.action == action
+    assert total_reduction(bones(rig)) is None
+    assert all(np.array_equal(rows, truth[name]) for name, rows in matrices(rig).items())
+
+
+@pytest.mark.parametrize("size", [0.01, 100.0])
+def test_the_tolerance_is_one_of_the_scene_also_for_a_rig_in_other_units(live_file, size):
+    rig = recorded_rig()
+    rig.scale = (size, size, size)
+    bpy.context.view_layer.update()
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE * size, RADIUS * size)
+    normalised = {
+        name: np.concatenate((rows[:, :3, :3] / size, rows[:, :3, 3:]), axis=2) for name, rows in truth.items()
+    }
+    shown = matrices(rig)
+    for name, rows in normalised.items():
+        now = np.concatenate((shown[name][:, :3, :3] / size, shown[name][:, :3, 3:]), axis=2)
+        assert largest(now, rows, RADIUS * size).max() <= TOLERANCE * size * (1.0 + 1e-3)
+    assert total_reduction(bones(rig)).after < 0.6 * len(NAMES) * len(FRAMES)
+
+
+@pytest.mark.parametrize("setting", ["no rotation", "no scale", "global location", "connected", "scaled"])
+def test_bones_that_inherit_otherwise_keep_to_it_too(live_file, setting):
+    """Each begins a chain of its own where its parent's error is no part of its own."""
+    rig = recorded_rig()
+    bone = rig.data.bones["Arm.L"]
+    if setting == "no rotation":
+        bone.use_inherit_rotation = False
+    elif setting == "global location":
+        bone.use_local_location = False
+        write_channel(rig, 'pose.bones["Arm.L"].location', FRAMES, 0.1 * np.sin(0.1 * FRAMES[:, None] * (1, 2, 3)))
+    elif setting == "connected":
+        bpy.context.view_layer.objects.active = rig
+        bpy.ops.object.mode_set(mode="EDIT")
+        rig.data.edit_bones["Arm.L"].use_connect = True
+        bpy.ops.object.mode_set(mode="OBJECT")
+    else:
+        bone.inherit_scale = "NONE" if setting == "no scale" else "FULL"
+        write_channel(
+            rig, 'pose.bones["Spine"].scale', FRAMES, np.repeat(1.2 + 0.2 * np.sin(0.1 * FRAMES)[:, None], 3, 1)
+        )
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    off = errors(rig, truth)
+    for name, error in off.items():
+        # What begins a chain of its own is still carried by its parent, which is off by no more.
+        own_chain = setting in ("no rotation", "no scale") and name in ("Arm.L", "Hand.L")
+        assert error <= (2.0 if own_chain else 1.0 + 1e-3) * TOLERANCE, name
+
+
+def test_a_foot_that_stands_is_held(live_file):
+    """One bone from a hip that sways down to a foot that is on the ground."""
+    rig = new_object("Leg", data=bpy.data.armatures.new("Leg"))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, head, tail in (("Hip", 1.0, 0.9), ("Thigh", 0.9, 0.5), ("Shin", 0.5, 0.1), ("Foot", 0.1, 0.05)):
+        bone = rig.data.edit_bones.new(name)
+        bone.head, bone.tail = (0.0, 0.0, head), (0.0, 0.001, tail)
+        bone.parent = rig.data.edit_bones[-2] if len(rig.data.edit_bones) > 1 else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    # A pendulum that hangs from the swaying hip, with its end where it is.
+    sway = 0.08 * np.sin(0.2 * FRAMES)
+    write_channel(rig, 'pose.bones["Hip"].location', FRAMES, np.stack((sway, 0.0 * sway, 0.0 * sway), axis=1))
+    lean = np.arcsin(sway / 0.8)
+    turns = np.zeros((len(FRAMES), 4))
+    turns[:, 0], turns[:, 3] = np.cos(lean / 2.0), np.sin(lean / 2.0)
+    write_channel(rig, 'pose.bones["Thigh"].rotation_quaternion', FRAMES, turns)
+    slides, every, recorded = {}, bones(rig, "Hip", "Thigh"), matrices(rig)["Foot"][:, :3, 3]
+    for hold in (False, True):
+        reduce_keys_of(every, "lerp_slerp", 0.02, 0.02, hold=hold)
+        as_whole = total_reduction(every).rig
+        slides[hold] = as_whole.slide_after
+        # It stands all the time: what it slides is how far it gets from where it stood at first.
+        for places, slide in ((recorded, as_whole.slide_before), (matrices(rig)["Foot"][:, :3, 3], slides[hold])):
+            assert np.linalg.norm(places - places[0], axis=1).max() == pytest.approx(slide, abs=1e-5)
+        restore_keys(every)
+    assert slides[True] < 0.6 * slides[False]
+
+
+def test_a_rig_that_is_a_strip_is_reduced(live_file):
+    rig = recorded_rig()
+    data = rig.animation_data
+    track = data.nla_tracks.new()
+    strip = track.strips.new("Strip", 1, data.action)
+    strip.action_slot = data.action_slot
+    data.action = None
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert max(errors(rig, truth).values()) <= TOLERANCE * (1.0 + 1e-3)
+    assert strip.action.name.endswith("Reduced")
+
+
+def test_bones_that_cannot_be_reduced_say_so_and_the_others_are(live_file):
+    rig = recorded_rig(still=("Head",))
+    rig.pose.bones["Hand.R"].rotation_mode = "AXIS_ANGLE"
+    refused: list[Refused] = []
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, refused=refused)
+    assert sorted(str(refusal).split()[0] for refusal in refused) == ["Body/Hand.R", "Body/Head"]
+    assert is_reduced(rig.pose.bones["Spine"])
+    assert not is_reduced(rig.pose.bones["Hand.R"])
+
+
+def test_with_no_tolerance_to_speak_of_every_bone_says_that_it_needs_its_keys(live_file):
+    rig = recorded_rig()
+    refused: list[Refused] = []
+    assert reduce_keys_of(bones(rig), "motor_spline", 1e-9, RADIUS, refused=refused) is None
+    assert len(refused) == len(NAMES)
+    assert "allow a larger one" in str(refused[0])
+
+
+def test_channels_have_what_was_recorded_on_every_key(live_file):
+    rig = recorded_rig("ZXY")
+    before = {channel: np.array([curve.evaluate(f) for f in FRAMES]) for channel, curve in curves_of(rig).items()}
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    for channel, curve in curves_of(rig).items():
+        if channel in before:
+            kept = np.array([point.co for point in curve.keyframe_points])
+            assert len(kept) < len(FRAMES)
+            np.testing.assert_allclose(kept[:, 1], before[channel][np.isin(FRAMES, kept[:, 0])], rtol=0, atol=1e-5)
