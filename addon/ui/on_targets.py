@@ -83,9 +83,11 @@ class OnTargets:
             summary = verb(refused)
         except Refused as refusal:
             refused, summary = [refusal], ""
-        refusals = [str(refusal) for refusal in refused[:MOST_REFUSALS]]
-        if len(refused) > MOST_REFUSALS:
-            refusals.append(f"and {len(refused) - MOST_REFUSALS} more")
+        # Bones of a rig may all have the same reason.
+        reasons = list(dict.fromkeys(map(str, refused)))
+        refusals = reasons[:MOST_REFUSALS]
+        if len(reasons) > MOST_REFUSALS:
+            refusals.append(f"and {len(reasons) - MOST_REFUSALS} more")
         if not summary or len(refused) >= len(targets):
             self.report({"ERROR"}, "\n".join(refusals))
             return {"CANCELLED"}

@@ -401,7 +401,9 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
 def _first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform]) -> float:
     """What to begin with, in the scene's units."""
     sizes = [max(target.animated.dimensions) for target in targets if target.prefix]
-    return OF_A_RIG * max(sizes) if sizes and max(sizes) > 0.0 else 0.001 / metres_per_unit(scene)
+    if not sizes or max(sizes) <= 0.0:
+        return 0.001 / metres_per_unit(scene)
+    return float(f"{OF_A_RIG * max(sizes):.2g}")
 
 
 class RIGID_MOTION_OT_restore_keys(_OfRigsToo, _OnChanged, bpy.types.Operator):

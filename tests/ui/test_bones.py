@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -20,7 +22,9 @@ from addon.animation.transforms import CONSTRAINT, Refused, transform_of
 from addon.ui import menus
 from addon.ui.notes import facts_and_notes
 from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, active_target, modes_meant, scope_for, targets_of
-from addon.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, spoken_of
+from addon.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, reduction_rows, spoken_of
+from tests.rigs.recorded import FRAMES as RECORDED
+from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import keyed
 from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
 from tests.ui.test_menus import drawn
@@ -200,6 +204,59 @@ def test_keys_of_bones_are_reduced_and_restored(rig):
     assert animation.is_reduced(bone(rig))
     assert operators.restore_keys() == {"FINISHED"}
     assert not animation.is_reduced(bone(rig))
+
+
+@pytest.fixture
+def body(extension) -> bpy.types.Object:
+    """A recorded body that is selected as an object, as an import leaves it."""
+    body = recorded_rig()
+    body.select_set(True)
+    return body
+
+
+def test_of_a_rig_that_is_selected_as_an_object_all_bones_are_reduced_and_restored(body, capfd):
+    assert operators.reduce_keys.poll()
+    assert not operators.restore_keys.poll()
+    assert operators.reduce_keys(shared=True, tolerance=0.02) == {"FINISHED"}
+    counts = {len(animation.key_frames(bone)) for bone in body.pose.bones}
+    assert len(counts) == 1
+    (count,) = counts
+    said = capfd.readouterr().out
+    assert f"7 bones: 630 keys became {7 * count}, largest error " in said
+    assert f", keys on {count} frames" in said
+    assert operators.restore_keys() == {"FINISHED"}
+    assert {len(animation.key_frames(bone)) for bone in body.pose.bones} == {len(RECORDED)}
+
+
+def test_the_tolerance_to_begin_with_is_one_of_the_rigs_size(body):
+    body.scale = (100.0, 100.0, 100.0)
+    bpy.context.view_layer.update()
+    operators.reduce_keys()
+    largest = animation.total_reduction(list(body.pose.bones)).largest_error
+    assert 0.001 * max(body.dimensions) < largest < 0.0031 * max(body.dimensions)
+
+
+def test_in_pose_mode_it_is_the_selected_bones_alone(body):
+    bpy.ops.object.mode_set(mode="POSE")
+    select(body, ("Arm.L", "Hand.L"))
+    assert operators.reduce_keys(tolerance=0.02) == {"FINISHED"}
+    assert [bone.name for bone in body.pose.bones if animation.is_reduced(bone)] == ["Arm.L", "Hand.L"]
+
+
+def test_a_reason_that_all_bones_have_is_said_once(body):
+    with pytest.raises(RuntimeError) as refused:
+        operators.reduce_keys(tolerance=1e-6)
+    assert str(refused.value).count("allow a larger one") == 1
+
+
+def test_what_became_of_a_rig_reads_as_rows(body):
+    operators.reduce_keys(tolerance=0.02)
+    reduction = animation.total_reduction(list(body.pose.bones))
+    rows = dict(reduction_rows(bpy.context.scene, reduction))
+    assert rows["Keys"] == f"630 \N{RIGHTWARDS ARROW} {reduction.after}"
+    assert rows["Frames"] == f"{reduction.rig.frames} with keys"
+    standing = replace(reduction, rig=animation.WholeRig(9, 0.001, 0.002))
+    assert dict(reduction_rows(bpy.context.scene, standing))["Feet"] == "slide 2 mm, recorded 1 mm"
 
 
 @pytest.mark.parametrize("text", ["An object", "Select an object with keys", "of the objects", "Object > Animation"])

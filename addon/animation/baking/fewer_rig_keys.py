@@ -76,7 +76,7 @@ class _Rig:
         *,
         hold: bool,
     ) -> None:
-        self.bones = list(rig.pose.bones)
+        self.rig, self.bones = rig, list(rig.pose.bones)
         numbers = {bone.name: number for number, bone in enumerate(self.bones)}
         self.targets = {numbers[transform.carrier.name]: transform for transform in members}
         self.places = {numbers[transform.carrier.name]: place for transform, (place, _) in members.items()}
@@ -136,6 +136,12 @@ class _Rig:
         chosen = {number: self._within_its_keys(keys[number], before[number]) for number in self.targets}
         # What has as few keys already stays as it is.
         chosen = {number: own for number, own in chosen.items() if len(own) < len(before[number])}
+        if not chosen:
+            way_out = ", or give each bone keys of its own" if shared else ""
+            raise Refused(
+                f"{self.rig.name}: its bones need their keys on all of {len(self.frames)} frames to stay within the "
+                f"tolerance: allow a larger one{way_out}"
+            )
         shown = Poses(
             self.poses.positions.copy(),
             self.poses.quaternions.copy(),

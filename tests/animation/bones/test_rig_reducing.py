@@ -227,12 +227,14 @@ def test_bones_that_cannot_be_reduced_say_so_and_the_others_are(live_file):
     assert not is_reduced(rig.pose.bones["Hand.R"])
 
 
-def test_with_no_tolerance_to_speak_of_every_bone_says_that_it_needs_its_keys(live_file):
+@pytest.mark.parametrize("shared", [False, True])
+def test_with_no_tolerance_to_speak_of_the_rig_says_once_that_it_needs_its_keys(live_file, shared):
     rig = recorded_rig()
     refused: list[Refused] = []
-    assert reduce_keys_of(bones(rig), "motor_spline", 1e-9, RADIUS, refused=refused) is None
-    assert len(refused) == len(NAMES)
-    assert "allow a larger one" in str(refused[0])
+    assert reduce_keys_of(bones(rig), "motor_spline", 1e-9, RADIUS, shared=shared, refused=refused) is None
+    (reason,) = set(map(str, refused))
+    assert reason.startswith("Body: its bones need their keys on all of 90 frames")
+    assert ("keys of its own" in reason) == shared
 
 
 def test_channels_have_what_was_recorded_on_every_key(live_file):

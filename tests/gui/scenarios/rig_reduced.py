@@ -1,0 +1,100 @@
+"""A recorded body: reduced from Object Mode by its button, in the redo panel to key poses, undone, one arm by its own."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from addon import animation
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
+
+REDO_ROWS = 44
+"""Pixels from the top of the redo panel to the middle of its first row."""
+
+REDO_ROW = 22
+"""Pixels from there to the next row."""
+
+
+def rig() -> bpy.types.Object:
+    """The rig, asked for anew each time: undo replaces it."""
+    return bpy.data.objects["Body"]
+
+
+def keys() -> list[int]:
+    """How many keys every bone has."""
+    return [len(animation.key_frames(rig().pose.bones[name])) for name in NAMES]
+
+
+def ends() -> np.ndarray:
+    """Where the bones' ends are in the world, every third frame."""
+    found = []
+    for frame in FRAMES[::3]:
+        bpy.context.scene.frame_set(int(frame))
+        found.append([rig().matrix_world @ rig().pose.bones[name].tail for name in NAMES])
+    return np.array(found)
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    hand.window.workspace = bpy.data.workspaces["Animation"]
+    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
+    view = hand.area("VIEW_3D")
+    bpy.data.batch_remove(bpy.data.objects)
+    recorded_rig()
+    rig().select_set(True)
+    bpy.context.scene.frame_end = int(FRAMES[-1])
+    space = view.spaces.active.region_3d
+    space.view_location, space.view_distance = (0.0, 0.0, 0.9), 4.0
+    bpy.ops.ed.undo_push(message="Recording")
+    recorded = ends()
+    dense = [len(FRAMES)] * len(NAMES)
+    assert keys() == dense
+    yield from hand.open_sidebar(view, "Animation")
+    yield from hand.picture("recorded")
+
+    button = yield from hand.find_button(view, "UI", "rigid_motion.reduce_keys")
+    yield from hand.click(button)
+    yield from hand.wait_until(lambda: sum(keys()) < sum(dense), "the button reduces all bones of the rig")
+    own = keys()
+    assert len(set(own)) > 1, "each bone has keys of its own"
+    assert np.linalg.norm(ends() - recorded, axis=-1).max() <= 0.003 * max(rig().dimensions)
+    redo = places.region(view, "HUD")
+    yield from hand.click(places.centre(redo))
+    yield from hand.wait_until(lambda: redo.height > 100, "the redo panel unfolds")
+    yield from hand.picture("own-keys")
+    yield from hand.hover((redo.x + 3 * redo.width // 4, redo.y + redo.height - REDO_ROWS))
+    yield from hand.press("RET")
+    yield from hand.press("A", ctrl=True)
+    yield from hand.type("0.02")
+    yield from hand.press("RET")
+    yield from hand.wait_until(lambda: sum(keys()) < sum(own), "a larger tolerance leaves fewer keys")
+    own = keys()
+    yield from hand.picture("redo-panel", places.box(view))
+
+    yield from hand.click((redo.x + redo.width // 2, redo.y + redo.height - REDO_ROWS - 4 * REDO_ROW))
+    yield from hand.wait_until(lambda: len(set(keys())) == 1, "Key Poses gives all bones keys on the same frames")
+    assert max(keys()) < len(FRAMES)
+    yield from hand.picture("key-poses")
+
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("Z", ctrl=True)
+    yield from hand.wait_until(lambda: keys() == dense, "one step takes all of it back")
+
+    yield from hand.press("TAB", ctrl=True)
+    assert bpy.context.mode == "POSE", bpy.context.mode
+    for bone in rig().pose.bones:
+        bone.select = bone.name.endswith(".L")
+    rig().data.bones.active = rig().data.bones["Hand.L"]
+    yield from hand.open_menu(view, "VIEW3D_MT_pose")
+    yield from hand.choose("Reduce Keys to Poses")
+    yield from hand.wait_until(lambda: keys() != dense, "the menu reduces the selected bones")
+    arm = [count for count, name in zip(keys(), NAMES, strict=True) if name.endswith(".L")]
+    rest = [count for count, name in zip(keys(), NAMES, strict=True) if not name.endswith(".L")]
+    assert max(arm) < len(FRAMES)
+    assert set(rest) == {len(FRAMES)}
+    yield from hand.picture("one-arm")
+    restore = yield from hand.find_button(view, "UI", "rigid_motion.restore_keys")
+    yield from hand.click(restore)
+    yield from hand.wait_until(lambda: keys() == dense, "Restore Keys gives them back")
+    np.testing.assert_allclose(ends(), recorded, atol=1e-5)
