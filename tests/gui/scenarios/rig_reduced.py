@@ -1,4 +1,4 @@
-"""A recorded body: reduced from Object Mode by its button, in the redo panel to key poses, undone, one arm by its own."""
+"""A recorded body: reduced as an object by its button, in the redo panel to key poses, undone; one arm in Pose Mode."""
 
 from __future__ import annotations
 
