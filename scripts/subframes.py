@@ -7,7 +7,7 @@
 On whole frames in-betweens are exact; motion blur and slow motion look in between. Objects go from key to key about
 axes and in directions drawn at random, by an angle and a distance that are the same for all segments, eased as Blender
 inserts keys. What Blender shows at sub-frames is compared with what the mode gives there, by the largest displacement
-in the world of three points at a distance (`--radius`) from the origin along the body's axes, and by the angle between.
+in the world of any point within a distance (`--radius`) of the origin, and by the angle between.
 Live and baked every frame are measured at quarter frames, baked every 0.25 half-way between those keys, where it is
 worst. Figures are the largest of all, RMS where it says so.
 """

@@ -348,8 +348,8 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
     measures = [
         (
             "Shell error",
-            f"The largest displacement of the three points {radius} from the body's origin along its axes: "
-            "position and rotation together, as the surface of a body of that size shows them.",
+            f"The largest displacement of any point within {radius} of the body's origin: "
+            "position and rotation together, as a body of that size shows them.",
         ),
         ("Position, rotation", "The distance of the origin, and the angle of the rotation, from the recorded ones."),
         (

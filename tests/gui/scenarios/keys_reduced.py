@@ -36,7 +36,7 @@ def modes() -> set[str]:
 
 
 def off(truth: np.ndarray) -> float:
-    """How far any corner of the cube is off on any frame: by less than twice the error at three points as far out."""
+    """How far any corner of the cube is off on any frame."""
     moved = (shown_worlds([cube()], FRAMES)[0] - truth) @ CORNERS
     return float(np.linalg.norm(moved[:, :3], axis=1).max())
 
