@@ -22,6 +22,9 @@ import numpy as np
 from .segments import SMALLEST_ANGLE, Curves, Segments
 from .trigonometry import fill_sine_and_cosine
 
+LATE = 2.0
+"""How many times as long as the segment before one may take for a stream, before its key counts as late."""
+
 
 def lerp_slerp(segments: Segments) -> Curves:
     """Straight line and great arc."""
@@ -90,8 +93,10 @@ def motor_spline(segments: Segments) -> Curves:
 def motor_spline_causal(segments: Segments) -> Curves:
     """The same for streams, from no key after the segment.
 
-    A key has the twist of the screw that led to it, and half of what the same share of the screw before would add to
-    that: all of it overshoots. A rest is kept, although nothing told of it when the body arrived there.
+    A key has the twist of the screw that led to it, and half of what the same share of the screw before would add: all
+    of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell that
+    the next key comes late: where a segment takes more than `LATE` times as long as the one before, the twist that it
+    is left with dies away in that time, and the screw goes on alone.
     """
 
     def at_keys(twists, before, after, rests):
@@ -100,7 +105,10 @@ def motor_spline_causal(segments: Segments) -> Curves:
         inner[:, rests[:, 1:]] = 0.0
         return np.concatenate((twists[..., :1], twists[..., :1], inner), axis=-1)
 
-    return _bent(segments, at_keys)
+    duration = (2.0 / segments.rate).reshape(-1, segments.keys.shape[-1] - 1)
+    before = np.concatenate((duration[:, :1], duration[:, :-1]), axis=1)
+    fades = np.minimum(LATE * before / duration, 1.0).ravel()
+    return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
 
 
 def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -155,6 +155,9 @@ class Curves:
     bends: np.ndarray | None = None
     """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
 
+    fades: np.ndarray | None = None
+    """In what part of each segment the bend at its beginning dies away, shape (S,); None where all of them need all."""
+
     @cached_property
     def matrices(self) -> np.ndarray:
         """P and Q of each segment in one matrix, shape (S, ROWS, functions in b and c)."""
@@ -218,7 +221,7 @@ def _fill(
 
     mode, reach = curves(segments), np.inf if outside and extrapolate else 1.0
     fill, numbers = _filler(mode, reach), np.stack((segments.start, segments.rate))
-    pieces = _pieces(segments, mode.bends) if mode.bends is not None and reach <= 1.0 else 0
+    pieces = _pieces(segments, mode.bends) if mode.bends is not None and mode.fades is None and reach <= 1.0 else 0
     if 0 < DENSE * pieces * segments.start.size <= samples.size:
         coefficients = _series(mode, pieces)
         key_times = _divided(key_times, pieces)
@@ -290,7 +293,8 @@ def _filler(mode: Curves, reach: float) -> Fill:
         if scales is not None:
             out[7] = scales
         if mode.bends is not None:
-            _bend(mode.bends[..., segment], s, reach <= 1.0, counts, out)
+            fades = None if mode.fades is None else np.repeat(mode.fades[segment], counts)
+            _bend(mode.bends[..., segment], fades, s, reach <= 1.0, counts, out)
 
     return fill
 
@@ -350,13 +354,17 @@ def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray
     multiply_matrices(mode.matrices[segment], basis, counts, out)
 
 
-def _bend(bends: np.ndarray, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray) -> None:
+def _bend(
+    bends: np.ndarray, fades: np.ndarray | None, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray
+) -> None:
     """Bend poses (ROWS, n) that run from key to key so that they leave and arrive with these twists (7, 2, S) added.
 
-    Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there.
+    Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there. At each sample `fades` (n,)
+    is the part of its segment in which the first of the two dies away.
     """
     u, left = 0.5 + 0.5 * s, 0.5 - 0.5 * s
-    functions = np.stack((u * left * left, -u * u * left))
+    faded = left if fades is None else 1.0 - np.minimum(u / fades, 1.0)
+    functions = np.stack((u * faded * faded, -u * u * left))
     if not within:
         functions = np.where(u < 0.0, ((1.0,), (0.0,)) * u, np.where(left < 0.0, ((0.0,), (-1.0,)) * left, functions))
     grows = bool(np.any(bends[6]))
