@@ -175,7 +175,8 @@ class _Body:
         found = np.empty(self.poses.shape)
         for joint, below in enumerate(self.skeleton.below):
             away = self.truth.positions[below] - self.truth.positions[joint]
-            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + self.radii[below, None]).max(axis=0)
+            balls = self.radii[below, None] * (1.0 if self.truth.scales is None else self.truth.scales[below])
+            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls).max(axis=0)
         return found
 
 
