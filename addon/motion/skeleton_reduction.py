@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .key_search import Keys, Recording, Search
 from .measures import shell_error
 from .modes import interpolate
-from .poses import PackedPoses, Poses, inverse, placed
+from .poses import LIMIT, PackedPoses, Poses, inverse, placed
 from .quaternions import align_signs, normalise
 from .reduction import check_recording, check_wishes
 from .skeletons import Skeleton
@@ -99,16 +99,15 @@ def reduce_skeleton_keys(
     )
     if not np.any(weights > 0.0):
         raise ValueError("every joint has a weight of 0: nothing would matter")
+    if budget is not None and not shared and budget < 2 * len(skeleton):
+        raise ValueError(f"a budget of {budget} keys is too small for {len(skeleton)} joints: each may need 2")
+    if len(times) <= 1:
+        return (np.arange(len(times)),) * len(skeleton)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = _Body(times, poses, skeleton, mode, radii, weights)
     if shared:
-        keys = body.key_poses(tolerance, budget, tries)
-        return (keys,) * len(skeleton)
-    if tolerance is not None:
-        return body.own_keys(tolerance)
-    if budget < 2 * len(skeleton):
-        raise ValueError(f"a budget of {budget} keys is too small for {len(skeleton)} joints: each may need 2")
-    return body.own_keys_within(budget)
+        return (body.key_poses(tolerance, budget, tries),) * len(skeleton)
+    return body.own_keys(tolerance) if tolerance is not None else body.own_keys_within(budget)
 
 
 class _Body:
@@ -119,7 +118,10 @@ class _Body:
     ) -> None:
         self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
         self.radii, self.weights = radii, weights
-        self.truth = skeleton.in_root_space(poses)
+        with np.errstate(over="ignore", invalid="ignore"):
+            self.truth = skeleton.in_root_space(poses)
+        for joint in range(len(skeleton)):
+            check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
 
     def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown."""
@@ -217,8 +219,6 @@ class _OwnKeys:
         self.keys = [np.array([key]) for key in body.middles]
 
     def found(self) -> tuple[np.ndarray, ...]:
-        if len(self.body.times) <= 2:
-            return tuple(np.arange(len(self.body.times)) for _ in self.keys)
         self._share_out()
         for joints in self.body.skeleton.levels:
             self._take_out(joints)
@@ -398,11 +398,11 @@ def _moves(poses: Poses) -> np.ndarray:
 
 
 def _one_for_each(numbers: ArrayLike | None, count: int, name: str) -> np.ndarray:
-    """A number for each joint, finite and not below zero."""
+    """A number for each joint, no damage and not below zero."""
     numbers = np.asarray(1.0 if numbers is None else numbers, dtype=np.float64)
     if numbers.shape not in ((), (count,)):
         raise ValueError(f"{name}: {numbers.size} numbers do not fit {count} joints; give one, or one for each")
     numbers = np.broadcast_to(numbers, (count,))
-    if not (valid := np.isfinite(numbers) & (numbers >= 0.0)).all():
+    if not (valid := (numbers >= 0.0) & (numbers < LIMIT)).all():
         raise ValueError(f"joint {int(np.argmin(valid))} has a {name} of {numbers[np.argmin(valid)]}")
     return numbers
