@@ -94,9 +94,9 @@ def motor_spline_causal(segments: Segments) -> Curves:
     """The same for streams, from no key after the segment.
 
     A key has the twist of the screw that led to it, and half of what the same share of the screw before would add: all
-    of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell that
-    the next key comes late: where a segment takes more than `LATE` times as long as the one before, the twist that it
-    is left with dies away in that time, and the screw goes on alone.
+    of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell
+    that the next key comes late: where a segment takes more than `LATE` times as long as the one before, the twist
+    that it is left with dies away in that time, and the screw goes on alone.
     """
 
     def at_keys(twists, before, after, rests):

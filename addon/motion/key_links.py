@@ -28,6 +28,9 @@ WIDTHS = {0: (3, 1), 1: (1, 0)}
 EFFORT = 100
 """Times that every sample may be looked at, on average."""
 
+WITHIN = 1.0 + 1e-12
+"""Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
+
 MANY = 2**40
 """Keys, more than there are."""
 
@@ -50,11 +53,13 @@ def linked_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
         pairs = _pairs(search, candidates, found)
         if search.reach == 0:
             return candidates[_shortest(pairs, len(candidates))]
-        links = _links(pairs, len(candidates))
-        samples = np.where(links >= 0, candidates[np.maximum(links, 0)], -1)
-        if (samples[:, 2] - samples[:, 1] - 1).sum() <= EFFORT * count:
+        before, after = _neighbours(pairs, len(candidates))
+        # Links are many times the pairs: they are counted before any is made.
+        if (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum() <= EFFORT * count:
+            links = _links(pairs, len(candidates))
+            samples = np.where(links >= 0, candidates[np.maximum(links, 0)], -1)
             _, peak = search.evaluate(samples, slice(1, 2))
-            return candidates[_shortest_of_four(links[peak[:, 0] <= 1.0])]
+            return candidates[_shortest_of_four(links[peak[:, 0] <= WITHIN])]
     return fewest
 
 
@@ -76,12 +81,17 @@ def _pairs(search: Search, candidates: np.ndarray, found: list[np.ndarray]) -> n
     return np.unique(np.concatenate(pairs), axis=0)
 
 
+def _neighbours(pairs: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """How many pairs end where each begins, and begin where it ends: 1 beyond the ends. Both (p,)."""
+    begun, ended = (np.bincount(column, minlength=count) for column in pairs.T)
+    return np.maximum(ended[pairs[:, 0]], pairs[:, 0] == 0), np.maximum(begun[pairs[:, 1]], pairs[:, 1] == count - 1)
+
+
 def _links(pairs: np.ndarray, count: int) -> np.ndarray:
     """Every pair with all pairs that end where it begins and begin where it ends: (l, 4), -1 beyond the ends."""
     by_end = pairs[np.argsort(pairs[:, 1], kind="stable")]
     begins, ends = (np.searchsorted(column, np.arange(count + 1)) for column in (pairs[:, 0], by_end[:, 1]))
-    before = np.maximum(np.diff(ends)[pairs[:, 0]], pairs[:, 0] == 0)
-    after = np.maximum(np.diff(begins)[pairs[:, 1]], pairs[:, 1] == count - 1)
+    before, after = _neighbours(pairs, count)
     numbers = np.repeat(np.arange(len(pairs)), before * after)
     offsets = np.arange(len(numbers)) - np.repeat(np.cumsum(before * after) - before * after, before * after)
     from_before, to_after = np.divmod(offsets, after[numbers])

@@ -49,6 +49,9 @@ LOOSER = (1.6, 1.3, 1.15)
 WORST = 1e30
 """Errors are clipped to this, so that their powers stay finite."""
 
+SWEEPS = 8
+"""Of all keys, for those to be changed at once."""
+
 BATCH = 2**14
 """Poses looked at in one go: few enough for the processor's caches."""
 
@@ -386,7 +389,7 @@ def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     rank[order + distance] = np.arange(len(order))
     picked: list[np.ndarray] = []
     # All at once that are the best in their neighbourhood, and again with what is left.
-    while True:
+    for _ in range(SWEEPS):
         windows = np.lib.stride_tricks.sliding_window_view(rank, 2 * distance - 1)
         best = windows.min(axis=1)
         centre = rank[distance - 1 : distance - 1 + len(best)]
@@ -396,6 +399,11 @@ def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
         picked.append(chosen - 1)
         near = chosen[:, None] + distance - 1 + np.arange(1 - distance, distance)
         rank[near.ravel()] = len(order)
+    # Where each is better than the next, as at rest where all are worth the same, one after the other is quicker.
+    for number in order[rank[order + distance] < len(order)].tolist():
+        if rank[number + distance] < len(order):
+            picked.append(np.array([number]))
+            rank[number + 1 : number + 2 * distance] = len(order)
     found = np.concatenate(picked) if picked else np.empty(0, dtype=np.int64)
     ranks = np.empty(count, dtype=np.int64)
     ranks[order] = np.arange(len(order))

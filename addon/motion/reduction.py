@@ -5,8 +5,6 @@ A key is a pose: all channels together. What is promised of them, and checked; `
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from .key_search import Recording, Search
@@ -77,8 +75,8 @@ def check_wishes(mode: str, tolerance: float | None, budget: int | None) -> None
         raise ValueError("key reduction needs either a tolerance or a budget of keys")
     if mode not in MODES:
         raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-        raise ValueError(f"a tolerance of {tolerance} is not a positive number")
+    if tolerance is not None and not 1.0 / LIMIT < tolerance < LIMIT:
+        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
     if budget is not None and budget < 2:
         raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")
 
@@ -91,6 +89,8 @@ def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
     finite = (np.abs(numbers) < LIMIT).all(axis=1)
     if not finite.all():
         raise ValueError(f"{whose}sample {int(np.argmin(finite))} is not finite, or has a number beyond {LIMIT:g}")
+    if not (turns := poses.quaternions.any(axis=1)).all():
+        raise ValueError(f"{whose}sample {int(np.argmin(turns))} has a quaternion of length zero")
     if poses.scales is not None and not (sound := (poses.scales > 1.0 / LIMIT) & (poses.scales < LIMIT)).all():
         raise ValueError(f"{whose}sample {int(np.argmin(sound))} has a scale that is not a positive number")
     if np.any(early := np.diff(times) <= SHORTEST):

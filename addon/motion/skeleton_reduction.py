@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .key_search import Keys, Recording, Search
 from .measures import shell_error
 from .modes import interpolate
-from .poses import PackedPoses, Poses, inverse, placed
+from .poses import LIMIT, PackedPoses, Poses, inverse, placed
 from .quaternions import align_signs, normalise
 from .reduction import check_recording, check_wishes
 from .skeletons import Skeleton
@@ -104,17 +104,17 @@ def reduce_skeleton_keys(
     free = ~np.broadcast_to(np.asarray(False if fixed is None else fixed, dtype=bool), (len(skeleton),))
     if not np.any(weights > 0.0):
         raise ValueError("every joint has a weight of 0: nothing would matter")
+    if budget is not None and not shared and budget < 2 * np.count_nonzero(free):
+        raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
+    if len(times) <= 1:
+        return (np.arange(len(times)),) * len(skeleton)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = _Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
         keys = body.key_poses(tolerance, budget, tries)
         every = np.arange(len(times))
         return tuple(keys if moves else every for moves in free.tolist())
-    if tolerance is not None:
-        return body.own_keys(tolerance)
-    if budget < 2 * np.count_nonzero(free):
-        raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
-    return body.own_keys_within(budget)
+    return body.own_keys(tolerance) if tolerance is not None else body.own_keys_within(budget)
 
 
 class _Body:
@@ -132,7 +132,10 @@ class _Body:
     ) -> None:
         self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
         self.radii, self.weights, self.free = radii, weights, free
-        self.truth = skeleton.in_root_space(poses)
+        with np.errstate(over="ignore", invalid="ignore"):
+            self.truth = skeleton.in_root_space(poses)
+        for joint in range(len(skeleton)):
+            check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
 
     def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown."""
@@ -188,7 +191,8 @@ class _Body:
         found = np.empty(self.poses.shape)
         for joint, below in enumerate(self.skeleton.below):
             away = self.truth.positions[below] - self.truth.positions[joint]
-            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + self.radii[below, None]).max(axis=0)
+            balls = self.radii[below, None] * (1.0 if self.truth.scales is None else self.truth.scales[below])
+            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls).max(axis=0)
         return found
 
 
@@ -230,8 +234,6 @@ class _OwnKeys:
         self.keys = [body.middles[[joint]] if free else every for joint, free in enumerate(body.free.tolist())]
 
     def found(self) -> tuple[np.ndarray, ...]:
-        if len(self.body.times) <= 2:
-            return tuple(np.arange(len(self.body.times)) for _ in self.keys)
         self._share_out()
         for joints in self.body.skeleton.levels:
             self._take_out(joints)
@@ -306,18 +308,35 @@ class _OwnKeys:
 
     def _prove(self) -> None:
         """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
-        ends = (0, len(self.body.times) - 1)
-        while (errors := self.body.errors(self.shown)).max() > self.tolerance:
-            joint, sample = np.unravel_index(np.argmax(errors), errors.shape)
-            chain = []
-            while joint >= 0:
-                chain.append(int(joint))
-                joint = self.body.skeleton.parents[joint]
-            off = [joint for joint in chain if self.body.free[joint] and sample not in self.keys[joint]]
-            if not off:
-                return  # By rounding.
-            for joint in off:
-                self._show(joint, np.union1d(self.keys[joint], (*ends, sample)))
+        allowed, many = self.tolerance * (1.0 + 1e-9), 1
+        while True:
+            errors = self.body.errors(self.shown)
+            errors[self._keyed()] = 0.0  # Whatever is left there is rounding, and may be more than a tiny tolerance.
+            worst = np.argsort(-errors, axis=None)[:many]
+            worst = worst[errors.flat[worst] > allowed]
+            if not len(worst):
+                return
+            self._put_back(worst)
+            many *= 2
+
+    def _keyed(self) -> np.ndarray:
+        """Where joints and all that they hang on have keys, shape (joints, n)."""
+        keyed = np.zeros(self.body.poses.shape, dtype=bool)
+        for joint, keys in enumerate(self.keys):
+            keyed[joint, keys] = True
+        for joints in self.body.skeleton.levels[1:]:
+            keyed[joints] &= keyed[self.body.skeleton.parents[joints]]
+        return keyed
+
+    def _put_back(self, numbers: np.ndarray) -> None:
+        """Keys at these of all joints' samples (joints * n,), also for what the joints hang on."""
+        wanted = np.zeros(self.body.poses.shape, dtype=bool)
+        wanted.flat[numbers] = True
+        for joints in self.body.skeleton.levels[:0:-1]:
+            np.logical_or.at(wanted, self.body.skeleton.parents[joints], wanted[joints])
+        for joint in np.flatnonzero(wanted.any(axis=1) & self.body.free).tolist():
+            ends = (0, len(self.body.times) - 1)
+            self._show(joint, np.union1d(self.keys[joint], (*ends, *np.flatnonzero(wanted[joint]))))
 
 
 class _Level(Recording):
@@ -396,13 +415,13 @@ def _moves(poses: Poses) -> np.ndarray:
 
 
 def _one_for_each(numbers: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
-    """A number for each joint or sample, or one for all: finite and not below zero."""
+    """A number for each joint or sample, or one for all: no damage and not below zero."""
     numbers = np.asarray(numbers, dtype=np.float64)
     if numbers.shape not in ((), *shapes):
         wanted = " or ".join(map(str, shapes))
         raise ValueError(f"{name} of shape {numbers.shape}: give one number, or an array of shape {wanted}")
     numbers = np.broadcast_to(numbers, shapes[0]) if numbers.ndim == 0 else numbers
-    if not (valid := np.isfinite(numbers) & (numbers >= 0.0)).all():
+    if not (valid := (numbers >= 0.0) & (numbers < LIMIT)).all():
         joint = np.argwhere(~valid)[0]
         raise ValueError(f"joint {joint[0]} has a {name} of {numbers[tuple(joint)]}")
     return numbers

@@ -49,7 +49,8 @@ class Skeleton:
                 return depths
             depths += above >= 0
             above = np.where(above >= 0, self.parents[above], -1)
-        raise ValueError(f"joint {int(np.argmax(above >= 0))} hangs on itself, through its parents")
+        # So far up there is nothing but the circle.
+        raise ValueError(f"joint {int(above[above >= 0].min())} hangs on itself, through its parents")
 
     @cached_property
     def levels(self) -> list[np.ndarray]:

@@ -1,0 +1,104 @@
+"""Skeletons, against matrices multiplied up each joint's own chain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from addon.motion import Poses, Skeleton
+from addon.motion.poses import inverse, placed
+from tests.motion.bodies import in_root_space, matrices, random_parents
+from tests.motion.cases import random_quaternions
+from tests.thoroughness import tried
+
+
+def some_poses(seed: int, *shape: int, scaled: bool) -> Poses:
+    random = np.random.default_rng(seed)
+    scales = np.exp(random.normal(scale=0.5, size=shape)) if scaled else None
+    return Poses(random.normal(size=(*shape, 3)), random_quaternions(random, *shape), scales)
+
+
+@settings(max_examples=tried(80))
+@given(st.integers(1, 14), st.integers(0, 2**16), st.booleans())
+def test_joints_get_where_matrices_take_them(joints, seed, scaled):
+    parents = random_parents(np.random.default_rng(seed), joints)
+    poses = some_poses(seed, joints, 7, scaled=scaled)
+    there = matrices(Skeleton(parents).in_root_space(poses))
+    expected = in_root_space(poses, parents)
+    assert np.abs(there - expected).max() <= 1e-13 * max(1.0, np.abs(expected).max())
+
+
+def test_the_poses_that_are_given_stay_as_they_are():
+    poses = some_poses(1, 5, 4, scaled=True)
+    before = poses.positions.copy(), poses.quaternions.copy(), poses.scales.copy()
+    Skeleton([3, -1, 1, 1, 0]).in_root_space(poses)
+    for now, then in zip((poses.positions, poses.quaternions, poses.scales), before, strict=True):
+        assert np.array_equal(now, then)
+
+
+@settings(max_examples=tried(60))
+@given(st.integers(1, 14), st.integers(0, 2**16))
+def test_depths_levels_and_what_hangs_below_are_those_of_the_chains(joints, seed):
+    parents = random_parents(np.random.default_rng(seed), joints)
+    chains = []
+    for joint in range(joints):
+        chain = [joint]
+        while parents[chain[-1]] >= 0:
+            chain.append(int(parents[chain[-1]]))
+        chains.append(chain)
+    skeleton = Skeleton(parents)
+    assert len(skeleton) == joints
+    assert skeleton.depths.tolist() == [len(chain) - 1 for chain in chains]
+    assert [sorted(below.tolist()) for below in skeleton.below] == [
+        [other for other in range(joints) if joint in chains[other]] for joint in range(joints)
+    ]
+    assert np.concatenate(skeleton.levels).size == joints
+    for depth, level in enumerate(skeleton.levels):
+        assert np.all(skeleton.depths[level] == depth)
+
+
+@pytest.mark.parametrize(
+    ("parents", "message"),
+    [
+        ([0], "joint 0 hangs on itself"),
+        ([-1, 2, 1], "joint 1 hangs on itself"),
+        ([1, 2, 3, 1], "joint 1 hangs on itself"),
+        ([4, 4, -1, 2, 3, 6, 7, 6], "joint 6 hangs on itself"),
+        ([-1, 2], "joint 1 has the parent 2: there are joints 0 to 1"),
+        ([-1, -2, 0], "joint 1 has the parent -2: there are joints 0 to 2"),
+        ([], "whole numbers, one for each joint"),
+        ([[-1, 0]], "whole numbers, one for each joint"),
+        (-1, "whole numbers, one for each joint"),
+        ([-1.0, 0.0], "whole numbers, one for each joint"),
+        ([None, 0], "whole numbers, one for each joint"),
+    ],
+)
+def test_parents_that_are_none_are_named(parents, message):
+    with pytest.raises(ValueError, match=message):
+        Skeleton(parents)
+
+
+def test_no_innocent_joint_is_blamed_for_a_circle():
+    random = np.random.default_rng(2)
+    for _ in range(50):
+        parents = random_parents(random, 12)
+        on_circle = random.choice(12, size=int(random.integers(1, 5)), replace=False)
+        parents[on_circle] = np.roll(on_circle, 1)
+        with pytest.raises(ValueError, match="hangs on itself") as error:
+            Skeleton(parents)
+        assert int(str(error.value).split()[1]) in on_circle
+
+
+@pytest.mark.parametrize("above_scaled", [False, True])
+@pytest.mark.parametrize("scaled", [False, True])
+def test_a_pose_in_the_space_of_another_is_the_product_of_matrices(above_scaled, scaled):
+    above, poses = some_poses(3, 40, scaled=above_scaled), some_poses(4, 40, scaled=scaled)
+    assert np.abs(matrices(placed(above, poses)) - matrices(above) @ matrices(poses)).max() < 1e-13
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_an_inverse_is_that_of_the_matrix(scaled):
+    poses = some_poses(5, 40, scaled=scaled)
+    assert np.abs(matrices(inverse(poses)) - np.linalg.inv(matrices(poses))).max() < 1e-12
