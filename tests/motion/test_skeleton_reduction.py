@@ -55,7 +55,7 @@ def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, 
 @settings(max_examples=tried(40))
 @given(st.integers(4, 10), st.integers(0, 2**16), st.sampled_from((0.003, 0.03, 0.3)), st.sampled_from(tuple(MODES)))
 def test_keys_of_their_own_are_no_more_than_key_poses(joints, seed, tolerance, mode):
-    """In 260 bodies only five of one or two joints had more, by up to four keys; a longer search is for key poses."""
+    """In 260 bodies four had more, of one or two joints, by up to four keys: key poses are searched for longer."""
     times, poses, parents = wandering_body(60, joints, seed)
     own, shared = (
         reduce_skeleton_keys(times, poses, parents, mode, tolerance=tolerance, shared=shared)
