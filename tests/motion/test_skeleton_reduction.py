@@ -1,0 +1,348 @@
+"""Key reduction of whole bodies: what it promises, recomputed by matrices down the chains and singular values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from addon.motion import MODES, Poses, reduce_skeleton_keys
+from addon.motion.quaternions import conjugate, multiply, rotate
+from scripts.trajectories import bvh
+from tests.motion.bodies import body_errors, in_root_space, wandering_body
+from tests.motion.cases import random_quaternions
+from tests.recordings import RECORDINGS
+from tests.thoroughness import tried
+
+TWO_WAYS = pytest.mark.parametrize("shared", [False, True])
+
+
+def check_keys(keys: tuple[np.ndarray, ...], joints: int, count: int, shared: bool) -> None:
+    assert len(keys) == joints
+    for own in keys:
+        assert np.all(np.diff(own) > 0)
+        assert (own[0], own[-1]) == (0, count - 1) or (len(own) == 1 and not shared and 0 <= own[0] < count)
+    assert not shared or all(np.array_equal(own, keys[0]) for own in keys)
+
+
+def rounding(poses: Poses, parents: np.ndarray) -> float:
+    return 1e-13 * max(1.0, float(np.abs(in_root_space(poses, parents)).max()))
+
+
+@settings(max_examples=tried(120))
+@given(
+    st.integers(1, 120),
+    st.integers(1, 12),
+    st.integers(0, 2**16),
+    st.booleans(),
+    st.booleans(),
+    st.sampled_from((1e-5, 1e-3, 0.02, 0.3)),
+    st.sampled_from(tuple(MODES)),
+)
+def test_every_joint_stays_within_the_tolerance_everywhere(count, joints, seed, scaled, shared, tolerance, mode):
+    random = np.random.default_rng(seed)
+    times, poses, parents = wandering_body(count, joints, seed, scaled=scaled, noise=(0.0, 1e-3)[seed % 2])
+    radii, weights = random.choice((0.0, 0.03, 0.5), joints), random.choice((0.0, 0.5, 1.0, 2.0), joints)
+    weights[random.integers(joints)] = 1.0
+    options = {"tolerance": tolerance, "radius": radii, "weights": weights, "shared": shared}
+    keys = reduce_skeleton_keys(times, poses, parents, mode, **options)
+    check_keys(keys, joints, count, shared)
+    errors = weights[:, None] * body_errors(times, poses, parents, keys, mode, radii)
+    assert errors.max() <= tolerance * (1.0 + 1e-9) + rounding(poses, parents)
+
+
+@settings(max_examples=tried(40))
+@given(st.integers(4, 10), st.integers(0, 2**16), st.sampled_from((0.003, 0.03, 0.3)), st.sampled_from(tuple(MODES)))
+def test_keys_of_their_own_are_no_more_than_key_poses(joints, seed, tolerance, mode):
+    """In 260 bodies four had more, of one or two joints, by up to four keys: key poses are searched for longer."""
+    times, poses, parents = wandering_body(60, joints, seed)
+    own, shared = (
+        reduce_skeleton_keys(times, poses, parents, mode, tolerance=tolerance, shared=shared)
+        for shared in (False, True)
+    )
+    assert sum(map(len, own)) <= sum(map(len, shared))
+
+
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+def test_keys_of_their_own_are_about_half_of_key_poses(mode):
+    """0.52 of them in the mean of 30 bodies."""
+    shares = []
+    for seed in range(6):
+        body = wandering_body(100, 8, seed)
+        own, shared = (reduce_skeleton_keys(*body, mode, tolerance=0.02, shared=shared) for shared in (False, True))
+        shares.append(sum(map(len, own)) / sum(map(len, shared)))
+    assert np.mean(shares) < 0.65
+
+
+@TWO_WAYS
+def test_a_joint_of_weight_two_keeps_to_half_the_tolerance(shared):
+    strict = 0
+    for seed in range(5):
+        times, poses, parents = wandering_body(80, 5, seed, resting=0.0)
+        for joint in range(5):
+            weights = np.where(np.arange(5) == joint, 2.0, 1.0)
+            options = {"tolerance": 0.02, "shared": shared}
+            keys = reduce_skeleton_keys(times, poses, parents, weights=weights, **options)
+            errors = body_errors(times, poses, parents, keys, "motor_spline", np.full(5, 0.03)).max(axis=1)
+            assert errors[joint] <= 0.01 * (1.0 + 1e-9)
+            assert errors.max() <= 0.02 * (1.0 + 1e-9)
+            plain = reduce_skeleton_keys(times, poses, parents, **options)
+            strict += (
+                body_errors(times, poses, parents, plain, "motor_spline", np.full(5, 0.03)).max(axis=1)[joint] > 0.01
+            )
+    assert strict > 12
+
+
+def test_joints_of_weight_zero_have_no_keys_for_themselves():
+    times, poses, _ = wandering_body(80, 4, 3, resting=0.0)
+    keys = reduce_skeleton_keys(times, poses, [-1, 0, 1, 0], tolerance=1e-3, weights=[1.0, 0.0, 0.0, 1.0])
+    assert [len(own) == 1 for own in keys] == [False, True, True, False]
+    # What matters hangs on what does not, so that has to be right as well.
+    keys = reduce_skeleton_keys(times, poses, [-1, 0, 1, 2], tolerance=1e-3, weights=[0.0, 0.0, 0.0, 1.0])
+    assert all(len(own) > 2 for own in keys)
+
+
+@settings(max_examples=tried(40))
+@given(st.integers(2, 90), st.integers(1, 6), st.integers(0, 2**16), st.integers(0, 120), st.sampled_from(tuple(MODES)))
+def test_a_budget_is_kept(count, joints, seed, more, mode):
+    body = wandering_body(count, joints, seed)
+    own = reduce_skeleton_keys(*body, mode, budget=2 * joints + more)
+    check_keys(own, joints, count, False)
+    assert sum(map(len, own)) <= 2 * joints + more
+    shared = reduce_skeleton_keys(*body, mode, budget=2 + more, shared=True)
+    check_keys(shared, joints, count, True)
+    assert len(shared[0]) == min(2 + more, count)
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+def test_a_larger_budget_buys_a_smaller_error(mode, shared):
+    for seed in range(2):
+        times, poses, parents = wandering_body(40, 3, seed)
+        budgets = (3, 7, 15, 30) if shared else (6, 14, 30, 70)
+        errors = [
+            body_errors(
+                *(times, poses, parents),
+                reduce_skeleton_keys(times, poses, parents, mode, budget=budget, shared=shared),
+                *(mode, np.full(3, 0.03)),
+            ).max()
+            for budget in budgets
+        ]
+        assert errors == sorted(errors, reverse=True)
+        assert errors[-1] < 0.2 * errors[0]
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_how_the_whole_body_stands_does_not_matter(seed, mode, shared):
+    random = np.random.default_rng(seed)
+    times, poses, parents = wandering_body(80, 6, seed)
+    turn, shift, roots = random_quaternions(random), random.normal(size=3), parents < 0
+    positions, quaternions = poses.positions.copy(), poses.quaternions.copy()
+    positions[roots] = rotate(turn, positions[roots]) + shift
+    quaternions[roots] = multiply(turn, quaternions[roots])
+    here, there = (
+        reduce_skeleton_keys(times, some, parents, mode, tolerance=0.02, shared=shared)
+        for some in (poses, Poses(positions, quaternions))
+    )
+    assert list(map(len, here)) == list(map(len, there))
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_how_the_axes_of_bones_lie_matters_little(seed, mode, shared):
+    """In 30 bodies key poses were as many, and keys of their own in all but three: up to four more or fewer."""
+    times, poses, parents = wandering_body(80, 6, seed)
+    turns = random_quaternions(np.random.default_rng(seed), 6)
+    on_joints = np.flatnonzero(parents >= 0)
+    back = conjugate(turns[parents[on_joints]])[:, None]
+    positions, quaternions = poses.positions.copy(), multiply(poses.quaternions, turns[:, None])
+    positions[on_joints] = rotate(back, positions[on_joints])
+    quaternions[on_joints] = multiply(back, quaternions[on_joints])
+    here, there = (
+        sum(map(len, reduce_skeleton_keys(times, some, parents, mode, tolerance=0.02, shared=shared)))
+        for some in (poses, Poses(positions, quaternions))
+    )
+    assert abs(here - there) <= 0.03 * here
+
+
+@TWO_WAYS
+def test_signs_of_quaternions_do_not_matter(shared):
+    times, poses, parents = wandering_body(80, 6, 4)
+    signs = np.random.default_rng(1).choice((-1.0, 1.0), (6, 80, 1))
+    here, there = (
+        reduce_skeleton_keys(times, Poses(poses.positions, some), parents, tolerance=0.02, shared=shared)
+        for some in (poses.quaternions, poses.quaternions * signs)
+    )
+    assert [own.tolist() for own in here] == [own.tolist() for own in there]
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("count", [1, 2, 3, 2000])
+def test_a_body_at_rest_has_one_key_each_or_two_key_poses(count, mode):
+    times, moving, parents = wandering_body(2, 5, 1, scaled=True)
+    poses = Poses(*(np.repeat(rows[:, :1], count, axis=1) for rows in (moving.positions, moving.quaternions)))
+    times = np.arange(float(count))
+    assert [len(own) for own in reduce_skeleton_keys(times, poses, parents, mode, tolerance=1e-9)] == [1] * 5
+    assert [len(own) for own in reduce_skeleton_keys(times, poses, parents, mode, budget=10)] == [1] * 5
+    shared = reduce_skeleton_keys(times, poses, parents, mode, tolerance=1e-9, shared=True)
+    assert [own.tolist() for own in shared] == [sorted({0, count - 1})] * 5
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("wanted", [{"tolerance": 1e-4}, {"budget": 10}])
+def test_few_samples_are_their_own_keys(wanted, shared):
+    times, poses, parents = wandering_body(40, 5, 2, resting=0.0)
+    for samples in (np.arange(0), np.arange(1), np.array((0, 39))):
+        keys = reduce_skeleton_keys(times[samples], poses[:, samples], parents, shared=shared, **wanted)
+        assert [own.tolist() for own in keys] == [list(range(len(samples)))] * 5
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("scaled", [False, True])
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline", "motor_spline_causal"])
+@pytest.mark.parametrize("tolerance", [1e-39, 1e-17, 1e-15])
+def test_a_tolerance_below_rounding_comes_to_an_end(tolerance, mode, scaled, shared):
+    times, poses, parents = wandering_body(30, 4, 5, scaled=scaled, resting=0.0, noise=1e-3)
+    keys = reduce_skeleton_keys(times, poses, parents, mode, tolerance=tolerance, shared=shared)
+    assert [len(own) for own in keys] == [30] * 4
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+def test_bodies_that_are_small_large_and_far_away_keep_to_the_tolerance(mode, scale, shared):
+    times, poses, parents = wandering_body(50, 5, 6, scaled=True)
+    roots = (parents < 0)[:, None]
+    scales = np.where(roots, scale, 1.0) * poses.scales
+    positions = np.where(roots[..., None], scale * poses.positions + 1e6, poses.positions)
+    poses, tolerance = Poses(positions, poses.quaternions, scales), 0.02 * scale
+    keys = reduce_skeleton_keys(times, poses, parents, mode, tolerance=tolerance, shared=shared)
+    errors = body_errors(times, poses, parents, keys, mode, np.full(5, 0.03))
+    assert 0.1 * tolerance < errors.max() <= tolerance * (1.0 + 1e-9) + rounding(poses, parents)
+    assert sum(map(len, keys)) < 200
+
+
+@TWO_WAYS
+@pytest.mark.parametrize("mode", MODES)
+def test_uneven_times_keep_to_the_tolerance(mode, shared):
+    _, poses, parents = wandering_body(60, 5, 7)
+    times = np.cumsum(10.0 ** np.random.default_rng(7).uniform(-4.0, 0.0, 60))
+    keys = reduce_skeleton_keys(times, poses, parents, mode, tolerance=0.02, shared=shared)
+    assert body_errors(times, poses, parents, keys, mode, np.full(5, 0.03)).max() <= 0.02 * (1.0 + 1e-9)
+
+
+@TWO_WAYS
+def test_turns_of_points_on_one_another_do_not_matter(shared):
+    times, poses, parents = wandering_body(60, 5, 8, resting=0.0)
+    turning = Poses(np.zeros_like(poses.positions), poses.quaternions)
+    keys = reduce_skeleton_keys(times, turning, parents, tolerance=1e-6, radius=0.0, shared=shared)
+    assert [len(own) for own in keys] == [2 if shared else 1] * 5
+
+
+TIMES, BODY, PARENTS = wandering_body(20, 3, 1, resting=0.0)
+CHAIN = [-1, 0, 1]
+
+
+@TWO_WAYS
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "either a tolerance or a budget"),
+        ({"tolerance": 0.1, "budget": 12}, "either a tolerance or a budget"),
+        ({"tolerance": 0.0}, "not a positive number"),
+        ({"tolerance": np.nan}, "not a positive number"),
+        ({"tolerance": np.inf}, "not a positive number"),
+        ({"tolerance": 1e-320}, "not a positive number"),
+        ({"budget": 1}, "a budget of 1 keys is too small"),
+        ({"tolerance": 0.1, "mode": "bezier"}, "no mode 'bezier'"),
+        ({"tolerance": 0.1, "radius": [0.1, -0.1, 0.1]}, "joint 1 has a radius of -0.1"),
+        ({"tolerance": 0.1, "radius": np.nan}, "joint 0 has a radius of nan"),
+        ({"tolerance": 0.1, "radius": [0.1, 0.1, 1e200]}, r"joint 2 has a radius of 1e\+200"),
+        ({"tolerance": 0.1, "radius": [0.1, 0.1]}, "radius: 2 numbers do not fit 3 joints"),
+        ({"tolerance": 0.1, "weights": [1.0, 1.0, -1.0]}, "joint 2 has a weight of -1"),
+        ({"tolerance": 0.1, "weights": [1.0, np.nan, 1.0]}, "joint 1 has a weight of nan"),
+        ({"tolerance": 0.1, "weights": [1.0] * 4}, "weight: 4 numbers do not fit 3 joints"),
+        ({"tolerance": 0.1, "weights": [0.0] * 3}, "every joint has a weight of 0"),
+        ({"tolerance": 0.1, "parents": [-1, 2, 1]}, "joint 1 hangs on itself"),
+        ({"tolerance": 0.1, "parents": [-1, 0]}, "do not fit 2 joints and 20 times"),
+        ({"tolerance": 0.1, "times": TIMES[:19]}, "do not fit 3 joints and 19 times"),
+        ({"tolerance": 0.1, "poses": BODY[0]}, "do not fit 3 joints and 20 times"),
+        ({"tolerance": 0.1, "times": TIMES[[*range(5), 4, *range(6, 20)]]}, "joint 0, sample 5 is not later"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(options, message, shared):
+    with pytest.raises(ValueError, match=message):
+        reduce_skeleton_keys(**{"times": TIMES, "poses": BODY, "parents": CHAIN, "shared": shared, **options})
+
+
+def test_a_budget_is_for_two_keys_of_each_joint():
+    with pytest.raises(ValueError, match="a budget of 5 keys is too small for 3 joints"):
+        reduce_skeleton_keys(TIMES, BODY, CHAIN, budget=5)
+
+
+@TWO_WAYS
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        ("positions", np.nan, "joint 2, sample 7 is not finite"),
+        ("quaternions", np.inf, "joint 2, sample 7 is not finite"),
+        ("quaternions", 0.0, "joint 2, sample 7 has a quaternion of length zero"),
+        ("scales", -1.0, "joint 2, sample 7 has a scale that is not a positive number"),
+    ],
+)
+def test_bad_samples_are_named_with_their_joint(part, value, message, shared):
+    parts = {"positions": BODY.positions.copy(), "quaternions": BODY.quaternions.copy(), "scales": np.ones((3, 20))}
+    parts[part][2, 7] = value
+    with pytest.raises(ValueError, match=message):
+        reduce_skeleton_keys(TIMES, Poses(**parts), CHAIN, tolerance=0.1, shared=shared)
+
+
+@TWO_WAYS
+def test_what_is_sound_by_itself_and_too_large_in_the_root_space_is_named(shared):
+    poses = Poses(BODY.positions, BODY.quaternions, np.full((3, 20), 1e30))
+    with pytest.raises(ValueError, match="joint 1, in the root's space, sample 0 "):
+        reduce_skeleton_keys(TIMES, poses, CHAIN, tolerance=0.1, shared=shared)
+
+
+BODIES = {
+    "beat_saber_body": RECORDINGS / "beat_saber_body.bvh",
+    "cmu_01_01": RECORDINGS.parent / "rigs" / "cmu_01_01.bvh",
+    "freebvh": RECORDINGS.parent / "rigs" / "freebvh.bvh",
+}
+
+
+def recorded_body(name: str, most: int = 80) -> tuple[np.ndarray, Poses, np.ndarray]:
+    """Times, joints in their parents' space and parents of a real body, 1.7 m tall, at a few of its samples."""
+    joints, motion = bvh._read_hierarchy(BODIES[name])
+    values, frame_time = bvh._read_motion(BODIES[name], motion, joints)
+    step = max(1, round(1.0 / 30.0 / frame_time))
+    samples = np.arange(0, len(values), step)[:most]
+    begins = np.cumsum([0, *(len(joint.channels) for joint in joints)])
+    own = [
+        bvh._placed(joint, values[samples, first:last], None)
+        for joint, first, last in zip(joints, begins[:-1], begins[1:], strict=True)
+    ]
+    parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
+    poses = Poses([joint.positions for joint in own], [joint.quaternions for joint in own])
+    spots = in_root_space(poses, parents)[..., :3, 3]
+    world = bvh.world_poses(joints, values[samples], [joint.name for joint in joints])
+    assert np.abs(spots - [there.positions for there in world.values()]).max() <= 1e-9 * np.abs(spots).max()
+    size = 1.7 / np.ptp(spots[:, 0, 1])
+    return frame_time * samples, Poses(size * poses.positions, poses.quaternions), parents
+
+
+@pytest.mark.recordings
+@TWO_WAYS
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+@pytest.mark.parametrize("name", BODIES)
+def test_real_bodies_keep_to_the_tolerance_with_fewer_keys(name, mode, shared):
+    times, poses, parents = recorded_body(name)
+    keys = reduce_skeleton_keys(times, poses, parents, mode, tolerance=0.01, radius=0.03, shared=shared)
+    check_keys(keys, len(parents), len(times), shared)
+    errors = body_errors(times, poses, parents, keys, mode, np.full(len(parents), 0.03))
+    assert errors.max() <= 0.01 * (1.0 + 1e-9)
+    assert sum(map(len, keys)) < len(parents) * len(times)
