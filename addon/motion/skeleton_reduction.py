@@ -100,10 +100,10 @@ def reduce_skeleton_keys(
         check_recording(times, poses[joint], f"joint {joint}, ")
     radii = _one_for_each(radius, "radius", (len(skeleton),))
     weights = _one_for_each(1.0 if weights is None else weights, "weight", (len(skeleton),), poses.shape)
-    weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
-    free = ~np.broadcast_to(np.asarray(False if fixed is None else fixed, dtype=bool), (len(skeleton),))
     if not np.any(weights > 0.0):
         raise ValueError("every joint has a weight of 0: nothing would matter")
+    weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
+    free = ~np.broadcast_to(np.asarray(False if fixed is None else fixed, dtype=bool), (len(skeleton),))
     if budget is not None and not shared and budget < 2 * np.count_nonzero(free):
         raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     if len(times) <= 1:

@@ -78,20 +78,40 @@ def test_keys_of_their_own_are_about_half_of_key_poses(mode):
 @TWO_WAYS
 def test_a_joint_of_weight_two_keeps_to_half_the_tolerance(shared):
     strict = 0
-    for seed in range(5):
+    for seed in range(2):
         times, poses, parents = wandering_body(80, 5, seed, resting=0.0)
+        options = {"tolerance": 0.02, "shared": shared}
+        plain = reduce_skeleton_keys(times, poses, parents, **options)
+        off = body_errors(times, poses, parents, plain, "motor_spline", np.full(5, 0.03)).max(axis=1)
+        strict += np.count_nonzero(off > 0.01)
         for joint in range(5):
             weights = np.where(np.arange(5) == joint, 2.0, 1.0)
-            options = {"tolerance": 0.02, "shared": shared}
             keys = reduce_skeleton_keys(times, poses, parents, weights=weights, **options)
             errors = body_errors(times, poses, parents, keys, "motor_spline", np.full(5, 0.03)).max(axis=1)
             assert errors[joint] <= 0.01 * (1.0 + 1e-9)
             assert errors.max() <= 0.02 * (1.0 + 1e-9)
-            plain = reduce_skeleton_keys(times, poses, parents, **options)
-            strict += (
-                body_errors(times, poses, parents, plain, "motor_spline", np.full(5, 0.03)).max(axis=1)[joint] > 0.01
-            )
-    assert strict > 12
+    assert strict > 4
+
+
+@TWO_WAYS
+def test_weights_may_change_with_time(shared):
+    times, poses, parents = wandering_body(80, 4, 1, resting=0.0)
+    weights = np.ones((4, 80))
+    weights[2, 20:50] = 5.0
+    keys = reduce_skeleton_keys(times, poses, parents, tolerance=0.02, shared=shared, weights=weights)
+    errors = body_errors(times, poses, parents, keys, "motor_spline", np.full(4, 0.03))
+    assert (errors * weights).max() <= 0.02 * (1.0 + 1e-9)
+    assert errors[2, 50:].max() > 0.004
+
+
+@TWO_WAYS
+def test_joints_that_are_fixed_keep_all_samples_and_what_hangs_on_them_is_within_the_tolerance(shared):
+    times, poses, parents = wandering_body(80, 6, 2, resting=0.0)
+    fixed = np.array((False, True, False, True, False, False))
+    keys = reduce_skeleton_keys(times, poses, parents, tolerance=0.02, shared=shared, fixed=fixed)
+    assert [len(own) == 80 for own in keys] == fixed.tolist()
+    errors = body_errors(times, poses, parents, keys, "motor_spline", np.full(6, 0.03))
+    assert errors.max() <= 0.02 * (1.0 + 1e-9)
 
 
 def test_joints_of_weight_zero_have_no_keys_for_themselves():
@@ -181,7 +201,7 @@ def test_signs_of_quaternions_do_not_matter(shared):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("count", [1, 2, 3, 2000])
+@pytest.mark.parametrize("count", [1, 2, 3, 500])
 def test_a_body_at_rest_has_one_key_each_or_two_key_poses(count, mode):
     times, moving, parents = wandering_body(2, 5, 1, scaled=True)
     poses = Poses(*(np.repeat(rows[:, :1], count, axis=1) for rows in (moving.positions, moving.quaternions)))
@@ -262,10 +282,10 @@ CHAIN = [-1, 0, 1]
         ({"tolerance": 0.1, "radius": [0.1, -0.1, 0.1]}, "joint 1 has a radius of -0.1"),
         ({"tolerance": 0.1, "radius": np.nan}, "joint 0 has a radius of nan"),
         ({"tolerance": 0.1, "radius": [0.1, 0.1, 1e200]}, r"joint 2 has a radius of 1e\+200"),
-        ({"tolerance": 0.1, "radius": [0.1, 0.1]}, "radius: 2 numbers do not fit 3 joints"),
+        ({"tolerance": 0.1, "radius": [0.1, 0.1]}, r"radius of shape \(2,\)"),
         ({"tolerance": 0.1, "weights": [1.0, 1.0, -1.0]}, "joint 2 has a weight of -1"),
         ({"tolerance": 0.1, "weights": [1.0, np.nan, 1.0]}, "joint 1 has a weight of nan"),
-        ({"tolerance": 0.1, "weights": [1.0] * 4}, "weight: 4 numbers do not fit 3 joints"),
+        ({"tolerance": 0.1, "weights": [1.0] * 4}, r"weight of shape \(4,\)"),
         ({"tolerance": 0.1, "weights": [0.0] * 3}, "every joint has a weight of 0"),
         ({"tolerance": 0.1, "parents": [-1, 2, 1]}, "joint 1 hangs on itself"),
         ({"tolerance": 0.1, "parents": [-1, 0]}, "do not fit 2 joints and 20 times"),

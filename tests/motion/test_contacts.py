@@ -1,0 +1,66 @@
+"""Which joints stand on the ground, and how far they slide, on motions where that is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.motion.contacts import slide, standing
+
+TIMES = np.arange(90) / 30.0
+HEIGHTS = np.array((1.7, 1.0, 0.05))
+
+
+def body(foot: np.ndarray) -> np.ndarray:
+    """A head and a hip that go forwards, and a foot (n, 3) that does as it is told."""
+    forwards = np.stack((0.8 * TIMES, 0.0 * TIMES, 0.0 * TIMES), axis=1)
+    head, hip = (forwards + np.array((0.0, 0.0, height)) for height in HEIGHTS[:2])
+    return np.stack((head, hip, foot))
+
+
+def stepping(stands: np.ndarray, drift: float = 0.0) -> np.ndarray:
+    """A foot that goes forwards at 2 m/s, but where it stands, where it drifts."""
+    ways = np.where(stands, drift / 30.0, 2.0 / 30.0)
+    return np.stack((np.cumsum(ways), 0.0 * ways, np.full(len(ways), HEIGHTS[2])), axis=1)
+
+
+def test_a_foot_that_stops_stands_and_nothing_else_does():
+    stops = (TIMES > 0.5) & (TIMES < 1.5)
+    stands = standing(TIMES, body(stepping(stops)))
+    assert not stands[:2].any()
+    assert np.all(stands[2] <= stops)
+    assert np.count_nonzero(stands[2]) >= np.count_nonzero(stops) - 2
+
+
+@pytest.mark.parametrize(("drift", "does"), [(0.05, True), (0.2, False)])
+def test_what_slides_slowly_still_stands(drift, does):
+    assert standing(TIMES, body(stepping(np.full(90, True), drift)))[2].any() == does
+
+
+def test_a_hand_that_is_held_still_does_not_stand():
+    still = np.tile((0.0, 0.0, 0.9), (90, 1))
+    positions = np.concatenate((body(stepping(np.full(90, False))), still[None]))
+    assert not standing(TIMES, positions)[3].any()
+
+
+def test_what_only_turns_back_does_not_stand():
+    foot = stepping(np.full(90, False))
+    foot[:, 0] = np.sin(8.0 * TIMES)
+    assert not standing(TIMES, body(foot))[2].any()
+
+
+def test_a_body_of_another_size_stands_as_long():
+    positions = body(stepping(TIMES > 1.0, 0.03))
+    assert np.array_equal(standing(TIMES, positions), standing(TIMES, 100.0 * positions))
+
+
+def test_one_sample_is_no_standing():
+    assert not standing(TIMES[:1], body(stepping(np.full(90, True)))[:, :1]).any()
+
+
+def test_the_slide_is_the_farthest_from_where_it_stood_at_first():
+    positions = body(stepping(TIMES > 1.0, 0.03))
+    stands = np.zeros((3, 90), dtype=bool)
+    stands[2, 40:71] = True
+    assert slide(positions, stands) == pytest.approx(0.03)
+    assert slide(positions, np.zeros_like(stands)) == 0.0
