@@ -6,13 +6,13 @@
 
 Every recording is imported as Blender's users do, with a key of location and rotation on every frame. *Reduce Keys to
 Poses* keeps the shell error on every frame within `--tolerance`: the largest displacement of any point in a ball of
-`--radius`. Decimate takes each channel for itself
-and shapes the curve between its keys by free handles. So there are three ways to ask it for the same: *as many keys* in
-each channel; keys on *as many frames*, which is how many poses an animator has to look after; and *as good*, the fewest
-keys that have no larger shell error, found by trying error margins. All errors are measured on what Blender shows, on
-every frame. The numbers that it all comes to are 6 for a key with free handles (frame, value, two handles of two), and
-for a pose its frame and a value in each channel, since straight keys need no handles. What the modes fill in between
-poses is in the file besides, on every frame, but made anew from the keys: it is not counted.
+`--radius`. Decimate takes each channel for itself and shapes the curve between its keys by free handles. So there are
+three ways to ask it for the same: *as many keys* in each channel; keys on *as many frames*, which is how many poses an
+animator has to look after; and *as good*, the fewest keys that have no larger shell error, found by trying error
+margins. All errors are measured on what Blender shows, on every frame. The numbers that it all comes to are 6 for a key
+with free handles (frame, value, two handles of two), and for a pose its frame and a value in each channel, since
+straight keys need no handles. What the modes fill in between poses is in the file besides, on every frame, but made
+anew from the keys: it is not counted.
 """
 
 from __future__ import annotations

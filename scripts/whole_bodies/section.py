@@ -12,7 +12,7 @@ from addon.motion import Poses
 
 from . import against_decimate, against_greedy, against_published, feet, timing
 from .bodies import RADIUS, Body, repeated
-from .rigs import MOST_FRAMES, VARIES, import_rig
+from .rigs import MOST_FRAMES, VARIES, UnusableRigError, import_rig
 
 TOLERANCE = 0.01
 """Metres, of every joint's ball."""
@@ -37,15 +37,21 @@ def section(paths: list[Path], recordings: list[tuple[str, float, Poses]]) -> It
     """All that is measured of the bodies in files; of single recordings (names, frames a second, poses), the time."""
     _say("bodies ...")
     found: dict[str, Body] = {}
-    decimated = []
+    decimated, left_out = [], []
     for path in paths:
         _say(f"{path.name}, Decimate ...")
-        rig = import_rig(path)
+        try:
+            rig = import_rig(path)
+        except UnusableRigError as error:
+            left_out.append(str(error))
+            continue
         body = rig.body()
         found[body.name] = body
         decimated.append((body, against_decimate.measure(rig, body.of_size(HEIGHT), MODE, TOLERANCE)))
     bodies = [body.of_size(HEIGHT) for body in found.values()]
-    yield from _bodies(list(found.values()))
+    yield from _bodies(list(found.values()), left_out)
+    if not bodies:
+        return
     yield from _greedy(bodies)
     yield from _decimate(decimated)
     yield from _ozz(found)
@@ -54,7 +60,7 @@ def section(paths: list[Path], recordings: list[tuple[str, float, Poses]]) -> It
     yield from _timing(paths, found, recordings)
 
 
-def _bodies(bodies: list[Body]) -> Iterator[str]:
+def _bodies(bodies: list[Body], left_out: list[str]) -> Iterator[str]:
     yield "## Whole bodies"
     yield ""
     yield from _paragraph(f"""
@@ -69,6 +75,8 @@ is that of every joint with all that it hangs on, the largest displacement of an
     for body in bodies:
         yield f"| {body.name} | {len(body.joints)} | {body.frames} | {body.rate:.0f} | {body.extent:.4g} |"
     yield ""
+    for why in left_out:
+        yield from _paragraph(f"Left out: {why}.")
 
 
 def _greedy(bodies: list[Body]) -> Iterator[str]:
@@ -76,9 +84,10 @@ def _greedy(bodies: list[Body]) -> Iterator[str]:
     yield ""
     yield from _paragraph(f"""
 All joints have keys on the same frames. *Greedy* puts in one key at a time, on the frame that is off most, until none
-is by too much; then every key in turn is taken out that can be. The *optimum* is the fewest there can be, where what is
-between two keys depends on no others: found by a dynamic programme that tries every pair of frames. The goal is at most
-{against_greedy.GOAL:g} of the greedy keys. Where the optimum is above that, nothing could meet it.
+is by too much; then every key in turn is taken out that can be. The *optimum* is the fewest there can be, by a dynamic
+programme that tries every frame as the next key; where what is between two keys depends on two more, it is found for at
+most {against_greedy.SHORT} frames. The goal is at most {against_greedy.GOAL:g} of the greedy keys. Where the optimum
+is above that, no choice of keys could meet it.
 """)
     _say("greedy insertion ...")
     yield from against_greedy.report(bodies, TOLERANCE)

@@ -14,6 +14,7 @@ from scripts import reduction
 from scripts.whole_bodies import against_decimate, against_greedy, against_published, feet, rigs, timing
 from scripts.whole_bodies import section as page
 from scripts.whole_bodies.bodies import Body, repeated
+from scripts.whole_bodies.optimum import optimum, optimum_of_four
 
 # Blender's BVH importer leaves closing the file to Python.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -94,8 +95,11 @@ def test_a_file_without_an_armature_is_refused(tmp_path):
         rigs.import_rig(path)
 
 
-@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp"])
-def test_the_optimum_is_the_fewest_of_all_choices(body, mode):
+@pytest.mark.parametrize(
+    ("mode", "programme"),
+    [("lerp_slerp", optimum), ("dq_sclerp", optimum), ("motor_spline", optimum_of_four)],
+)
+def test_the_optimum_is_the_fewest_of_all_choices(body, mode, programme):
     few = Body(body.name, body.rate, body.joints, body.parents, body.poses[:, 4:15], body.moving, body.turning)
     tolerance = 0.03
 
@@ -107,14 +111,16 @@ def test_the_optimum_is_the_fewest_of_all_choices(body, mode):
                     return len(keys)
         return few.frames
 
-    best = against_greedy.optimum(few, mode, tolerance)
-    assert best == fewest() > 2
+    best = programme(few, mode, tolerance)
+    assert best == fewest()
     assert best <= len(against_greedy.greedy(few, mode, tolerance))
 
 
-def test_there_is_no_simple_optimum_where_keys_further_away_matter(body):
+def test_each_optimum_is_of_modes_that_depend_on_as_many_keys(body):
     with pytest.raises(ValueError, match="depends on others"):
-        against_greedy.optimum(body, "motor_spline", TOLERANCE)
+        optimum(body, "motor_spline", TOLERANCE)
+    with pytest.raises(ValueError, match="does not depend on four"):
+        optimum_of_four(body, "lerp_slerp", TOLERANCE)
 
 
 def test_greedy_keys_keep_to_the_tolerance_and_none_can_go(body):
@@ -174,6 +180,7 @@ def test_the_page_has_a_section_of_bodies(tmp_path, monkeypatch):
     monkeypatch.setattr(page, "CYCLE", "leg")
     monkeypatch.setattr(page, "CYCLE_FRAMES", 12)
     monkeypatch.setattr(page, "LONG", "leg")
+    monkeypatch.setattr(against_greedy, "SHORT", 0)
     monkeypatch.setattr(against_decimate, "TRIALS", 4)
     monkeypatch.setattr(timing, "RUNS", 1)
     monkeypatch.setattr(against_published, "OZZ_BODY", "leg")
