@@ -7,7 +7,8 @@ Each way starts from the keys (positions and quaternions) and ends with position
 round by round, so that a machine that slows down slows all of them; a figure is a way's fastest round, and what counts
 are the ratios. "In the algebra" is the mode written out in NumPy as in the paper, for every in-between anew (this
 program's own reference); "closed form" is the best formula known to this program without a table of segments.
-Key reduction is timed on recordings of growing length, beside the greedy insertion that one would write first.
+Key reduction is timed on made-up recordings of growing length, beside the greedy insertion that one would write first;
+real recordings and whole bodies are timed by `scripts/reduction.py`.
 Needs the packages of the "test" extra; pypose (its SE(3) B-spline) is measured where it is installed.
 """
 

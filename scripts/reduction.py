@@ -1,17 +1,18 @@
 """What Reduce Keys to Poses leaves of recordings, beside Blender's own Decimate of the Graph Editor.
 
     python scripts/reduction.py
-    python scripts/reduction.py --recordings FOLDER
+    python scripts/reduction.py --recordings FOLDER --bodies FOLDER_OR_FILES
     python scripts/reduction.py --output docs/reduction.md
 
 Every recording is imported as Blender's users do, with a key of location and rotation on every frame. *Reduce Keys to
-Poses* keeps the shell error (`--radius`) on every frame within `--tolerance`. Decimate takes each channel for itself
-and shapes the curve between its keys by free handles. So there are three ways to ask it for the same: *as many keys* in
-each channel; keys on *as many frames*, which is how many poses an animator has to look after; and *as good*, the fewest
-keys that have no larger shell error, found by trying error margins. All errors are measured on what Blender shows, on
-every frame. The numbers that it all comes to are 6 for a key with free handles (frame, value, two handles of two), and
-for a pose its frame and a value in each channel, since straight keys need no handles. What the modes fill in between
-poses is in the file besides, on every frame, but made anew from the keys: it is not counted.
+Poses* keeps the shell error on every frame within `--tolerance`: the largest displacement of any point in a ball of
+`--radius`. Decimate takes each channel for itself and shapes the curve between its keys by free handles. So there are
+three ways to ask it for the same: *as many keys* in each channel; keys on *as many frames*, which is how many poses an
+animator has to look after; and *as good*, the fewest keys that have no larger shell error, found by trying error
+margins. All errors are measured on what Blender shows, on every frame. The numbers that it all comes to are 6 for a key
+with free handles (frame, value, two handles of two), and for a pose its frame and a value in each channel, since
+straight keys need no handles. What the modes fill in between poses is in the file besides, on every frame, but made
+anew from the keys: it is not counted.
 """
 
 from __future__ import annotations
@@ -30,9 +31,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from addon import animation
 from addon.motion import Poses, interpolate, repair, shell_error
 from addon.motion.measures import rms
+from scripts.graph_decimate import decimate
 from scripts.publishing import opening, publish
 from scripts.trajectories import TrajectoryError, read_trajectories
 from scripts.trajectories.reading import FORMATS
+from scripts.whole_bodies import rigs
+from scripts.whole_bodies.section import section
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
 
@@ -98,19 +102,6 @@ def import_recording(recording: Recording, rotation_mode: str) -> bpy.types.Obje
     obj.select_set(True)
     bpy.context.view_layer.objects.active = obj
     return obj
-
-
-def decimate(obj: bpy.types.Object, **options: object) -> None:
-    """Blender's Decimate on all keys of an object, in a Graph Editor: `mode`, and `factor` or `remove_error_margin`."""
-    for fcurve in animation.channelbag_of(obj).fcurves:
-        fcurve.select = True
-        fcurve.keyframe_points.foreach_set("select_control_point", np.ones(len(fcurve.keyframe_points), dtype=bool))
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    area.type = "GRAPH_EDITOR"
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
-        bpy.ops.graph.decimate(**options)
 
 
 def outcome(obj: bpy.types.Object, how: str, recording: Recording, truth: Poses, radius: float) -> Outcome:
@@ -213,6 +204,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure, print, and write where asked."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings, axes and unit as they are")
+    parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="BVH, FBX, folders of them")
     parser.add_argument("--tolerance", type=float, default=0.005, help="in metres (%(default)s)")
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     parser.add_argument("--fps", type=float, default=60.0, help="frames a second (%(default)g)")
@@ -220,17 +212,20 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         recordings = [read(path, options.fps) for path in files(options.recordings)]
+        bodies = rigs.files(options.bodies)
     except (TrajectoryError, OSError) as error:
         parser.error(str(error))
     command = (
         f"python scripts/reduction.py --tolerance {options.tolerance:g} --radius {options.radius:g} "
-        f"--fps {options.fps:g}{' --recordings ...' if options.recordings else ''}"
+        f"--fps {options.fps:g}{' --recordings ...' if options.recordings else ''}{' --bodies ...' if bodies else ''}"
     )
     lines = opening("Few keys instead of many", command, __doc__, Blender=bpy.app.version_string)
     animation.register()
     try:
         for rotation_mode in ROTATION_MODES:
             lines += report(recordings, rotation_mode, options.tolerance, options.radius)
+        if bodies:
+            lines += section(bodies, [(one.name, options.fps, one.poses) for one in recordings])
     finally:
         animation.unregister()
     publish(lines, options.output)
