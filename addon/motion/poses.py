@@ -91,12 +91,16 @@ class PackedPoses:
 
 
 def placed(above: Poses, poses: Poses) -> Poses:
-    """Where poses (...) are that are given in the space of others (...), with a scale where either has one."""
+    """Where poses (...) are that are given in the space of others (...), with a scale where either has one.
+
+    What has fewer leading axes is the same along the others.
+    """
     arms = rotate(above.quaternions, poses.positions)
     scales = poses.scales if above.scales is None else above.scales
     if above.scales is not None:
         arms *= above.scales[..., None]
         scales = above.scales if poses.scales is None else above.scales * poses.scales
+        scales = np.broadcast_to(scales, arms.shape[:-1])
     return Poses(above.positions + arms, multiply(above.quaternions, poses.quaternions), scales)
 
 

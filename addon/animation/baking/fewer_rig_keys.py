@@ -19,8 +19,8 @@ from ...motion.quaternions import align_signs
 from ..actions.reading import sources_of_users
 from ..actions.slots import Slot, SlotTransform, transforms_in
 from ..actions.sources import SAME_FRAME, Source, distinct
-from ..inbetweens.acting import Readings
-from ..transforms import Refused, Transform
+from ..inbetweens.acting import Readings, readable
+from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import SMALLEST, FewerKeys, WholeRig, samples_of, shown_poses, values_on, with_best_modes, with_keys
 from .sizes import radius_of, size_of
 
@@ -44,9 +44,12 @@ def fewer_keys_of_rigs(
     """Plans for all bones among the targets, those together that one slot of a rig moves."""
     together: dict[tuple[bpy.types.Object, bpy.types.Action, int], dict[Transform, tuple[SlotTransform, Source]]] = {}
     for transform, reading in readings.items():
-        # What cannot be read says so itself.
-        if transform.prefix and not any(isinstance(source, Refused) for _, source in reading):
-            for place, source in reading:
+        if transform.prefix:
+            try:
+                keyed = readable(transform, reading)
+            except Refused:
+                continue  # Its own plan says so.
+            for place, source in keyed:
                 if source.channels:
                     key = transform.animated, place.slot.action, place.slot.handle
                     together.setdefault(key, {})[transform] = place, source
@@ -56,6 +59,9 @@ def fewer_keys_of_rigs(
             fewer = _Rig(rig, members, tolerance, radius, hold=hold).fewer_keys(mode, shared=shared, best_of=best_of)
         except Refused as refusal:
             plans.update(dict.fromkeys(members, refusal))
+            continue
+        except ValueError as problem:
+            plans.update(dict.fromkeys(members, Refused(f"{rig.name} cannot be reduced: {problem}")))
             continue
         for transform, plan in fewer.items():
             found = plans.setdefault(transform, [])
@@ -82,7 +88,7 @@ class _Rig:
         self.places = {numbers[transform.carrier.name]: place for transform, (place, _) in members.items()}
         self.sources = {numbers[transform.carrier.name]: source for transform, (_, source) in members.items()}
         slot = next(iter(self.places.values())).slot
-        others = dict(_others(rig, slot, {transform.prefix for transform in members}))
+        others = {transform: source for transform, source in _keyed_in(rig, slot) if transform not in members}
         self.frames = _united(samples_of(self.sources[number]) for number in self.targets)
         around = [np.arange(span[0], span[1] + 1.0) for span in self._spans_that_go_on()]
         outside = _united(around) if around else self.frames[:0]
@@ -90,8 +96,14 @@ class _Rig:
         self.seen = np.union1d(self.frames, outside)
         self.own = np.isin(self.seen, self.frames)
 
-        every = {numbers[name]: source for name, source in others.items()} | self.sources
+        every = {numbers[one.carrier.name]: source for one, source in others.items() if one.prefix} | self.sources
         basis = [self._basis(number, every.get(number)) for number in range(len(self.bones))]
+        for number, poses in enumerate(basis):
+            if poses.scales is not None and poses.scales.min() <= 0.0:
+                raise Refused(
+                    f"{rig.name}/{self.bones[number].name}: its scale passes zero, and with it the size of all that "
+                    "hangs on it: reduce the bones above and below it apart from one another"
+                )
         grows = any(poses.scales is not None and np.abs(poses.scales - 1.0).max() > SMALLEST for poses in basis)
         follows = [_follows(bone, grows) for bone in self.bones]
         parents = [numbers[bone.parent.name] if whole else -1 for bone, whole in zip(self.bones, follows, strict=True)]
@@ -110,8 +122,8 @@ class _Rig:
         self.tolerance = tolerance / self.unit
         self.radii = np.array([(radius or radius_of(bone)) / self.unit for bone in self.bones])
         self.rounding = SMALLEST * (float(np.abs(self.truth.positions).max()) + self.radii.max())
-        self.world = np.array(rig.matrix_world)
-        self.in_world = self._in_world(self.truth)
+        self.world = _world(rig, others.get(transform_of(rig)), self.seen)
+        self.in_world = placed(self.world, self.truth).positions
         scene = bpy.context.scene
         self.stands = standing(self.seen * scene.render.fps_base / scene.render.fps, self.in_world)
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
@@ -167,7 +179,7 @@ class _Rig:
         if best_of:
             self._mix(fewer, shown, show)
         errors = self._errors(shown).max(axis=1) * self.unit
-        standing_at = (self.in_world, self._in_world(self.skeleton.in_root_space(shown)))
+        standing_at = (self.in_world, placed(self.world, self.skeleton.in_root_space(shown)).positions)
         as_whole = WholeRig(
             len(_united(distinct(source.keyed_frames) for source in fewer.values())) if fewer else 0,
             *(slide(places, self.stands) for places in standing_at),
@@ -200,9 +212,6 @@ class _Rig:
     def _errors(self, shown: Poses) -> np.ndarray:
         """Of all bones on all frames (bones, m), in the rig's unit."""
         return shell_error(self.skeleton.in_root_space(shown), self.truth, self.radii[:, None])
-
-    def _in_world(self, poses: Poses) -> np.ndarray:
-        return poses.positions @ self.world[:3, :3].T + self.world[:3, 3]
 
     def _within_its_keys(self, keys: np.ndarray, before: np.ndarray) -> np.ndarray:
         """The samples of a bone's keys, none of them outside of those that it has: there it holds."""
@@ -254,13 +263,24 @@ class _Rig:
                 show(number, single)
 
 
-def _others(rig: bpy.types.Object, slot: Slot, prefixes: set[str]) -> Iterator[tuple[str, Source]]:
-    """What is keyed of the other bones of a rig in a slot, by their names. What cannot be read stands as it is."""
-    places = [place for place in transforms_in(slot) if place.prefix and place.prefix not in prefixes]
+def _keyed_in(rig: bpy.types.Object, slot: Slot) -> Iterator[tuple[Transform, Source]]:
+    """What is keyed of a rig in a slot, itself and its bones. What cannot be read stands as it is."""
+    places = transforms_in(slot)
     for place, sources in zip(places, sources_of_users(places), strict=True):
         for user, source in zip(place.users, sources, strict=True):
-            if user.animated == rig and isinstance(source, Source):
-                yield user.carrier.name, source
+            if user.animated == rig and isinstance(source, Source) and source.channels:
+                yield user, source
+
+
+def _world(rig: bpy.types.Object, source: Source | None, frames: np.ndarray) -> Poses:
+    """Where a rig is on these frames, shape (m,): by its own keys where nothing else moves it, or as it stands."""
+    if source is not None and rig.parent is None and not rig.constraints:
+        poses = shown_poses(source, frames)
+        size = rig.scale[0] * rig.delta_scale[0] if poses.scales is None else poses.scales
+    else:
+        place, turn, scale = rig.matrix_world.decompose()
+        poses, size = Poses(np.tile(place, (len(frames), 1)), np.tile(turn, (len(frames), 1))), np.mean(scale)
+    return Poses(poses.positions, poses.quaternions, np.broadcast_to(size, frames.shape))
 
 
 def _united(frames: Iterable[np.ndarray]) -> np.ndarray:

@@ -175,8 +175,9 @@ def test_bones_that_inherit_otherwise_keep_to_it_too(live_file, setting):
         assert error <= (2.0 if own_chain else 1.0 + 1e-3) * TOLERANCE, name
 
 
-def test_a_foot_that_stands_is_held(live_file):
-    """One bone from a hip that sways down to a foot that is on the ground."""
+@pytest.mark.parametrize("carried", [False, True])
+def test_a_foot_that_stands_is_held(live_file, carried):
+    """Under a hip that sways. Carried, the rig moves on, and the hip goes as far back in it."""
     rig = new_object("Leg", data=bpy.data.armatures.new("Leg"))
     bpy.context.view_layer.objects.active = rig
     bpy.ops.object.mode_set(mode="EDIT")
@@ -187,7 +188,12 @@ def test_a_foot_that_stands_is_held(live_file):
     bpy.ops.object.mode_set(mode="OBJECT")
     # A pendulum that hangs from the swaying hip, with its end where it is.
     sway = 0.08 * np.sin(0.2 * FRAMES)
-    write_channel(rig, 'pose.bones["Hip"].location', FRAMES, np.stack((sway, 0.0 * sway, 0.0 * sway), axis=1))
+    on = 0.02 * FRAMES if carried else 0.0 * FRAMES
+    along = rig.data.bones["Hip"].x_axis.x
+    assert abs(along) == pytest.approx(1.0)
+    write_channel(rig, 'pose.bones["Hip"].location', FRAMES, np.outer(sway - on / along, (1.0, 0.0, 0.0)))
+    if carried:
+        write_channel(rig, "location", FRAMES, np.outer(on, (1.0, 0.0, 0.0)))
     lean = np.arcsin(sway / 0.8)
     turns = np.zeros((len(FRAMES), 4))
     turns[:, 0], turns[:, 3] = np.cos(lean / 2.0), np.sin(lean / 2.0)
