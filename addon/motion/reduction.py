@@ -75,7 +75,7 @@ def check_wishes(mode: str, tolerance: float | None, budget: int | None) -> None
         raise ValueError("key reduction needs either a tolerance or a budget of keys")
     if mode not in MODES:
         raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
-    if tolerance is not None and not 1.0 / LIMIT < tolerance < LIMIT:
+    if tolerance is not None and not 1.0 / LIMIT < float(tolerance) < LIMIT:
         raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
     if budget is not None and budget < 2:
         raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")

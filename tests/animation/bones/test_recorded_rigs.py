@@ -12,10 +12,11 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import key_frames, problem_of, set_mode
+from addon.animation import Refused, key_frames, problem_of, reduce_keys_of, set_mode, total_reduction
 from addon.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import in_turn
+from tests.animation.bones.test_rig_reducing import largest, matrices
 from tests.animation.oracle import curves_of
 from tests.recordings import RECORDINGS
 from tests.thoroughness import sample, tried
@@ -124,3 +125,24 @@ def test_on_its_keys_a_rig_is_as_it_was(importers, name):
     assert {problem_of(pose_bone) for pose_bone in rig.pose.bones} == {""}
     (shown,) = shown_poses([rig], frames)
     assert_same_poses(rig, frames, shown, before)
+
+
+@pytest.mark.parametrize("shared", [False, True], ids=["own keys", "key poses"])
+@pytest.mark.parametrize("name", sample(["pab_walk.fbx", "freebvh.bvh", "pab_run.fbx"]))
+def test_no_bone_of_a_rig_with_fewer_keys_is_off_by_more_than_the_tolerance(importers, name, shared):
+    rig = imported(name)
+    bones = list(rig.pose.bones)
+    times = np.concatenate([key_frames(bone) for bone in bones if len(key_frames(bone))])
+    frames = np.arange(np.ceil(times.min()), np.floor(times.max()) + 1.0)
+    truth = matrices(rig, frames)
+    unit = max(np.ptp([rows[0, :3, 3] for rows in truth.values()], axis=0)) / 1.7
+    refused: list[Refused] = []
+    reduce_keys_of(bones, "motor_spline", 0.02 * unit, 0.03 * unit, shared=shared, refused=refused)
+    total = total_reduction(bones)
+    assert total.after < 0.8 * total.before
+    for bone, shown in matrices(rig, frames).items():
+        # Rotations without the size of the rig.
+        pair = [rows.copy() for rows in (shown, truth[bone])]
+        for rows in pair:
+            rows[:, :3, :3] /= np.cbrt(np.linalg.det(rows[:, :3, :3]))[:, None, None]
+        assert largest(*pair, 0.03 * unit).max() <= 0.02 * unit * (1.0 + 2e-3), bone
