@@ -89,24 +89,37 @@ class _Rig:
         self.sources = {numbers[transform.carrier.name]: source for transform, (_, source) in members.items()}
         slot = next(iter(self.places.values())).slot
         others = {transform: source for transform, source in _keyed_in(rig, slot) if transform not in members}
-        self.frames = _united(samples_of(self.sources[number]) for number in self.targets)
-        around = [np.arange(span[0], span[1] + 1.0) for span in self._spans_that_go_on()]
-        outside = _united(around) if around else self.frames[:0]
-        outside = outside[(outside < self.frames[0]) | (outside > self.frames[-1])]
+        self._look_at_frames()
+        self._pose_bones({numbers[one.carrier.name]: source for one, source in others.items() if one.prefix})
+        self.unit = size_of(rig.matrix_world) or 1.0
+        self.tolerance = tolerance / self.unit
+        self.radii = np.array([(radius or radius_of(bone)) / self.unit for bone in self.bones])
+        self.rounding = SMALLEST * (float(np.abs(self.truth.positions).max()) + self.radii.max())
+        self._stand(others.get(transform_of(rig)), hold=hold)
+
+    def _look_at_frames(self) -> None:
+        """The frames that keys are for, and those that are seen: where channels go on outside of their keys, more."""
+        sources = [self.sources[number] for number in self.targets]
+        self.frames = _united(map(samples_of, sources))
+        spans = [source.seen_range for source in sources if source.goes_on]
+        around = _united([self.frames, *(np.arange(first, last + 1.0) for first, last in spans)])
+        outside = around[(around < self.frames[0]) | (around > self.frames[-1])]
         self.seen = np.union1d(self.frames, outside)
         self.own = np.isin(self.seen, self.frames)
 
-        every = {numbers[one.carrier.name]: source for one, source in others.items() if one.prefix} | self.sources
-        basis = [self._basis(number, every.get(number)) for number in range(len(self.bones))]
-        for number, poses in enumerate(basis):
+    def _pose_bones(self, others: dict[int, Source]) -> None:
+        """The poses of all bones on the frames that are seen, in their parents' space and in the rig's."""
+        basis = [self._basis(number, (others | self.sources).get(number)) for number in range(len(self.bones))]
+        for bone, poses in zip(self.bones, basis, strict=True):
             if poses.scales is not None and poses.scales.min() <= 0.0:
                 raise Refused(
-                    f"{rig.name}/{self.bones[number].name}: its scale passes zero, and with it the size of all that "
-                    "hangs on it: reduce the bones above and below it apart from one another"
+                    f"{self.rig.name}/{bone.name}: its scale passes zero, and with it the size of all that hangs on "
+                    "it: reduce the bones above and below it apart from one another"
                 )
         grows = any(poses.scales is not None and np.abs(poses.scales - 1.0).max() > SMALLEST for poses in basis)
         follows = [_follows(bone, grows) for bone in self.bones]
-        parents = [numbers[bone.parent.name] if whole else -1 for bone, whole in zip(self.bones, follows, strict=True)]
+        numbers = {bone: number for number, bone in enumerate(self.bones)}
+        parents = [numbers[bone.parent] if whole else -1 for bone, whole in zip(self.bones, follows, strict=True)]
         self.skeleton = Skeleton(parents)
         self.rest = [_rest(bone, whole) for bone, whole in zip(self.bones, follows, strict=True)]
         local = [placed(rest, poses) for rest, poses in zip(self.rest, basis, strict=True)]
@@ -118,18 +131,13 @@ class _Rig:
         )
         self.truth = self.skeleton.in_root_space(self.poses)
 
-        self.unit = size_of(rig.matrix_world) or 1.0
-        self.tolerance = tolerance / self.unit
-        self.radii = np.array([(radius or radius_of(bone)) / self.unit for bone in self.bones])
-        self.rounding = SMALLEST * (float(np.abs(self.truth.positions).max()) + self.radii.max())
-        self.world = _world(rig, others.get(transform_of(rig)), self.seen)
+    def _stand(self, own: Source | None, *, hold: bool) -> None:
+        """Which bones stand on the ground, with what is keyed of the rig itself, and how much their errors count."""
+        self.world = _world(self.rig, own, self.seen)
         self.in_world = placed(self.world, self.truth).positions
-        scene = bpy.context.scene
-        self.stands = standing(self.seen * scene.render.fps_base / scene.render.fps, self.in_world)
+        render = bpy.context.scene.render
+        self.stands = standing(self.seen * render.fps_base / render.fps, self.in_world)
         self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
-
-    def _spans_that_go_on(self) -> list[tuple[int, int]]:
-        return [self.sources[number].seen_range for number in self.targets if self.sources[number].goes_on]
 
     def fewer_keys(self, mode: str, *, shared: bool, best_of: bool) -> dict[Transform, FewerKeys]:
         keys = reduce_skeleton_keys(

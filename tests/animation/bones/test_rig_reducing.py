@@ -252,3 +252,22 @@ def test_channels_have_what_was_recorded_on_every_key(live_file):
             kept = np.array([point.co for point in curve.keyframe_points])
             assert len(kept) < len(FRAMES)
             np.testing.assert_allclose(kept[:, 1], before[channel][np.isin(FRAMES, kept[:, 0])], rtol=0, atol=1e-5)
+
+
+def test_a_scale_that_passes_zero_is_named(live_file):
+    rig = recorded_rig()
+    sizes = np.cos(0.1 * FRAMES)
+    write_channel(rig, 'pose.bones["Spine"].scale', FRAMES, np.stack((sizes, sizes, sizes), axis=1))
+    with pytest.raises(Refused, match="Body/Spine: its scale passes zero"):
+        reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert not any(map(is_reduced, bones(rig)))
+
+
+def test_a_bone_with_an_infinite_key_says_so_and_the_others_are_reduced(live_file):
+    rig = recorded_rig()
+    curves_of(rig)['pose.bones["Hand.L"].rotation_quaternion', 1].keyframe_points[5].co.y = np.inf
+    refused: list[Refused] = []
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, refused=refused)
+    (refusal,) = refused
+    assert str(refusal).startswith("Body/Hand.L")
+    assert is_reduced(rig.pose.bones["Hand.R"])
