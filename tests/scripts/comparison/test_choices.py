@@ -15,13 +15,13 @@ from tests.scripts.comparison.recordings import swinging_clip
 
 
 def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -> np.ndarray:
-    """By SciPy: how far the points at `radius` on the axes come to be from where they were recorded, in metres."""
-    filled = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
-    ends = []
-    for poses in (filled, clip.poses):
-        axes = Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix()
-        ends.append(poses.positions[:, :, None] * clip.metres_per_unit + radius * axes)
-    return np.linalg.norm(ends[0] - ends[1], axis=1).max(axis=1)
+    """By SciPy and singular values: how far any point within the radius is off, in metres."""
+    shown = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
+    matrices = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, clip.poses)]
+    axes, sizes, _ = np.linalg.svd(radius * (matrices[0] - matrices[1]))
+    offsets = (shown.positions - clip.poses.positions) * clip.metres_per_unit
+    moved = np.einsum("nij,ni->nj", axes, offsets)
+    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
@@ -117,7 +117,7 @@ def test_what_is_no_rate_is_refused_with_the_way_out(kind: type[Choice], written
 
 @pytest.mark.parametrize("choice", [Uniform("3"), Budget("3"), Tolerance("10mm"), Tolerance("0.4")], ids=str)
 def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_what_they_were_chosen_for(choice) -> None:
-    clip = replace(swinging_clip(seed=4), metres_per_unit=0.1)
+    clip = replace(swinging_clip(seed=19), metres_per_unit=0.1)
     modes = ("lerp_slerp", "dq_sclerp", "motor_spline")
     made = reconstruct(clip, choice, (*modes, BEST_OF), 0.1)
     errors = {mode: np.sqrt(np.mean(own.shell**2)) for mode, own in made.errors.items()}
