@@ -101,11 +101,13 @@ def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> di
     """By SciPy: offsets of the origin (n, 3), turns in radians (n,) and shell errors (n,) between two tables."""
     offset = poses_of(filled).positions - poses_of(truth).positions
     turns = [Rotation.from_quat(poses_of(columns).quaternions, scalar_first=True) for columns in (filled, truth)]
-    arms = [0.1 * (turns[0].as_matrix() - turns[1].as_matrix())[:, :, axis] for axis in range(3)]
+    # What turns moves a ball to a disc across the axis of the turn.
+    axes, sizes, _ = np.linalg.svd(0.1 * (turns[0].as_matrix() - turns[1].as_matrix()))
+    moved = np.einsum("nij,ni->nj", axes, offset)
     return {
         "offset": offset,
         "turn": (turns[1].inv() * turns[0]).magnitude(),
-        "shell": np.max([np.linalg.norm(offset + arm, axis=1) for arm in arms], axis=0),
+        "shell": np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0]),
     }
 
 
