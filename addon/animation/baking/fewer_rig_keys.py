@@ -245,7 +245,8 @@ class _Rig:
                     "and with fewer of them would go elsewhere there: give its channels constant extrapolation and no "
                     "cycles, or cycles that all have the same range"
                 )
-            for one in off:
+            # What rests goes on resting, as long as others can make up for it.
+            for one in [one for one in off if len(chosen[one]) > 1] or off:
                 chosen[one] = np.union1d(chosen[one], (0, sample, len(samples) - 1))
                 show_keys(one)
 
