@@ -180,21 +180,24 @@ class Search:
         keys = Keys(
             indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
         )
-        numbers = np.flatnonzero(np.arange(len(indices)) < keys.last)
-        windows = keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
+        numbers, windows = self._segments(keys)
         cost, peak = self.evaluate(windows, slice(self.reach, self.reach + 1))
         keys.cost[numbers], keys.peak[numbers] = cost[:, 0], peak[:, 0]
         return keys
 
     def errors(self, keys: Keys) -> np.ndarray:
         """The error at every sample, in tolerances, shape (n,)."""
-        numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
-        windows = keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
+        _, windows = self._segments(keys)
         errors = np.zeros(len(self.recording.times))
         for batch, counts in self._batches(windows, slice(self.reach, self.reach + 1)):
             samples, found, _ = self._errors(batch, self.reach, counts)
             errors[samples] = found
         return errors
+
+    def _segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
+        numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
+        return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
 
     def densified(self, keys: Keys) -> Keys:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
@@ -434,9 +437,5 @@ def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray, reach: int)
             column = end - step * inwards
             some = (column >= 0) & (column < windows.shape[1])
             here, column = rows[some], column[some]
-            made = beyond(keys[..., here, column + inwards], keys[..., here, column + 2 * inwards])
-            keys.positions[..., here, column, :] = made.positions
-            keys.quaternions[..., here, column, :] = made.quaternions
-            if keys.scales is not None:
-                keys.scales[..., here, column] = made.scales
+            keys[..., here, column] = beyond(keys[..., here, column + inwards], keys[..., here, column + 2 * inwards])
     return key_times, keys

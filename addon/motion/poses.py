@@ -74,6 +74,19 @@ class Poses:
             self.positions[whole], self.quaternions[whole], None if self.scales is None else self.scales[index]
         )
 
+    def __setitem__(self, index: Any, poses: Poses) -> None:
+        """Put others in the place of those at `index`, in the same arrays. Scales only where both have some."""
+        whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
+        self.positions[whole], self.quaternions[whole] = poses.positions, poses.quaternions
+        if self.scales is not None and poses.scales is not None:
+            self.scales[index] = poses.scales
+
+    def copy(self) -> Poses:
+        """The same in arrays of their own."""
+        return Poses(
+            self.positions.copy(), self.quaternions.copy(), None if self.scales is None else self.scales.copy()
+        )
+
 
 class PackedPoses:
     """Poses (..., n) whose components are apart in memory, as what is picked from them is: quicker to work on."""

@@ -208,9 +208,7 @@ class _WholeBody(Recording):
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
         everything = self.body.poses[:, samples]
-        everything.positions[self.moving], everything.quaternions[self.moving] = shown.positions, shown.quaternions
-        if everything.scales is not None:
-            everything.scales[self.moving] = shown.scales
+        everything[self.moving] = shown
         return self.body.errors(everything, samples).max(axis=0) / self.tolerance[samples]
 
 
@@ -224,12 +222,7 @@ class _OwnKeys:
     """
 
     def __init__(self, body: _Body, tolerance: float) -> None:
-        self.body, self.tolerance = body, tolerance
-        self.shown = Poses(
-            body.poses.positions.copy(),
-            body.poses.quaternions.copy(),
-            None if body.poses.scales is None else body.poses.scales.copy(),
-        )
+        self.body, self.tolerance, self.shown = body, tolerance, body.poses.copy()
         every = np.arange(len(body.times))
         self.keys = [body.middles[[joint]] if free else every for joint, free in enumerate(body.free.tolist())]
 
@@ -285,10 +278,7 @@ class _OwnKeys:
 
     def _show(self, joint: int, keys: np.ndarray) -> None:
         self.keys[joint] = keys
-        shown = self.body.shown(joint, keys)
-        self.shown.positions[joint], self.shown.quaternions[joint] = shown.positions, shown.quaternions
-        if shown.scales is not None:
-            self.shown.scales[joint] = shown.scales
+        self.shown[joint] = self.body.shown(joint, keys)
 
     def _take_out(self, joints: np.ndarray) -> None:
         """Take keys out of joints that do not hang on one another, as far as the error in the root's space allows."""
@@ -296,13 +286,14 @@ class _OwnKeys:
         joints = np.array(movable, dtype=np.int64)
         if not len(joints):
             return
-        rests = _Level(self, joints).may_rest()
+        level = _Level(self, joints)
+        rests = level.may_rest()
         for joint in joints[rests].tolist():
             self._show(joint, self.body.middles[[joint]])
         joints = joints[~rests]
         if len(joints):
             count = len(self.body.times)
-            search = Search(_Level(self, joints))
+            search = Search(_Level(self, joints) if rests.any() else level)
             tracks = [count * place + self.keys[joint] for place, joint in enumerate(joints.tolist())]
             self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
 

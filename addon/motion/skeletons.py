@@ -68,13 +68,7 @@ class Skeleton:
 
     def in_root_space(self, poses: Poses) -> Poses:
         """Where joints are that have these poses (joints, ...) in their parents' space."""
-        positions, quaternions = poses.positions.copy(), poses.quaternions.copy()
-        scales = None if poses.scales is None else poses.scales.copy()
+        there = poses.copy()
         for joints in self.levels[1:]:
-            above = self.parents[joints]
-            parents = Poses(positions[above], quaternions[above], None if scales is None else scales[above])
-            there = placed(parents, poses[joints])
-            positions[joints], quaternions[joints] = there.positions, there.quaternions
-            if scales is not None:
-                scales[joints] = there.scales
-        return Poses(positions, quaternions, scales)
+            there[joints] = placed(there[self.parents[joints]], poses[joints])
+        return there

@@ -162,19 +162,12 @@ class _Rig:
                 f"{self.rig.name}: its bones need their keys on all of {len(self.frames)} frames to stay within the "
                 f"tolerance: allow a larger one{way_out}"
             )
-        shown = Poses(
-            self.poses.positions.copy(),
-            self.poses.quaternions.copy(),
-            None if self.poses.scales is None else self.poses.scales.copy(),
-        )
+        shown = self.poses.copy()
         fewer: dict[int, Source] = {}
 
         def show(number: int, source: Source) -> None:
             fewer[number] = source
-            poses = placed(self.rest[number], self._basis(number, source))
-            shown.positions[number], shown.quaternions[number] = poses.positions, poses.quaternions
-            if shown.scales is not None and poses.scales is not None:
-                shown.scales[number] = poses.scales
+            shown[number] = placed(self.rest[number], self._basis(number, source))
 
         def show_keys(number: int) -> None:
             own = chosen[number]
