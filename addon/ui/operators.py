@@ -11,15 +11,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
-from ..animation.actions.slots import places_of
-from ..animation.baking.copies import BAKED, REDUCED, entries_in_use
+from ..animation.baking.copies import BAKED, REDUCED, entries_of
 from ..animation.baking.originals import WAYS_BACK
 from ..animation.baking.sizes import metres_per_unit
 from ..animation.inbetweens.live import paused
 from ..animation.inbetweens.mending import with_troubles
 from ..animation.inbetweens.polls import with_in_betweens, with_modes, with_more_keys_than
 from ..animation.properties import MODE_ITEMS
-from ..animation.transforms import Transform, transform_of
+from ..animation.transforms import Transform
 from .on_targets import OnTargets
 from .preferences import DEFAULT_MODE, default_mode
 from .rows import labelled
@@ -217,15 +216,10 @@ class _OnChanged(OnTargets):
     @classmethod
     def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
         """What was done last to the keys of each target that something was done to."""
-        found, places = {}, {}
-        for target in targets:
-            if len(target.motion.bakes):
-                animated = target.animated
-                if animated not in places:
-                    places[animated] = places_of(transform_of(animated))
-                entries = entries_in_use(target, places[animated])
-                if kind := next((entry.kind for entry in entries if entry.original is not None), None):
-                    found[target] = kind
+        found = {}
+        for target, entries in entries_of(targets):
+            if kind := next((entry.kind for entry in entries if entry.original is not None), None):
+                found[target] = kind
         return found
 
     @classmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 import bpy
 
@@ -15,7 +16,7 @@ from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
-from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length
+from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length, reduction_rows
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
@@ -146,8 +147,8 @@ def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, targ
     if reduction is not None:
         row.operator("rigid_motion.discard_dense_keys", text="", icon="TRASH")
         column = layout.column(align=True)
-        labelled(column, "Keys").label(text=f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}")
-        labelled(column, "Off By").label(text=f"{length(context.scene, reduction.largest_error, 3)} at most")
+        for label, text in reduction_rows(context.scene, replace(reduction, rig=None)):
+            labelled(column, label).label(text=text)
 
 
 def _in_space(base: type, space: str, parent: type | None = None) -> type[bpy.types.Panel]:

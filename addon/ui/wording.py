@@ -94,7 +94,7 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
 
 
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
-    """What became of the keys of a rig's bones, as labels and what belongs to them."""
+    """What became of keys, and of the rig where it is one, as labels and what belongs to them."""
     rows = [
         ("Keys", f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
         ("Off By", f"{length(scene, reduction.largest_error, precision=3)} at most"),

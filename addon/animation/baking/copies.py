@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import bpy
 
 from ..actions.slots import Slot, SlotTransform, places_of
-from ..transforms import Transform, is_ours
+from ..transforms import Transform, is_ours, transform_of
 
 BAKED, REDUCED = "BAKED", "REDUCED"
 """What was done to the keys."""
@@ -46,6 +46,17 @@ def exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action
                 name = constraint.action_slot.identifier
                 constraint.action = new
                 constraint.action_slot = new.slots.get(name)
+
+
+def entries_of(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, list[bpy.types.PropertyGroup]]]:
+    """What has such notes, and those in use: there is one look at what moves a data-block."""
+    places: dict[bpy.types.Object, list[SlotTransform]] = {}
+    for transform in transforms:
+        if len(transform.motion.bakes):
+            animated = transform.animated
+            if animated not in places:
+                places[animated] = places_of(transform_of(animated))
+            yield transform, list(entries_in_use(transform, places[animated]))
 
 
 def entries_in_use(

@@ -6,6 +6,7 @@ are those of the Action, lengths those of its channels.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,10 +104,7 @@ def fewer_keys(
 ) -> FewerKeys:
     """The keys that one slot needs, which may be as many as it has."""
     frames = samples_of(source)
-    # What goes on outside of the keys, by cycles or at a slope, has to stay as well.
-    around = np.arange(source.seen_range[0], source.seen_range[1] + 1.0)
-    around = around[(around < frames[0]) | (around > frames[-1])]
-    seen = np.concatenate((around[around < frames[0]], frames, around[around > frames[-1]]))
+    seen = seen_frames(frames, [source])
     truth, own = shown_poses(source, seen), np.isin(seen, frames)
     unit, radius = in_channels(transform, radius, truth.scales is not None)
     tolerance /= unit
@@ -121,10 +119,7 @@ def fewer_keys(
             break
         more = _worst(chosen, error[own], allowed)
         if not len(more):
-            raise Refused(
-                f"{transform.name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
-                "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
-            )
+            raise goes_elsewhere(transform.name)
         chosen = np.union1d(chosen, more)
     if best_of:
         mixed = with_best_modes(fewer, frames, truth[own], radius, rounding, allowed)
@@ -185,6 +180,21 @@ def samples_of(source: Source) -> np.ndarray:
     before, behind = keys[place - 1], keys[np.minimum(place, len(keys) - 1)]
     apart = (whole - before > SAME_FRAME) & (behind - whole > SAME_FRAME) & (behind - before > 1.0 + SAME_FRAME)
     return np.union1d(keys, whole[apart])
+
+
+def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
+    """These frames and, since what goes on outside of the keys has to stay as well, all that are seen around them."""
+    first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
+    around = np.arange(first, last + 1.0)
+    return np.union1d(frames, around[(around < frames[0]) | (around > frames[-1])])
+
+
+def goes_elsewhere(name: str) -> Refused:
+    """Why something cannot have fewer keys, although those that are left say all about the time between them."""
+    return Refused(
+        f"{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
+        "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
+    )
 
 
 def shown_poses(source: Source, frames: np.ndarray) -> Poses:

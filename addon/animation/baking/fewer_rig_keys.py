@@ -21,7 +21,18 @@ from ..actions.slots import Slot, SlotTransform, transforms_in
 from ..actions.sources import SAME_FRAME, Source, distinct
 from ..inbetweens.acting import Readings, readable
 from ..transforms import Refused, Transform, transform_of
-from .fewer_keys import SMALLEST, FewerKeys, WholeRig, samples_of, shown_poses, values_on, with_best_modes, with_keys
+from .fewer_keys import (
+    SMALLEST,
+    FewerKeys,
+    WholeRig,
+    goes_elsewhere,
+    samples_of,
+    seen_frames,
+    shown_poses,
+    values_on,
+    with_best_modes,
+    with_keys,
+)
 from .sizes import radius_of, size_of
 
 HOLD = 4.0
@@ -101,10 +112,7 @@ class _Rig:
         """The frames that keys are for, and those that are seen: where channels go on outside of their keys, more."""
         sources = [self.sources[number] for number in self.targets]
         self.frames = _united(map(samples_of, sources))
-        spans = [source.seen_range for source in sources if source.goes_on]
-        around = _united([self.frames, *(np.arange(first, last + 1.0) for first, last in spans)])
-        outside = around[(around < self.frames[0]) | (around > self.frames[-1])]
-        self.seen = np.union1d(self.frames, outside)
+        self.seen = seen_frames(self.frames, sources)
         self.own = np.isin(self.seen, self.frames)
 
     def _pose_bones(self, others: dict[int, Source]) -> None:
@@ -233,11 +241,7 @@ class _Rig:
             sample = int(np.searchsorted(samples, moment))
             off = [one for one in chain if self.own[moment] and sample not in chosen[one]]
             if not off:
-                raise Refused(
-                    f"{self.targets[chain[0]].name if chain else self.bones[number].name} goes on outside of its keys, "
-                    "and with fewer of them would go elsewhere there: give its channels constant extrapolation and no "
-                    "cycles, or cycles that all have the same range"
-                )
+                raise goes_elsewhere(self.targets[chain[0]].name if chain else self.bones[number].name)
             # What rests goes on resting, as long as others can make up for it.
             for one in [one for one in off if len(chosen[one]) > 1] or off:
                 chosen[one] = np.union1d(chosen[one], (0, sample, len(samples) - 1))

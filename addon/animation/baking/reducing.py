@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -17,13 +17,13 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..actions.channels import replace_keys
-from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
+from ..actions.slots import places_of, slots_of, transforms_in
 from ..actions.sources import MODE_NAMES, distinct
 from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
 from ..inbetweens.mode_keys import segment_modes, set_mode_in
 from ..transforms import Refused, Transform, is_ours, transform_of
 from .bake import go_back
-from .copies import REDUCED, entries_in_use
+from .copies import REDUCED, entries_in_use, entries_of
 from .fewer_keys import FewerKeys, WholeRig, fewer_keys
 from .fewer_rig_keys import Plans, fewer_keys_of_rigs
 from .originals import (
@@ -147,44 +147,38 @@ def reduction_of(target: Target) -> Reduction | None:
     if not len(transform.motion.bakes):
         return None
     places = places_of(transform)
-    entries = [entry for entry in entries_in_use(transform, places) if entry.kind == REDUCED]
-    if not entries:
-        return None
+    entries = _reduced(entries_in_use(transform, places))
     reduced = {entry.changed for entry in entries}
     modes = [mode for place in places if place.slot.action in reduced for mode in segment_modes(place)]
+    return _summed(entries, entries if transform.prefix else [], dict(Counter(modes)))
+
+
+_Entries = list[bpy.types.PropertyGroup]
+
+
+def _reduced(entries: Iterable[bpy.types.PropertyGroup]) -> _Entries:
+    return [entry for entry in entries if entry.kind == REDUCED]
+
+
+def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> Reduction | None:
+    """All of these notes together; None where there are none. What they say of a rig is that with the most frames."""
+    if not entries:
+        return None
+    rig = max(of_bones, key=lambda entry: entry.frames_after, default=None)
     return Reduction(
         sum(entry.keys_before for entry in entries),
         sum(entry.keys_after for entry in entries),
         max(entry.largest_error for entry in entries),
-        dict(Counter(modes)),
-        _whole_rig(entries[0]) if transform.prefix else None,
+        segments,
+        None if rig is None else WholeRig(rig.frames_after, rig.slide_before, rig.slide_after),
     )
-
-
-def _whole_rig(entry: bpy.types.PropertyGroup) -> WholeRig:
-    return WholeRig(entry.frames_after, entry.slide_before, entry.slide_after)
 
 
 def total_reduction(targets: Targets) -> Reduction | None:
     """What became of the keys of several targets together, without their modes. None where none were reduced."""
-    places: dict[bpy.types.Object, list[SlotTransform]] = {}
-    entries = []
-    for transform in transforms_of(targets):
-        if len(transform.motion.bakes):
-            if transform.animated not in places:
-                places[transform.animated] = places_of(transform_of(transform.animated))
-            used = entries_in_use(transform, places[transform.animated])
-            entries += [(transform, entry) for entry in used if entry.kind == REDUCED]
-    if not entries:
-        return None
-    of_bones = [entry for transform, entry in entries if transform.prefix]
-    return Reduction(
-        sum(entry.keys_before for _, entry in entries),
-        sum(entry.keys_after for _, entry in entries),
-        max(entry.largest_error for _, entry in entries),
-        {},
-        _whole_rig(max(of_bones, key=lambda entry: entry.frames_after)) if of_bones else None,
-    )
+    of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
+    of_bones = [entry for transform, entries in of_each if transform.prefix for entry in entries]
+    return _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
 
 
 def is_reduced(target: Target) -> bool:
