@@ -71,12 +71,10 @@ class Body:
 
     def shown(self, keys: Keys, mode: str) -> Poses:
         """Where the joints are by their keys, shape (joints, n)."""
-        positions, quaternions = np.empty_like(self.poses.positions), np.empty_like(self.poses.quaternions)
+        shown = self.poses.copy()
         for joint, own in enumerate(keys):
-            held = self.poses[joint][own]
-            filled = interpolate(self.times[own], held, self.times, mode) if len(own) > 1 else held
-            positions[joint], quaternions[joint] = filled.positions, filled.quaternions
-        return self.skeleton.in_root_space(Poses(positions, quaternions))
+            shown[joint] = interpolate(self.times[own], self.poses[joint][own], self.times, mode)
+        return self.skeleton.in_root_space(shown)
 
     def shown_by_key_poses(self, keys: np.ndarray, mode: str) -> Poses:
         """The same where all joints have keys at the same samples."""

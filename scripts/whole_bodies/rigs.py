@@ -11,6 +11,7 @@ import numpy as np
 
 from addon import animation
 from addon.animation.actions.channels import replace_keys
+from addon.animation.transforms.bones import prefix_of
 from addon.motion import Poses
 from addon.motion.eulers import quaternions_from_extrinsic_eulers
 from addon.motion.poses import placed
@@ -49,9 +50,7 @@ class _Joint:
 
     @property
     def prefix(self) -> str:
-        if isinstance(self.carrier, bpy.types.Object):
-            return ""
-        return f'pose.bones["{bpy.utils.escape_identifier(self.carrier.name)}"].'
+        return "" if isinstance(self.carrier, bpy.types.Object) else prefix_of(self.carrier.name)
 
     @property
     def location(self) -> str:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from addon.motion import MODES, Poses, decimate, interpolate, reduce_keys, repair, twists
 from addon.motion.quaternions import align_signs, normalise
 from scripts.trajectories import read_trajectories
+from tests.balls import largest_displacements
 from tests.motion.test_twists import pose_matrix
 from tests.recordings import RECORDINGS
 from tests.thoroughness import sample, tried
@@ -30,10 +31,7 @@ def shell_errors(times: np.ndarray, poses: Poses, keys: np.ndarray, mode: str, r
         np.array([pose_matrix(*pose) for pose in zip(some.quaternions, some.positions, strict=True)])
         for some in (shown, poses)
     )
-    # The ball becomes a disc: all of its points move across the axis of the turn.
-    axes, sizes, _ = np.linalg.svd(radius * (a - b)[:, :3, :3])
-    moved = np.einsum("nij,ni->nj", axes, (a - b)[:, :3, 3])
-    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
+    return largest_displacements((a - b)[:, :3, 3], radius * (a - b)[:, :3, :3])
 
 
 def wandering(count: int, seed: int, noise: float = 0.0, rough: float = 3.0) -> tuple[np.ndarray, Poses]:

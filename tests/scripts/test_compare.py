@@ -24,6 +24,7 @@ from scripts import compare
 from scripts.comparison.study import folder_names
 from scripts.workplan import Workspace
 from scripts.workplan import __main__ as workplan
+from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -101,13 +102,10 @@ def errors_of(filled: dict[str, np.ndarray], truth: dict[str, np.ndarray]) -> di
     """By SciPy: offsets of the origin (n, 3), turns in radians (n,) and shell errors (n,) between two tables."""
     offset = poses_of(filled).positions - poses_of(truth).positions
     turns = [Rotation.from_quat(poses_of(columns).quaternions, scalar_first=True) for columns in (filled, truth)]
-    # What turns moves a ball to a disc across the axis of the turn.
-    axes, sizes, _ = np.linalg.svd(0.1 * (turns[0].as_matrix() - turns[1].as_matrix()))
-    moved = np.einsum("nij,ni->nj", axes, offset)
     return {
         "offset": offset,
         "turn": (turns[1].inv() * turns[0]).magnitude(),
-        "shell": np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0]),
+        "shell": largest_displacements(offset, 0.1 * (turns[0].as_matrix() - turns[1].as_matrix())),
     }
 
 

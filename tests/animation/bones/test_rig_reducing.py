@@ -20,6 +20,7 @@ from addon.animation import (
 )
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
+from tests.balls import largest_displacements
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
 
 TOLERANCE, RADIUS = 0.01, 0.05
@@ -41,9 +42,7 @@ def matrices(rig: bpy.types.Object, frames: np.ndarray = FRAMES) -> dict[str, np
 
 def largest(shown: np.ndarray, truth: np.ndarray, radius: float = RADIUS) -> np.ndarray:
     """How far any point of the ball is off on each frame, by singular values."""
-    axes, sizes, _ = np.linalg.svd(radius * (shown - truth)[:, :3, :3])
-    moved = np.einsum("nij,ni->nj", axes, (shown - truth)[:, :3, 3])
-    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
+    return largest_displacements((shown - truth)[:, :3, 3], radius * (shown - truth)[:, :3, :3])
 
 
 def errors(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, float]:

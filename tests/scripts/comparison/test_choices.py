@@ -11,6 +11,7 @@ from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.clips import Clip
 from scripts.comparison.modes import BEST_OF
 from scripts.comparison.study import reconstruct
+from tests.balls import largest_displacements
 from tests.scripts.comparison.recordings import swinging_clip
 
 
@@ -18,10 +19,8 @@ def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -
     """By SciPy and singular values: how far any point within the radius is off, in metres."""
     shown = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
     matrices = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, clip.poses)]
-    axes, sizes, _ = np.linalg.svd(radius * (matrices[0] - matrices[1]))
     offsets = (shown.positions - clip.poses.positions) * clip.metres_per_unit
-    moved = np.einsum("nij,ni->nj", axes, offsets)
-    return np.hypot(moved[:, 2], np.hypot(moved[:, 0], moved[:, 1]) + sizes[:, 0])
+    return largest_displacements(offsets, radius * (matrices[0] - matrices[1]))
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
