@@ -80,7 +80,13 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     frames = np.asarray(frames, dtype=np.float64)
     native, delta = np.empty((2, _height([source]), len(frames)))
     delta = delta[: _filled_height([source])]
-    _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
+    if len(source.key_frames) > 1:
+        _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
+    else:
+        # Without a segment there is nothing to fill in.
+        _sampled([(source, slice(len(frames)))], [frames], out=native)
+        turn_into_quaternions(native, source.order)
+        delta[:] = source.original[: len(delta), None]
 
     def moved_by(deltas: np.ndarray) -> Poses:
         positions = (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T

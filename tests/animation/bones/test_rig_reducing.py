@@ -104,6 +104,22 @@ def test_what_hangs_on_a_target_keeps_its_own_keys_and_to_the_tolerance(live_fil
     assert len(key_frames(alone.pose.bones["Spine"])) < together
 
 
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
+def test_what_rests_in_another_pose_with_one_key_is_measured_as_it_is_shown(live_file, rotation_mode):
+    rig = recorded_rig(rotation_mode, still=("Arm.L",))
+    arm = rig.pose.bones["Arm.L"]
+    path = "rotation_quaternion" if rotation_mode == "QUATERNION" else "rotation_euler"
+    turn = (0.8, 0.0, 0.6, 0.0) if rotation_mode == "QUATERNION" else (0.7, -0.4, 1.1)
+    write_channel(rig, arm.path_from_id(path), FRAMES, np.tile(turn, (len(FRAMES), 1)))
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert len(key_frames(arm)) == 1
+    off = errors(rig, truth)
+    assert max(off.values()) <= TOLERANCE * (1.0 + 1e-4)
+    for bone in bones(rig):
+        assert reduction_of(bone).largest_error == pytest.approx(off[bone.name], abs=2e-6)
+
+
 def test_a_bone_that_hardly_moves_is_left_with_one_key(live_file):
     rig = recorded_rig(still=("Head",))
     turns = np.tile((1.0, 0.0, 0.0, 0.0), (len(FRAMES), 1))
