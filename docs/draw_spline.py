@@ -15,7 +15,7 @@ DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
 from addon.motion import Poses, curves, interpolate
-from scripts.comparison.markup import Markup, element
+from scripts.comparison.report.markup import Markup, element
 from scripts.files import write_text
 
 FRAMES = np.array((1.0, 13.0, 14.0, 26.0, 38.0))

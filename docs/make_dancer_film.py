@@ -21,11 +21,12 @@ sys.path.insert(0, str(DOCS.parent))
 
 from addon import animation
 from addon.animation import write_channel
-from scripts.comparison import captions, palette
-from scripts.comparison.film import render_film, render_still
-from scripts.comparison.materials import ink, surface
-from scripts.comparison.stage import make_lights, set_up_render
-from scripts.comparison.stage_settings import StageSettings
+from scripts.comparison import palette
+from scripts.comparison.stage import captions
+from scripts.comparison.stage.film import render_film, render_still
+from scripts.comparison.stage.materials import ink, surface
+from scripts.comparison.stage.scene import make_lights, set_up_render
+from scripts.comparison.stage.settings import StageSettings
 from tests.rigs import dancer, figure
 
 SETTINGS = StageSettings(resolution=(960, 540), antialiasing="5", fps=dancer.FPS)

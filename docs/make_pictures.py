@@ -19,9 +19,10 @@ sys.path.insert(0, str(DOCS.parent))
 
 from addon.motion import KEYFRAME_MODES
 from scripts import compare
-from scripts.comparison.choices import Uniform
-from scripts.comparison.stage import StageSettings, build_stage
-from scripts.comparison.study import read_clips, reconstruct
+from scripts.comparison.stage.scene import StageSettings, build_stage
+from scripts.comparison.study.choices import Uniform
+from scripts.comparison.study.reading import read_clips
+from scripts.comparison.study.reconstructions import reconstruct
 
 SMOOTH = ("lerp_slerp", "dq_sclerp", "motor_spline")
 

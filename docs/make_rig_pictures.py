@@ -22,11 +22,12 @@ DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS.parent))
 
 from addon import animation
-from scripts.comparison import captions, palette
-from scripts.comparison.film import render_film, render_still
-from scripts.comparison.materials import ink, surface
-from scripts.comparison.stage import make_lights, set_up_render
-from scripts.comparison.stage_settings import StageSettings
+from scripts.comparison import palette
+from scripts.comparison.stage import captions
+from scripts.comparison.stage.film import render_film, render_still
+from scripts.comparison.stage.materials import ink, surface
+from scripts.comparison.stage.scene import make_lights, set_up_render
+from scripts.comparison.stage.settings import StageSettings
 from tests.rigs import figure, scenes
 from tests.rigs.human import human
 

@@ -22,12 +22,12 @@ if str(ROOT) not in sys.path:
 from addon.motion import KEYFRAME_MODES, MODES
 from scripts.command_line import as_typed, number, own_arguments
 from scripts.comparison import steps
-from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform
-from scripts.comparison.modes import BEST_OF, single_modes
 from scripts.comparison.planning import Wanted, comparison_tasks, look_into, reading_tasks
-from scripts.comparison.report import Settings
-from scripts.comparison.stage_settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
+from scripts.comparison.report.pages import Settings
+from scripts.comparison.stage.settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
 from scripts.comparison.steps import KEYS_NEEDED, REPORT
+from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform
+from scripts.comparison.study.modes import BEST_OF, single_modes
 from scripts.comparison.version import blender_version, program_version
 from scripts.progress import Progress
 from scripts.system_libraries import missing_for_rendering, way_out
@@ -248,7 +248,7 @@ def require_subject(wanted: str) -> None:
         Where there is no Blender to ask.
     """
     # Only here is Blender loaded, which takes longer than all else before the work begins.
-    from scripts.comparison.subject import load_subject
+    from scripts.comparison.stage.subject import load_subject
 
     load_subject(wanted)
 

@@ -26,7 +26,7 @@ from scripts import compare
 from scripts.command_line import as_typed, own_arguments
 from scripts.comparison import steps
 from scripts.comparison.planning import comparison_tasks, look_into, reading_tasks
-from scripts.comparison.stage_settings import MODELS, SubjectError, place_of_subject
+from scripts.comparison.stage.settings import MODELS, SubjectError, place_of_subject
 from scripts.comparison.version import program_version
 from scripts.files import write_text
 from scripts.progress import Progress

@@ -20,13 +20,13 @@ from scripts.trajectories.reading import split_source
 from scripts.workplan import Task
 
 from . import steps
-from .choices import Choice, choice_parts
-from .metrics import table_names
-from .report import ON_ONE_PAGE, Settings
-from .stage_settings import StageSettings, place_of_subject
-from .storage import ClipReference, file_names, read_facts, read_times
-from .study import folder_names
-from .timeline import Timeline
+from .report.pages import ON_ONE_PAGE, Settings
+from .stage.settings import StageSettings, place_of_subject
+from .stage.timeline import Timeline
+from .study.choices import Choice, choice_parts
+from .study.metrics import table_names
+from .study.reading import folder_names
+from .study.storage import ClipReference, file_names, read_facts, read_times
 
 MODULE = steps.__name__
 

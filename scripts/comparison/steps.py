@@ -12,16 +12,17 @@ from scripts.files import write_text
 from scripts.trajectories import TrajectoryError
 from scripts.workplan import Job, TaskError, step
 
-from . import needed
-from .choices import Choice, choice_from
-from .clip_section import Films
-from .error_charts import errors_over_time
-from .metrics import Metrics, write_metrics, write_reconstruction
-from .modes import single_modes
-from .report import Settings, write_clip_page, write_overview, write_report
-from .results import ClipResults, Result, read_result, write_result
-from .storage import ClipReference, file_names, read_clip, read_keys, write_keys, write_recording
-from .study import read_source, reconstruct
+from .report.clip_section import Films
+from .report.error_charts import errors_over_time
+from .report.pages import Settings, write_clip_page, write_overview, write_report
+from .study import needed
+from .study.choices import Choice, choice_from
+from .study.metrics import Metrics, write_metrics, write_reconstruction
+from .study.modes import single_modes
+from .study.reading import read_source
+from .study.reconstructions import reconstruct
+from .study.results import ClipResults, Result, read_result, write_result
+from .study.storage import ClipReference, file_names, read_clip, read_keys, write_keys, write_recording
 from .version import program_version
 
 PARTS = ".parts"
@@ -168,9 +169,9 @@ def tabulate_keys(job: Job, *, studies: Sequence[Any]) -> None:
 @step
 def build(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radius: float, stage: Mapping[str, Any]) -> None:
     """Build the stage of a film, and save it."""
-    from .film import save_blend
-    from .stage import build_stage
-    from .stage_settings import StageSettings, SubjectError
+    from .stage.film import save_blend
+    from .stage.scene import build_stage
+    from .stage.settings import StageSettings, SubjectError
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = read_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, radius)
@@ -184,7 +185,7 @@ def build(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radius: f
 @step
 def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int) -> dict[str, float]:
     """Render some frames of a film."""
-    from .film import render_piece
+    from .stage.film import render_piece
 
     chosen = choice_from(*choice)
     blend = job.reads(blend_of(clip, chosen))
@@ -199,7 +200,7 @@ def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int)
 @step
 def encode(job: Job, *, clip: str, choice: Sequence[str], firsts: Sequence[int]) -> dict[str, float]:
     """Join the pieces of a film."""
-    from .film import join_pieces
+    from .stage.film import join_pieces
 
     chosen = choice_from(*choice)
     pieces = [job.reads(piece_of(clip, chosen, first)) for first in firsts]

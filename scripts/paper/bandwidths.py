@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scripts.comparison.clips import Clip
+from scripts.comparison.study.clips import Clip
 from scripts.streaming import PACKINGS, bandwidth, send
 
 from . import claims

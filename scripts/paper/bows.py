@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from addon.motion import interpolate
-from scripts.comparison.clips import Clip
-from scripts.comparison.findings import NOTHING, REFERENCE
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.metrics import NOTHING
+from scripts.comparison.study.modes import REFERENCE
 
 from . import claims
 from .table import senders

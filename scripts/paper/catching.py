@@ -18,13 +18,13 @@ from addon.animation import bake_poses
 from addon.motion import MODES, Poses, interpolate, measure, rms
 from addon.motion.quaternions import multiply, rotate
 from assets.making.motions import HAND, THERE
-from scripts.comparison import captions, layout, trails
-from scripts.comparison.clips import Clip
-from scripts.comparison.lanes import label_of
-from scripts.comparison.materials import surface
-from scripts.comparison.nodes import apply_group
 from scripts.comparison.palette import GHOST, colour_of
-from scripts.comparison.subject import load_subject
+from scripts.comparison.stage import captions, layout, trails
+from scripts.comparison.stage.materials import surface
+from scripts.comparison.stage.nodes import apply_group
+from scripts.comparison.stage.subject import load_subject
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.modes import label_of
 from scripts.streaming import Link, Playback, receive, send
 
 from .picture import FAINT, INK, RULE, Sheet

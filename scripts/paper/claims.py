@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scripts.comparison.findings import UPDATES_IN_THE_PAPER
+from scripts.comparison.report.findings import UPDATES_IN_THE_PAPER
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import textwrap
 from dataclasses import dataclass
 
 from addon.motion import MODES
-from scripts.comparison.markup import Markup, element
 from scripts.comparison.palette import colour_of
+from scripts.comparison.report.markup import Markup, element
 from scripts.streaming import PACKINGS
 
 WIDTH = 480

@@ -12,8 +12,8 @@ import numpy as np
 
 from addon.motion import Poses
 from addon.motion.quaternions import rotate
-from scripts.comparison.clips import Clip
-from scripts.comparison.study import read_clips
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reading import read_clips
 from scripts.trajectories import TrajectoryError
 from scripts.trajectories.reading import FORMATS
 

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from addon.motion import MODES
-from scripts.comparison.findings import REFERENCE, listed
+from scripts.comparison.report.findings import listed
+from scripts.comparison.study.modes import REFERENCE
 
 from . import claims, strips, triangle
 from .bandwidths import Bandwidth

@@ -14,11 +14,11 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 
 from addon.motion import Poses
-from scripts.comparison import captions, layout
-from scripts.comparison.materials import ink
-from scripts.comparison.stage import make_camera, make_frame, make_lights, set_up_render
-from scripts.comparison.stage_settings import StageSettings
-from scripts.comparison.subject import tinted_slots
+from scripts.comparison.stage import captions, layout
+from scripts.comparison.stage.materials import ink
+from scripts.comparison.stage.scene import make_camera, make_frame, make_lights, set_up_render
+from scripts.comparison.stage.settings import StageSettings
+from scripts.comparison.stage.subject import tinted_slots
 
 WIDTH = 1004
 """Pixels."""

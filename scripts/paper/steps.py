@@ -15,10 +15,10 @@ import bpy
 import numpy as np
 
 from addon.motion import MODES
-from scripts.comparison.clips import Clip
-from scripts.comparison.film import render_film, render_still
-from scripts.comparison.findings import REFERENCE
-from scripts.comparison.study import folder_names, read_clips
+from scripts.comparison.stage.film import render_film, render_still
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.modes import REFERENCE
+from scripts.comparison.study.reading import folder_names, read_clips
 from scripts.files import write_text
 from scripts.workplan import Job, Plan, Task, step
 

@@ -14,9 +14,9 @@ import numpy as np
 from addon.motion import MODES, Poses, interpolate
 from addon.motion.quaternions import angle_between, multiply, normalise, rotate
 from assets.making.motions import TIP
-from scripts.comparison.materials import surface
 from scripts.comparison.palette import GHOST, colour_of
-from scripts.comparison.subject import load_subject
+from scripts.comparison.stage.materials import surface
+from scripts.comparison.stage.subject import load_subject
 
 from .picture import FAINT, INK, RULE, Sheet
 

@@ -5,8 +5,8 @@ or 12 updates a second. Errors are taken over a whole range of updates a second,
 averaged out: `PHASES` of them, each a little later than the one before, are measured together. Then the lowest rate
 that is as good is where the curve of a mode first comes down to the error wanted. Errors are in metres and m/s.
 
-`scripts.comparison.needed` asks the same of one sender and one yardstick, key by key; over several senders the curves
-are smooth enough for the other two.
+`scripts.comparison.study.needed` asks the same of one sender and one yardstick, key by key; over several senders the
+curves are smooth enough for the other two.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import numpy as np
 
 from addon.motion import MODES, Errors, decimate, interpolate, measure, reduce_keys, rms
 from addon.motion.decimation import nearest
-from scripts.comparison.clips import Clip
-from scripts.comparison.findings import NOTHING, REFERENCE
-from scripts.comparison.needed import geometric_mean
-from scripts.comparison.study import same_motions
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.metrics import NOTHING, geometric_mean
+from scripts.comparison.study.modes import REFERENCE
+from scripts.comparison.study.reconstructions import same_motions
 
 from . import claims
 from .motions import sampling_rate

@@ -22,8 +22,8 @@ import numpy as np
 
 from addon.motion import MODES, Poses, decimate, interpolate
 from addon.motion.quaternions import align_signs
-from scripts.comparison.clips import Clip
-from scripts.comparison.findings import REFERENCE
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.modes import REFERENCE
 
 from . import claims
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from addon.motion import MODES, Poses, interpolate, measure
 from addon.motion.quaternions import angle_between, normalise, rotate
-from scripts.comparison.materials import surface
+from scripts.comparison.stage.materials import surface
 
 from . import claims
 from .picture import FAINT, INK, Sheet

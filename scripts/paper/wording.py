@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scripts.comparison.findings import REFERENCE, listed
+from scripts.comparison.report.findings import listed
+from scripts.comparison.study.modes import REFERENCE
 
 from . import claims
 from .timing import Timing

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
-from scripts.comparison.study import folder_names
+from scripts.comparison.study.reading import folder_names
 from scripts.workplan import Workspace
 from scripts.workplan import __main__ as workplan
 from tests.balls import largest_displacements

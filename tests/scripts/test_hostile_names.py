@@ -15,8 +15,8 @@ from urllib.parse import unquote
 import pytest
 
 from scripts import compare
-from scripts.comparison.report import ON_ONE_PAGE
-from scripts.comparison.study import DEVICES, NOT_FOLDERS, folder_names
+from scripts.comparison.report.pages import ON_ONE_PAGE
+from scripts.comparison.study.reading import DEVICES, NOT_FOLDERS, folder_names
 from scripts.trajectories import TrajectoryError, read_trajectories
 from tests.scripts.trajectories.seeds import SEEDS
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure
-from scripts.comparison.choices import Uniform
-from scripts.comparison.clips import Clip
-from scripts.comparison.reconstructions import Reconstruction
+from scripts.comparison.study.choices import Uniform
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reconstructions import Reconstruction
 
 
 def swinging_clip(

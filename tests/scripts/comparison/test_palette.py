@@ -7,7 +7,7 @@ import pytest
 
 from addon.motion import MODES
 from scripts.comparison import palette
-from scripts.comparison.modes import BEST_OF
+from scripts.comparison.study.modes import BEST_OF
 
 # Machado, Oliveira, Fernandes 2009, severity 1: what people with one kind of cone missing see, in linear RGB.
 VISION = {

@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from addon.motion import MODES
 from scripts.comparison import steps
-from scripts.comparison.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts
-from scripts.comparison.clips import Clip
 from scripts.comparison.planning import PIECE, Study, Wanted, comparison_tasks, look_into, reading_tasks
-from scripts.comparison.report import ON_ONE_PAGE, Settings
-from scripts.comparison.stage_settings import StageSettings
-from scripts.comparison.storage import ClipReference, file_names, write_recording
-from scripts.comparison.study import folder_names, reconstruct
+from scripts.comparison.report.pages import ON_ONE_PAGE, Settings
+from scripts.comparison.stage.settings import StageSettings
+from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reading import folder_names
+from scripts.comparison.study.reconstructions import reconstruct
+from scripts.comparison.study.storage import ClipReference, file_names, write_recording
 from scripts.workplan import Plan, Task
 from tests.scripts.comparison.recordings import swinging_clip
 from tests.thoroughness import tried

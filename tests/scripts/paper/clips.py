@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from addon.motion import Poses
-from scripts.comparison.clips import Clip
-from scripts.comparison.study import read_clips
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reading import read_clips
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 

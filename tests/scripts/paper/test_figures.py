@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from scripts.comparison.film import render_still
+from scripts.comparison.stage.film import render_still
 from scripts.paper import claims, picture, strips, triangle
 from scripts.paper.catching import build, views
 from tests.scripts.paper.clips import thrown

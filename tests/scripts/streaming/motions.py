@@ -6,8 +6,8 @@ import numpy as np
 
 from addon.motion import Poses, interpolate
 from addon.motion.quaternions import angle_between, normalise
-from scripts.comparison.clips import Clip
-from scripts.comparison.study import read_clips
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reading import read_clips
 from tests.recordings import RECORDINGS
 
 FRAME = 1.0 / 60.0

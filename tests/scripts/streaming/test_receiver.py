@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from addon.motion import MODES, Poses, interpolate, rms, shell_error
 from addon.motion.quaternions import angle_between
-from scripts.comparison.clips import Clip
+from scripts.comparison.study.clips import Clip
 from scripts.streaming import PACKINGS, Link, Packets, Playback, PlayOut, What, receive, send
 from tests.scripts.streaming.motions import FRAME, SOURCES, clips, swinging
 from tests.thoroughness import sample, tried

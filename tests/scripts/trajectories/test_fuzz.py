@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 from addon.motion import MODES, interpolate, measure, reduce_keys
-from scripts.comparison.study import make_clip
+from scripts.comparison.study.reading import make_clip
 from scripts.trajectories import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.mutations import in_place, mutated

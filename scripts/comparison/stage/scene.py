@@ -1,0 +1,232 @@
+"""The stage: one scene in which every mode moves its own object, side by side, as ordinary keyed animation.
+
+Lanes stand side by side in front of the `Frame`, an empty in the plane of the picture on which everything is written.
+What changes over time is either a key or a node group that reads the frame: the saved file plays for anyone,
+without scripts. The scene's custom properties tell where the recording's origin is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from addon.motion.quaternions import rotate
+
+from .. import palette
+from ..study.reconstructions import Reconstruction
+from . import captions, layout
+from .lanes import Cast, Lanes
+from .settings import SMALL_PICTURE, StageSettings
+from .subject import load_subject, vertices_of
+from .timeline import ShownMotion, Timeline
+
+
+def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.types.Scene:
+    """Make the scene of a comparison, in a file that is emptied for it.
+
+    Raises
+    ------
+    SubjectError
+        Where the object to show cannot be had.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.name = f"{reconstruction.clip.name} {reconstruction.choice.name}"
+    timeline = Timeline.of(reconstruction, settings.fps, settings.slow_motion)
+    motion = ShownMotion.of(reconstruction, timeline)
+    mesh = load_subject(settings.subject)
+    magnification = layout.display_scale(motion.recording.positions, float(np.ptp(vertices_of(mesh), axis=0).max()))
+    mesh.transform(Matrix.Scale(magnification, 4))
+
+    outline = layout.outermost(vertices_of(mesh))
+    yaw = layout.heading(layout.swept_points(motion.recording, outline))
+    low, high = _extent(motion, outline, yaw)
+    width, height = settings.resolution
+    plan = layout.arrange(len(motion.modes), (high - low)[:2], width / height)
+    errors = _errors_in_mm(reconstruction, timeline)
+    cast = Cast(
+        timeline=timeline,
+        motion=motion,
+        layout=plan,
+        yaw=yaw,
+        middle=np.append((low + high)[:2] / 2.0, high[2]),
+        errors=errors,
+        largest_error=max(float(error.max()) for error in errors.values()),
+        mesh=mesh,
+        notes=_notes(reconstruction),
+        traced=layout.telling_point(motion.recording, outline),
+    )
+
+    frame = make_frame(plan.metres)
+    lanes = Lanes(cast, frame)
+    for mode, cell in zip(motion.modes, plan.cells, strict=True):
+        lanes.build(mode, cell)
+    _make_header(reconstruction, settings, cast, lanes, magnification)
+    make_camera(scene, plan.metres, depth=float(high[2] - low[2]))
+    make_lights(scene)
+    set_up_render(scene, settings, timeline.count)
+    scene["recording_centre_m"] = motion.centre.tolist()
+    scene["recording_start_s"] = timeline.start
+    return scene
+
+
+def _extent(motion: ShownMotion, outline: np.ndarray, yaw: float) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest and the highest of right, up and away, shape (3,) each, that anything which moves reaches."""
+    turn = layout.yaw_quaternion(yaw)
+    seen = [
+        layout.project(rotate(turn, layout.swept_points(poses, outline)))
+        for poses in (motion.recording, *motion.modes.values())
+    ]
+    return np.min([points.min(axis=0) for points in seen], axis=0), np.max([p.max(axis=0) for p in seen], axis=0)
+
+
+def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[str, np.ndarray]:
+    """Mode id to the shell error at each frame."""
+    times = timeline.times_of(timeline.frames)
+    return {
+        mode: 1e3 * np.interp(times, reconstruction.times, errors.shell)
+        for mode, errors in reconstruction.errors.items()
+    }
+
+
+def _notes(reconstruction: Reconstruction) -> dict[str, str]:
+    """Mode id to itself, or to its own number of keys where the modes have different ones."""
+    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items()}
+    if len(set(counts.values())) == 1:
+        return {mode: mode for mode in counts}
+    duration = float(np.ptp(reconstruction.times[[0, -1]]))
+    return {mode: f"{(count - 1) / duration:.1f} keys/s on average" for mode, count in counts.items()}
+
+
+def make_frame(metres: float) -> bpy.types.Object:
+    """The plane of the picture, behind everything that moves."""
+    frame = bpy.data.objects.new("Frame", None)
+    frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
+    frame.scale = (metres, metres, metres)
+    frame.empty_display_size = 0.1
+    return frame
+
+
+def _make_header(
+    reconstruction: Reconstruction, settings: StageSettings, cast: Cast, lanes: Lanes, magnification: float
+) -> None:
+    """What is written above and below the lanes: clip, rate and time, and how to read the picture."""
+    collection = bpy.data.collections.new("Captions")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(lanes.frame)
+    left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN - 0.042
+    right = -left
+
+    def put(obj: bpy.types.Object, x: float, y: float) -> None:
+        captions.put(obj, lanes.frame, collection, x, y)
+
+    name_width = captions.width_of(reconstruction.clip.name)
+    size = min(0.046, 0.5 * (right - left) / name_width)
+    put(captions.words("Clip", reconstruction.clip.name, size, lanes.ink), left, line)
+    rate = captions.words("Choice of keys", reconstruction.choice.title, 0.034, lanes.faint)
+    put(rate, left + name_width * size + 0.03, line)
+    timeline = cast.timeline
+    ends = timeline.frames[[0, -1]]
+    decimals = captions.readout_group("Time in s", 2, lanes.ink)
+    put(captions.readout("Time", decimals, 0.046, ends, timeline.times_of(ends) - timeline.start), right - 0.03, line)
+    put(captions.words("Seconds", "s", 0.034, lanes.faint, "RIGHT"), right, line)
+
+    full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
+    parts = ["translucent: the recording", "dots: the keys kept", f"number and bar: shell error (full bar {full} mm)"]
+    if settings.slow_motion != 1.0:
+        parts.append(f"{settings.slow_motion:g} times slower than life")
+    if magnification > 1.0:
+        parts.append(f"object shown {magnification:.3g} times its size")
+    legend = "    ".join(parts)
+    size = min(0.026, (right - left) / captions.width_of(legend))
+    put(captions.words("Legend", legend, size, lanes.faint), left, -0.5 + layout.MARGIN + 0.002)
+
+
+def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
+    """A camera square to the frame, in front of all that moves, with parallel rays."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
+    camera.location = -layout.AWAY * (depth + metres)
+    camera.data.type = "ORTHO"
+    camera.data.sensor_fit = "VERTICAL"
+    camera.data.ortho_scale = metres
+    camera.data.clip_start = 0.5 * metres
+    camera.data.clip_end = depth + 1.5 * metres
+
+
+def make_lights(scene: bpy.types.Scene) -> None:
+    """Two suns for EEVEE and Cycles. Workbench brings its own light."""
+    for name, strength, pitch, yaw in (("Key light", 3.0, 40.0, -35.0), ("Fill light", 1.2, 60.0, 50.0)):
+        light = bpy.data.lights.new(name, "SUN")
+        light.energy = strength
+        light.angle = math.radians(5.0)
+        obj = bpy.data.objects.new(name, light)
+        obj.rotation_euler = (math.radians(pitch), 0.0, math.radians(yaw))
+        scene.collection.objects.link(obj)
+
+
+def set_up_render(
+    scene: bpy.types.Scene, settings: StageSettings, frames: int, background: str = palette.BACKGROUND
+) -> None:
+    """Engine, size, colours and encoder of a scene of so many frames."""
+    scene.frame_start, scene.frame_end = 1, frames
+    scene.frame_set(1)
+    render = scene.render
+    render.resolution_x, render.resolution_y = settings.resolution
+    render.resolution_percentage = 100
+    render.fps, render.fps_base = settings.fps, 1.0
+    render.engine = _engine_id(settings.engine)
+    scene.view_settings.view_transform = "Standard"
+    _set_background(scene, background)
+    _set_up_video(scene)
+    scene.display.render_aa = settings.antialiasing or ("FXAA" if render.resolution_y < SMALL_PICTURE else "OFF")
+    shading = scene.display.shading
+    shading.light, shading.studio_light = "STUDIO", "paint.sl"
+    shading.color_type = "MATERIAL"
+    shading.show_object_outline = shading.show_shadows = shading.show_cavity = False
+    scene.eevee.taa_render_samples = settings.samples
+    if hasattr(scene, "cycles"):  # An add-on, which may be off.
+        scene.cycles.samples = settings.samples
+        scene.cycles.use_denoising = False
+
+
+def _set_up_video(scene: bpy.types.Scene) -> None:
+    """H.264 in an MP4 beside the .blend, wherever that is taken, by Blender's own encoder."""
+    image, video = scene.render.image_settings, scene.render.ffmpeg
+    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+        image.media_type = "VIDEO"
+    image.file_format = "FFMPEG"
+    image.color_mode = "RGB"
+    video.format, video.codec, video.audio_codec = "MPEG4", "H264", "NONE"
+    video.constant_rate_factor = "HIGH"  # Thin lines and small letters stay sharp.
+    video.ffmpeg_preset = "REALTIME"
+    video.gopsize = scene.render.fps
+    scene.render.use_file_extension = True
+    scene.render.use_stamp_date = False  # The same film is the same file, whenever it is made.
+    scene.render.filepath = "//comparison.mp4"
+
+
+def _set_background(scene: bpy.types.Scene, background: str) -> None:
+    """One colour, for Workbench and for the others."""
+    scene.world = bpy.data.worlds.new("World")
+    colour = palette.linear(background)
+    scene.world.color = colour
+    if scene.world.node_tree is None:  # Blender 5 makes it, and warns of the switch.
+        scene.world.use_nodes = True
+    nodes = scene.world.node_tree.nodes
+    next(node for node in nodes if node.bl_idname == "ShaderNodeBackground").inputs["Color"].default_value = (
+        *colour,
+        1.0,
+    )
+
+
+def _engine_id(engine: str) -> str:
+    """Blender's name of an engine. EEVEE's was another before Blender 5."""
+    if engine == "eevee":
+        return "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+    return {"workbench": "BLENDER_WORKBENCH", "cycles": "CYCLES"}[engine]

@@ -1,0 +1,143 @@
+"""The object that is shown: a model of ours or any object of a user's .blend file, as one mesh of its own.
+
+Whatever makes up its shape (modifiers, curves, text) is in the mesh; of the file it came from nothing else remains.
+Scripts in such a file never run: it is read as data.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from .settings import SubjectError, place_of_subject
+
+TINTED = "Mode"
+"""The material that gives way to the colour of the lane."""
+
+
+def load_subject(wanted: str) -> bpy.types.Mesh:
+    """The mesh of an object, in its own axes and its size in the world of its file.
+
+    Parameters
+    ----------
+    wanted : str
+        See `place_of_subject`.
+
+    Raises
+    ------
+    SubjectError
+        Where the file, the object or its faces are missing.
+    """
+    return _read_mesh(*place_of_subject(wanted))
+
+
+def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Shape (n, 3), metres."""
+    flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3).astype(np.float64)
+
+
+def shrink(mesh: bpy.types.Mesh, depth: float) -> None:
+    """Move every vertex inwards, against its normal, by a length in metres."""
+    normals = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertex_normals.foreach_get("vector", normals)
+    inside = vertices_of(mesh) - depth * normals.reshape(-1, 3)
+    mesh.vertices.foreach_set("co", inside.astype(np.float32).ravel())
+    mesh.update()
+
+
+def tinted_slots(mesh: bpy.types.Mesh) -> list[int]:
+    """The material slots that take the colour of the lane: those named `TINTED`, or else the first."""
+    named = [index for index, material in enumerate(mesh.materials) if material and _plain(material.name) == TINTED]
+    return named or [0]
+
+
+def _plain(name: str) -> str:
+    """The name without the number that Blender adds to make it unique."""
+    stem, dot, number = name.rpartition(".")
+    return stem if dot and number.isdecimal() else name
+
+
+def _read_mesh(file: Path, name: str) -> bpy.types.Mesh:
+    if not file.is_file():
+        raise SubjectError(f"{file}: there is no such file")
+    before = set(bpy.data.user_map())
+    mesh = None
+    try:
+        with bpy.data.libraries.load(str(file), link=False) as (source, target):
+            if name not in source.objects:
+                raise SubjectError(f"{file}: has no object {name!r}; it has {_listed(source.objects)}")
+            target.objects = [name]
+        mesh = _evaluated_copy(target.objects[0])
+        names = _own_materials(mesh) if mesh else {}
+    except OSError as error:
+        raise SubjectError(f"{file}: is not a .blend file that this Blender can read") from error
+    finally:
+        _discard_all_but(mesh, before)
+    if mesh is None:
+        raise SubjectError(f"{file}: {name!r} has no faces to show; name a mesh, curve, surface or text object")
+    mesh.name = name
+    for material, plain in names.items():
+        material.name = plain
+    if not mesh.materials:
+        mesh.materials.append(None)
+    return mesh
+
+
+def _listed(names: list[str]) -> str:
+    return (", ".join(sorted(names)[:12]) + (", ..." if len(names) > 12 else "")) or "none"
+
+
+def _evaluated_copy(loaded: bpy.types.Object) -> bpy.types.Mesh | None:
+    """The shape as its scene shows it, sized as in its file; None for what has no faces."""
+    objects = bpy.context.scene.collection.objects
+    objects.link(loaded)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = loaded.evaluated_get(depsgraph)
+    try:
+        mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+    except RuntimeError:  # A light, a camera, an empty.
+        return None
+    finally:
+        size = evaluated.matrix_world.to_scale()
+        objects.unlink(loaded)
+    if not mesh.polygons:
+        return None
+    mesh.transform(Matrix.Diagonal((*size, 1.0)))
+    return mesh
+
+
+def _own_materials(mesh: bpy.types.Mesh) -> dict[bpy.types.Material, str]:
+    """Give the mesh copies of its materials, and return the names they are copies of.
+
+    Blender notes in what it loads which file that was, by its full path, and a copy has no such note. Images are
+    packed, so that the file that shows the object can be opened elsewhere.
+    """
+    names = {}
+    for slot, material in enumerate(mesh.materials):
+        if material is not None:
+            mesh.materials[slot] = material.copy()
+            names[mesh.materials[slot]] = material.name
+    for image in bpy.data.images:
+        if image.source == "FILE" and not image.packed_file and Path(bpy.path.abspath(image.filepath)).is_file():
+            image.pack()
+    return names
+
+
+def _discard_all_but(mesh: bpy.types.Mesh | None, before: set[bpy.types.ID]) -> None:
+    """Remove what came with the object, except what the mesh uses: its materials and their images."""
+    arrived = set(bpy.data.user_map()) - before
+    for block in arrived:
+        if getattr(block, "animation_data", None) is not None:
+            block.animation_data_clear()
+    users = bpy.data.user_map(subset=arrived)
+    needed: set[bpy.types.ID] = set()
+    found = arrived & {mesh}
+    while found:
+        needed |= found
+        found = {block for block in arrived - needed if users[block] & needed and not isinstance(block, bpy.types.Text)}
+    bpy.data.batch_remove(arrived - needed)

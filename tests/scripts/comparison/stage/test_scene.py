@@ -1,0 +1,284 @@
+from __future__ import annotations
+
+import dataclasses
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+
+from addon.animation import channelbag_of, read_poses
+from addon.motion import KEYFRAME_MODES, Poses, interpolate
+from addon.motion.quaternions import angle_between, conjugate, multiply, rotate
+from scripts.comparison.stage import layout
+from scripts.comparison.stage.nodes import input_path
+from scripts.comparison.stage.scene import build_stage
+from scripts.comparison.stage.settings import StageSettings
+from scripts.comparison.stage.subject import vertices_of
+from scripts.comparison.stage.timeline import Timeline
+from scripts.comparison.study.choices import Tolerance
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reconstructions import reconstruct as choose
+from scripts.trajectories.axes import to_blender
+from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.thoroughness import sample
+
+SETTINGS = StageSettings(resolution=(160, 90), fps=12)
+TWO = ("lerp_slerp", "dq_sclerp")
+
+
+def changed(clip: Clip, scale: float | tuple[float, ...] = 1.0, offset: float = 0.0) -> Clip:
+    return dataclasses.replace(clip, poses=Poses(clip.poses.positions * scale + offset, clip.poses.quaternions))
+
+
+def evaluated_points(obj: bpy.types.Object) -> np.ndarray:
+    """World points of the object as it is drawn, instances included."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    points = [np.empty((0, 3))]
+    for instance in depsgraph.object_instances:
+        owner = instance.parent if instance.is_instance else instance.object
+        if owner.name == obj.name and instance.object.type == "MESH":
+            matrix = np.array(instance.matrix_world)
+            points.append(vertices_of(instance.object.data) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(points)
+
+
+def assert_same_poses(found: Poses, wanted: Poses) -> None:
+    assert np.abs(found.positions - wanted.positions).max() < 1e-5
+    assert angle_between(found.quaternions, wanted.quaternions).max() < 1e-5 * 4
+
+
+@pytest.mark.parametrize("axes", ["blender", "unity"])
+def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
+    clip = dataclasses.replace(changed(swinging_clip(seconds=1.0), offset=300.0), axes=axes)
+    reconstruction = reconstruct(clip, "5")
+    scene = build_stage(reconstruction, SETTINGS)
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    times = timeline.times_of(timeline.frames)
+    centre = np.array(scene["recording_centre_m"])
+    for mode in KEYFRAME_MODES:
+        lane = bpy.data.objects[f"Lane {mode}"]
+        turn = np.array(lane.matrix_world.to_quaternion())
+        kept = reconstruction.keys[mode]
+        shown = {
+            mode: interpolate(clip.times[kept], clip.poses[kept], times, mode),
+            f"{mode} recording": interpolate(clip.times, clip.poses, times, "dq_sclerp"),
+        }
+        for name, poses in shown.items():
+            found = read_poses(bpy.data.objects[name], timeline.frames)
+            wanted = to_blender(poses, axes)
+            at_home = Poses(
+                rotate(conjugate(turn), found.positions - np.array(lane.matrix_world.translation)) + centre,
+                multiply(conjugate(turn), found.quaternions),
+            )
+            assert_same_poses(at_home, wanted)
+
+
+def test_the_keys_of_a_mode_are_ordinary_keys_for_every_frame():
+    scene = build_stage(reconstruct(swinging_clip(seconds=1.0), "5", TWO), SETTINGS)
+    for mode in TWO:
+        fcurves = channelbag_of(bpy.data.objects[mode]).fcurves
+        assert {curve.data_path for curve in fcurves} == {"location", "rotation_quaternion"}
+        assert {len(curve.keyframe_points) for curve in fcurves} == {scene.frame_end}
+        assert bpy.data.objects[mode].animation_data.action.name == mode
+
+
+def test_an_object_that_grows_grows_on_the_stage():
+    clip = swinging_clip(seconds=0.6)
+    scales = np.linspace(1.0, 2.0, len(clip.times))
+    growing = dataclasses.replace(clip, poses=Poses(clip.poses.positions, clip.poses.quaternions, scales))
+    scene = build_stage(reconstruct(growing, "5", ("cga_slerp",)), SETTINGS)
+    found = read_poses(bpy.data.objects["cga_slerp"], np.array([1.0, scene.frame_end]))
+    assert found.scales[0] == pytest.approx(1.0, abs=1e-5)
+    assert found.scales[1] > 1.6
+
+
+CLIPS = {
+    "as recorded": (1.0, 0.0),
+    "a millimetre": (1e-3, 0.0),
+    "a kilometre": (1e3, 0.0),
+    "far away": (1.0, 1e4),
+    "flat on the floor": ((1.0, 1.0, 0.0), 0.0),
+    "up and down": ((0.0, 0.0, 3.0), 0.0),
+    "on the spot": (0.0, 5.0),
+}
+
+
+@pytest.mark.parametrize("clip", CLIPS)
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
+def test_everything_that_moves_stays_within_its_own_card(clip, modes):
+    scene = build_stage(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
+    aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
+    for frame in sample(range(1, scene.frame_end + 1, 2)):
+        scene.frame_set(frame)
+        for mode in modes:
+            card = bpy.data.objects[f"{mode} card"]
+            size = card.data.vertices
+            half = np.abs([vertex.co[:2] for vertex in size]).max(axis=0)
+            for name in (mode, f"{mode} recording"):
+                obj = bpy.data.objects[name]
+                world = np.array(obj.matrix_world)
+                points = layout.outermost(vertices_of(obj.data)) @ world[:3, :3].T + world[:3, 3]
+                seen = np.array([world_to_camera_view(scene, scene.camera, Vector(point)) for point in points])
+                places = (seen[:, :2] - 0.5) * (aspect, 1.0) - np.array(card.location[:2])
+                assert (np.abs(places) < half).all()
+                assert (seen[:, 2] > scene.camera.data.clip_start).all()
+                assert (seen[:, 2] < scene.camera.data.clip_end).all()
+
+
+def test_everything_that_is_written_is_within_the_picture():
+    clip = dataclasses.replace(swinging_clip(seconds=0.6), name="a_recording_with_quite_a_long_name_" * 3)
+    scene = build_stage(reconstruct(clip, "7.5"), SETTINGS)
+    for obj in bpy.data.objects["Frame"].children:
+        corners = evaluated_points(obj) if obj.type == "MESH" else [obj.matrix_world @ Vector(c) for c in obj.bound_box]
+        assert len(corners)
+        for corner in corners:
+            x, y, depth = world_to_camera_view(scene, scene.camera, Vector(corner))
+            assert -1e-6 <= x <= 1 + 1e-6, obj.name
+            assert -1e-6 <= y <= 1 + 1e-6, obj.name
+            assert scene.camera.data.clip_start < depth < scene.camera.data.clip_end
+
+
+def test_the_number_and_the_bar_show_the_error_of_the_frame():
+    reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
+    scene = build_stage(reconstruction, SETTINGS)
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    largest = 0.0
+    errors = {}
+    for mode in TWO:
+        times = timeline.times_of(timeline.frames)
+        errors[mode] = 1e3 * np.interp(times, reconstruction.times, reconstruction.errors[mode].shell)
+        largest = max(largest, errors[mode].max())
+    for mode in TWO:
+        number, bar = bpy.data.objects[f"{mode} error"], bpy.data.objects[f"{mode} bar"]
+        path = input_path(number.modifiers[0], "Value")
+        written = channelbag_of(number).fcurves.find(path, index=0)
+        drawn = []
+        for frame, error in enumerate(errors[mode], start=1):
+            scene.frame_set(frame)
+            assert written.evaluate(frame) == pytest.approx(error, abs=1e-4)
+            assert bar.scale.x == pytest.approx(error / largest, abs=1e-5)
+            drawn.append(evaluated_points(number))
+        assert all(len(points) for points in drawn)
+        assert any(len(points) != len(drawn[0]) for points in drawn)
+
+
+def test_the_number_ends_where_it_ended():
+    scene = build_stage(reconstruct(swinging_clip(seconds=1.0), "5", TWO), SETTINGS)
+    clock = bpy.data.objects["Time"]
+    ends = []
+    for frame in (2, 6, 11):
+        scene.frame_set(frame)
+        ends.append(evaluated_points(clock)[:, 0].max())
+    assert np.ptp(ends) < 0.006 * bpy.data.objects["Frame"].scale.x
+
+
+def test_the_trail_ends_at_the_object_and_follows_it_for_a_while():
+    reconstruction = reconstruct(swinging_clip(seconds=2.0), "5", TWO)
+    scene = build_stage(reconstruction, SETTINGS)
+    frame = scene.frame_end
+    for mode in TWO:
+        trail = bpy.data.objects[f"{mode} trail"]
+        path = vertices_of(trail.data)
+        world = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world)
+        path = path @ world[:3, :3].T + world[:3, 3]
+        scene.frame_set(frame)
+        drawn = evaluated_points(trail)
+        reach = 0.02 * bpy.data.objects["Frame"].scale.x
+        gaps = np.linalg.norm(drawn[None] - path[:, None], axis=-1).min(axis=1)
+        assert gaps[-1] < reach
+        assert gaps[0] > reach
+        scene.frame_set(1)
+        assert len(evaluated_points(trail)) < len(drawn) / 4
+
+
+def test_keys_are_marked_where_the_modes_meet_the_recording():
+    reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
+    scene = build_stage(reconstruction, SETTINGS)
+    keys = bpy.data.objects["dq_sclerp keys"]
+    assert len(keys.data.vertices) == len(reconstruction.keys["dq_sclerp"])
+    scene.frame_set(scene.frame_end)
+    radius = 0.02 * bpy.data.objects["Frame"].scale.x
+    world = np.array(keys.matrix_world)
+    last = vertices_of(keys.data)[-1] @ world[:3, :3].T + world[:3, 3]
+    assert np.linalg.norm(evaluated_points(keys) - last, axis=1).min() < radius
+
+
+def test_the_file_needs_no_script_to_play():
+    build_stage(reconstruct(swinging_clip(seconds=0.6), "5"), SETTINGS)
+    assert not bpy.data.texts
+    for block in bpy.data.user_map():
+        data = getattr(block, "animation_data", None)
+        assert data is None or not data.drivers, block
+
+
+def test_the_outliner_tells_what_is_what():
+    scene = build_stage(reconstruct(swinging_clip("arm", seconds=0.6), "7.5", TWO), SETTINGS)
+    assert scene.name == "arm 7.5"
+    assert {child.name for child in scene.collection.children} == {"Lane lerp_slerp", "Lane dq_sclerp", "Captions"}
+    assert {"dq_sclerp", "dq_sclerp recording"} <= set(bpy.data.collections["Lane dq_sclerp"].objects.keys())
+
+
+def test_a_clip_shorter_than_a_frame_is_one_frame():
+    scene = build_stage(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
+    assert (scene.frame_start, scene.frame_end) == (1, 1)
+    assert len(evaluated_points(bpy.data.objects["Time"]))
+
+
+@pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
+def test_every_engine_can_be_chosen(engine):
+    reconstruction = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
+    scene = build_stage(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
+    assert engine in scene.render.engine.lower()
+
+
+def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
+    build_stage(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
+    assert "object shown" in bpy.data.curves["Legend"].body
+    assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 5.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"engine": "lux"}, "engine 'lux': there are workbench, eevee, cycles"),
+        ({"resolution": (641, 360)}, "resolution 641x360: give two even numbers"),
+        ({"fps": 0}, "0 frames a second"),
+        ({"slow_motion": 0.0}, "slow motion by 0.0"),
+        ({"antialiasing": "7"}, "antialiasing '7'"),
+    ],
+)
+def test_settings_that_make_no_film_are_refused(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        StageSettings(**wrong)
+
+
+def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counted_in_its_caption():
+    reconstruction = choose(swinging_clip(seconds=1.0), Tolerance("5mm"), ("lerp_slerp", "motor_spline"), 0.1)
+    scene = build_stage(reconstruction, SETTINGS)
+    assert scene.name == "swing tolerance-5mm"
+    assert bpy.data.curves["Choice of keys"].body == "within 5 mm"
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    assert len(reconstruction.keys["motor_spline"]) < len(reconstruction.keys["lerp_slerp"])
+    for mode, keys in reconstruction.keys.items():
+        marks = bpy.data.objects[f"{mode} keys"].data
+        frames = np.empty(len(marks.vertices), dtype=np.float32)
+        marks.attributes["frame"].data.foreach_get("value", frames)
+        assert np.allclose(frames, timeline.frames_of(reconstruction.clip.times[keys]), atol=1e-4)
+        caption = " ".join(bpy.data.curves[f"{mode} id"].body.split())
+        assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s on average"
+
+
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
+@pytest.mark.parametrize("clip", [1.0, (0.0, 0.0, 3.0)], ids=["as recorded", "up and down"])
+def test_the_count_of_keys_does_not_run_into_the_error(modes, clip):
+    build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), SETTINGS)
+    for mode in modes:
+        count, number = bpy.data.objects[f"{mode} id"], bpy.data.objects[f"{mode} error"]
+        corners = np.array([count.matrix_local @ Vector(corner) for corner in count.bound_box])
+        label = bpy.data.objects[f"{mode} label"]
+        assert corners[:, 1].max() < min((label.matrix_local @ Vector(corner)).y for corner in label.bound_box)
+        digits = 4 * 0.5 * number.scale.x
+        beside, above = number.location.x - digits, number.location.y + 0.75 * number.scale.y
+        assert corners[:, 0].max() < beside or corners[:, 1].min() > above

@@ -1,0 +1,44 @@
+"""Reading sources: of several bodies the good ones stay, and the others are named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.motion import Poses
+from scripts.comparison.study import reading as study
+from scripts.trajectories import Recording, Trajectory, TrajectoryError
+
+
+def body(name: str, sound: int, lost: int = 0) -> Trajectory:
+    """A body with so many good samples, and so many that were not tracked."""
+    positions = np.zeros((sound + lost, 3))
+    positions[sound:] = np.nan
+    quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (sound + lost, 1))
+    return Trajectory(name, np.arange(sound + lost, dtype=float), Poses(positions, quaternions))
+
+
+@pytest.fixture
+def recorded(monkeypatch: pytest.MonkeyPatch):
+    """Lets a source hold these bodies."""
+
+    def hold(*bodies: Trajectory) -> None:
+        monkeypatch.setattr(study, "read_trajectories", lambda source: Recording(Path("take.csv"), bodies))
+
+    return hold
+
+
+def test_a_body_without_two_poses_is_left_out_and_named(recorded):
+    recorded(body("left", 5), body("tracker", 1, lost=7), body("right", 4))
+    clips, note = study.read_source("take.csv:*", "blender")
+    assert [clip.name for clip in clips] == ["take-left", "take-right"]
+    assert note.startswith("'tracker' is left out: 1 usable poses are left")
+
+
+@pytest.mark.parametrize("bodies", [("left",), ("left", "right")])
+def test_a_source_without_any_good_body_is_refused(recorded, bodies):
+    recorded(*(body(name, 1, lost=3) for name in bodies))
+    with pytest.raises(TrajectoryError, match="1 usable poses are left"):
+        study.read_source("take.csv:*", "blender")
