@@ -166,7 +166,7 @@ def _show(obj: bpy.types.Object, first: float, last: float) -> None:
 
 def _captions(camera: bpy.types.Object, side: float, title: str, colour: str, poses: np.ndarray, says: str) -> None:
     """Title, poses that have passed, all of them on a strip, and what there is to say, below a lane."""
-    bright, faint, dim = ink(f"{title} ink", colour), ink("Faint", palette.FAINT), ink("Dim", palette.TRACK)
+    bright, faint, dim = ink(f"{title} ink", colour), ink("Faint", palette.DARK.faint), ink("Dim", palette.DARK.track)
     bottom = -WIDTH * SETTINGS.resolution[1] / SETTINGS.resolution[0]
     every, collection = dancer.FRAMES, bpy.context.scene.collection
 
@@ -210,7 +210,7 @@ def _captions(camera: bpy.types.Object, side: float, title: str, colour: str, po
             pop[:, 1] = 1.0 + 0.9 * np.linspace(1.0, 0.0, 5)
             write_channel(tick, "scale", frame + np.arange(5.0), pop)
     head = figure.boxes(
-        "Playhead", ink("Playhead", palette.INK), ((0.0, 0.0, 0.0), (0.004 * WIDTH, 1.7 * tall, 0.0005))
+        "Playhead", ink("Playhead", palette.DARK.ink), ((0.0, 0.0, 0.0), (0.004 * WIDTH, 1.7 * tall, 0.0005))
     )
     put(head, LEFT, STRIP, 0.002)
     ways = np.tile(np.array(head.location), (len(every), 1))

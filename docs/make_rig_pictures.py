@@ -83,7 +83,7 @@ def lever(rig: bpy.types.Object) -> scenes.Scene:
     knob.parent, knob.location = rod, (0.0, 0.0, 0.62)
     grip = figure.boxes("Grip", wood, ((0.0, 0.0, scenes.LEVER), (0.034, 0.034, 0.15)))
     grip.parent = rod
-    stand = figure.boxes("Stand", surface("Stand", palette.TRACK), ((0.0, 0.0, -0.4), (0.10, 0.16, 0.8)))
+    stand = figure.boxes("Stand", surface("Stand", palette.DARK.track), ((0.0, 0.0, -0.4), (0.10, 0.16, 0.8)))
     stand.parent, stand.location = rig, scenes.PIVOT
     return scenes.pull_a_lever(rig, rod)
 
@@ -192,7 +192,7 @@ def build(shot: Shot) -> bpy.types.Scene:
 
 def caption(camera: bpy.types.Object, shot: Shot, side: float, title: str, colour: str, strays: np.ndarray) -> None:
     """Title, number and what it is of, below a lane."""
-    bright, faint = ink(f"{title} ink", colour), ink("Faint", palette.FAINT)
+    bright, faint = ink(f"{title} ink", colour), ink("Faint", palette.DARK.faint)
     unit = shot.width
     bottom = -unit * SETTINGS.resolution[1] / SETTINGS.resolution[0]
     collection = bpy.context.scene.collection

@@ -2,12 +2,13 @@
 
 The modes have the colours of Okabe and Ito (Color Universal Design, 2008), which people with any of the common forms
 of colour blindness can tell apart, but for a lighter blue, and a leaf green beside them that keeps apart from all: each
-reaches a contrast of 3 on the stage. Nothing here needs Blender.
+reaches a contrast of 3 on the dark stage, and is darkened to reach it on the light one. Nothing here needs Blender.
 """
 
 from __future__ import annotations
 
 import zlib
+from dataclasses import dataclass
 
 MODE_COLOURS: dict[str, str] = {
     "lerp_slerp": "#D55E00",
@@ -25,12 +26,32 @@ MODE_COLOURS: dict[str, str] = {
 OTHER_COLOURS = ("#B3B3B3", "#A98467", "#B7E4C7")
 """For modes that have no colour of their own yet."""
 
-BACKGROUND = "#14171C"
-CARD = "#242932"
-TRACK = "#3A424E"
-FAINT = "#9AA4B2"
-INK = "#EEF1F5"
-GHOST = "#C9D3E0"
+
+@dataclass(frozen=True)
+class Theme:
+    """The colours of a stage."""
+
+    background: str
+    card: str
+    """What a lane stands on."""
+
+    track: str
+    """What is yet to come in a graph."""
+
+    faint: str
+    ink: str
+    ghost: str
+    """Of the recording."""
+
+
+THEMES = {
+    "dark": Theme("#14171C", "#242932", "#3A424E", "#9AA4B2", "#EEF1F5", "#C9D3E0"),
+    "light": Theme("#E4E7EB", "#FFFFFF", "#D3D9E0", "#58626E", "#14171C", "#5B6572"),
+}
+DARK = THEMES["dark"]
+
+LEAST_CONTRAST = 3.0
+"""Of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
 
 
 def colour_of(mode: str) -> str:
@@ -38,8 +59,29 @@ def colour_of(mode: str) -> str:
     return MODE_COLOURS.get(mode) or OTHER_COLOURS[zlib.crc32(mode.encode()) % len(OTHER_COLOURS)]
 
 
+def colour_on(theme: Theme, mode: str) -> str:
+    """The colour of a mode, darkened as far as it needs to be to stand out from a light card."""
+    red, green, blue = linear(colour_of(mode))
+    highest = (luminance(theme.card) + 0.05) / LEAST_CONTRAST - 0.05
+    if luminance(theme.card) < 0.5 or luminance(colour_of(mode)) <= highest:
+        return colour_of(mode)
+    share = highest / luminance(colour_of(mode))
+    return "#" + "".join(f"{int(255.0 * _encoded(share * value)):02X}" for value in (red, green, blue))
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance, 0 to 1."""
+    red, green, blue = linear(colour)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
 def linear(colour: str) -> tuple[float, float, float]:
     """The linear RGB, 0 to 1, that Blender computes in, of an sRGB colour such as "#56B4E9"."""
     encoded = (int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
     red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in encoded)
     return red, green, blue
+
+
+def _encoded(value: float) -> float:
+    """What sRGB has for linear light."""
+    return 12.92 * value if value <= 0.0031308 else 1.055 * value ** (1.0 / 2.4) - 0.055

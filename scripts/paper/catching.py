@@ -18,7 +18,7 @@ from addon.animation import bake_poses
 from addon.motion import MODES, Poses, interpolate, measure, rms
 from addon.motion.quaternions import multiply, rotate
 from assets.making.motions import HAND, THERE
-from scripts.comparison.palette import GHOST, colour_of
+from scripts.comparison.palette import DARK, colour_of
 from scripts.comparison.stage import captions, layout, trails
 from scripts.comparison.stage.materials import surface
 from scripts.comparison.stage.nodes import apply_group
@@ -231,7 +231,7 @@ class _Cast:
     def __init__(self, sheet: Sheet, truth: Poses) -> None:
         self.sheet, self.truth = sheet, truth
         self.tool, self.controller = load_subject("drill"), load_subject("controller")
-        self.ghost = surface("What happened", GHOST, alpha=0.45)
+        self.ghost = surface("What happened", DARK.ghost, alpha=0.45)
         self.hands = {hand: surface(hand, colour) for hand, colour in HANDS.items()}
         self.tools = {mode: surface(f"Mode {mode}", colour_of(mode)) for mode in ENGINES}
         self.trail = trails.trail_group()
@@ -279,7 +279,7 @@ class _Cast:
 def _write_legend(sheet: Sheet, moments: np.ndarray) -> None:
     """What is what, and the time."""
     low = -0.5 + 0.042
-    entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (GHOST, "what happened")]
+    entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (DARK.ghost, "what happened")]
     sheet.key(entries, sheet.left, low, 6.5)
     sheet.words(
         "coloured: the tool as shown, and its path; mm: from tool to hand at the catch",

@@ -14,7 +14,7 @@ import numpy as np
 from addon.motion import MODES, Poses, interpolate
 from addon.motion.quaternions import angle_between, multiply, normalise, rotate
 from assets.making.motions import TIP
-from scripts.comparison.palette import GHOST, colour_of
+from scripts.comparison.palette import DARK, colour_of
 from scripts.comparison.stage.materials import surface
 from scripts.comparison.stage.subject import load_subject
 
@@ -88,7 +88,7 @@ def build() -> bpy.types.Scene:
     """The figure as a scene."""
     sheet = Sheet(1000, 1.56)
     mesh = load_subject("drill")
-    ghost = surface("Pivoting about the tip", GHOST, alpha=0.35)
+    ghost = surface("Pivoting about the tip", DARK.ghost, alpha=0.35)
     rest = interpolate([0.0, 1.0], keys(), MOMENTS, "dq_sclerp")
     numbers = {(one.mode, one.at): one for one in instants()}
     columns = np.linspace(-0.378, 0.345, len(MOMENTS)) * sheet.aspect

@@ -6,6 +6,8 @@ to play them; they end at a fixed place and Blender's own font has digits of one
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 import numpy as np
 
@@ -52,13 +54,16 @@ def words(name: str, text: str, size: float, material: bpy.types.Material, align
     return bpy.data.objects.new(name, curve)
 
 
-def in_two_lines(text: str) -> str:
-    """The text broken at the space that leaves the shortest lines, preferably before a bracket."""
-    breaks = [place for place, letter in enumerate(text) if letter == " "]
-    if not breaks:
-        return text
-    best = min(breaks, key=lambda place: max(place, len(text) - place - 1) - 2 * (text[place + 1] == "("))
-    return f"{text[:best]}\n{text[best + 1 :]}"
+def wrapped(parts: Sequence[str], width: float) -> str:
+    """The parts with commas between them, in lines that are no wider than that where they have several parts."""
+    lines = [parts[0]]
+    for part in parts[1:]:
+        if width_of(f"{lines[-1]}, {part},") <= width:
+            lines[-1] += f", {part}"
+        else:
+            lines[-1] += ","
+            lines.append(part)
+    return "\n".join(lines)
 
 
 def put(

@@ -1,7 +1,7 @@
-"""Lanes: what one mode has of the stage. An object that moves, the recording as its ghost, trails, marks, a caption.
+"""Lanes: what a motion has of the stage. An object that moves, the recording as its ghost, trails, marks, a caption.
 
-A lane is an empty; what moves is its child, so an object's own channels are the poses of `timeline.ShownMotion`. What
-is written is a child of the frame (`layout`).
+A lane is an empty; what moves is its child, so an object's own channels are the poses of `timeline.ShownMotion`. Where
+the camera follows, the empty moves the other way. What is written is a child of the frame (`layout`).
 """
 
 from __future__ import annotations
@@ -10,14 +10,15 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from addon.animation import bake_poses, write_channel
 from addon.motion import Poses
+from addon.motion.quaternions import rotate
 
-from .. import palette
+from ..palette import Theme, colour_on
 from ..study.modes import label_of
 from . import captions, layout, trails
+from .framing import Framing
 from .materials import ink, surface
 from .nodes import apply_group
 from .subject import shrink, tinted_slots, vertices_of
@@ -30,17 +31,16 @@ MARKS_SHOWN = 14
 """About so many marks are shown at once: those nearest in time, where keys are dense."""
 
 # In units of the frame's height.
-TRAIL_RADIUS = 0.0032
-PATH_RADIUS = 0.0012
-MARK_RADIUS = 0.0042
+TRAIL_RADIUS = 0.0036
+PATH_RADIUS = 0.0014
+MARK_RADIUS = 0.0052
 
-GHOST_ALPHA = 0.24
+GHOST_ALPHA = 0.3
 GHOST_INSET = 0.003
 """How much smaller the ghost is all around, in units of the object: where both agree, the object hides it."""
 
-BAR_HEIGHT = 0.009
-NUMBER_WIDTH = 3.6
-"""Of the error with its unit, in units of its size."""
+TITLE, NAME, NUMBER, UNIT, GRAPH = 0.05, 0.033, 0.064, 0.036, 0.07
+"""Sizes of what a caption holds, in units of the frame's height, where there is room."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,25 +49,32 @@ class Cast:
 
     timeline: Timeline
     motion: ShownMotion
+    deviated: dict[str, Poses]
+    """Mode id to poses at the fine frames, as far off from the recording as is shown."""
+
+    framing: Framing
+    """At the fine frames."""
+
     layout: layout.Layout
-    yaw: float
-    """The turn about z in radians that shows the motion from its broad side."""
 
     middle: np.ndarray
-    """The middle of all that moves, as `layout.project` gives it but for the depth, which is that of the far end."""
+    """The middle of all that moves, from the focus on, as `layout.project` gives it but for the depth, which is that of
+    the far end."""
 
     errors: dict[str, np.ndarray]
     """Mode id to the error at each frame, in millimetres."""
 
     largest_error: float
-    """In millimetres: that of a full bar."""
+    """In millimetres: what the graphs reach up to."""
 
     mesh: bpy.types.Mesh
     notes: dict[str, str]
-    """Mode id to what is written small below the name of the mode."""
+    """Mode id to what its keys are, where the modes have different ones."""
 
     traced: np.ndarray
     """The point of the object whose path is drawn, shape (3,)."""
+
+    theme: Theme
 
     def path_of(self, poses: Poses) -> np.ndarray:
         """The way of the traced point, shape (n, 3)."""
@@ -79,62 +86,86 @@ class Lanes:
 
     def __init__(self, cast: Cast, frame: bpy.types.Object) -> None:
         self.cast, self.frame = cast, frame
-        self.ink, self.faint = ink("Ink", palette.INK), ink("Faint", palette.FAINT)
-        self.card, self.track = ink("Card", palette.CARD), ink("Track", palette.TRACK)
-        self.ghost = surface("Recording", palette.GHOST, alpha=GHOST_ALPHA)
+        theme = cast.theme
+        self.ink, self.faint = ink("Ink", theme.ink), ink("Faint", theme.faint)
+        self.card, self.track = ink("Card", theme.card), ink("Track", theme.track)
+        self.ghost = surface("Recording", theme.ghost, alpha=GHOST_ALPHA)
         self.ghost_mesh = cast.mesh.copy()
         self.ghost_mesh.name = f"{cast.mesh.name} recording"
         shrink(self.ghost_mesh, GHOST_INSET * float(np.ptp(vertices_of(cast.mesh), axis=0).max()))
         self.ghost_action: bpy.types.Action | None = None
-        self.trail_group, self.marks_group = trails.trail_group(), trails.marks_group()
+        self.trail_group, self.marks_group = trails.trail_group(windowed=True), trails.marks_group()
+        self.graph_group = trails.graph_group()
         motion, timeline = cast.motion, cast.timeline
         self.path = trails.polyline("Recording path", timeline.fine_frames, cast.path_of(motion.recording))
         self.readout = captions.readout_group("Error in mm", captions.decimals_for(cast.largest_error), self.ink)
-        labels = [label_of(mode) for mode in motion.modes]
-        self.label_width = max(captions.width_of(label) for label in labels)
-        self.note_width = max(captions.width_of(note) for note in cast.notes.values())
-        self.broken_label_width = max(captions.width_of(captions.in_two_lines(label)) for label in labels)
+        self.title_width = max(captions.width_of(_title(mode)) for mode in motion.modes)
 
-    def build(self, mode: str, cell: layout.Cell) -> None:
-        """Make the lane of a mode in its cell, in a collection of its own."""
+    def build(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
+        """Make the lane of modes that are one motion in its cell, in a collection of its own; the first gives names."""
+        mode = modes[0]
         self.collection = bpy.data.collections.new(f"Lane {mode}")
         bpy.context.scene.collection.children.link(self.collection)
         lane = bpy.data.objects.new(f"Lane {mode}", None)
         self.collection.objects.link(lane)
         metres = self.cast.layout.metres
         lane.empty_display_size = 0.05 * metres
-        lane.rotation_euler.z = self.cast.yaw
-        lane.location = layout.unproject(np.append(cell.view * metres, -0.01 * metres) - self.cast.middle)
+        self._place(lane, cell)
         self._add_actors(mode, lane)
-        self._add_trails(mode, lane)
-        self._add_caption(mode, cell)
+        self._add_trails(mode, lane, cell)
+        self._add_caption(modes, cell)
+
+    def _place(self, lane: bpy.types.Object, cell: layout.Cell) -> None:
+        """Put the focus into the middle of the view on every frame."""
+        cast = self.cast
+        lane.rotation_euler.z = cast.framing.yaw
+        home = layout.unproject(np.append(cell.view * cast.layout.metres, -0.01 * cast.layout.metres) - cast.middle)
+        focus = rotate(layout.yaw_quaternion(cast.framing.yaw), cast.framing.focus)[:: cast.timeline.steps]
+        lane.location = home - focus[0]
+        if cast.framing.follows:
+            write_channel(lane, "location", cast.timeline.frames, home - focus)
+            lane.animation_data.action.name = lane.name
 
     def _add_actors(self, mode: str, lane: bpy.types.Object) -> None:
-        frames, steps = self.cast.timeline.frames, self.cast.timeline.steps
-        actor = self._child(lane, mode, self.cast.mesh)
-        actor.rotation_mode = "QUATERNION"
-        _paint(actor, tinted_slots(self.cast.mesh), surface(f"Mode {mode}", palette.colour_of(mode)))
-        bake_poses(actor, frames, self.cast.motion.modes[mode][::steps])
-        actor.animation_data.action.name = mode
+        frames, steps, motion = self.cast.timeline.frames, self.cast.timeline.steps, self.cast.motion
+        material = surface(f"Mode {mode}", colour_on(self.cast.theme, mode))
+        self._add_actor(mode, lane, motion.modes[mode][::steps], material)
+        if self.cast.deviated[mode] is not motion.modes[mode]:
+            # The motion itself is there for whoever opens the file; its deviation is what is seen.
+            bpy.data.objects[mode].hide_render = bpy.data.objects[mode].hide_viewport = True
+            self._add_actor(f"{mode} deviating", lane, self.cast.deviated[mode][::steps], material)
 
         ghost = self._child(lane, f"{mode} recording", self.ghost_mesh)
         ghost.rotation_mode = "QUATERNION"
         _paint(ghost, range(len(ghost.material_slots)), self.ghost)
         if self.ghost_action is None:
-            bake_poses(ghost, frames, self.cast.motion.recording[::steps])
+            bake_poses(ghost, frames, motion.recording[::steps])
             self.ghost_action = ghost.animation_data.action
             self.ghost_action.name = "recording"
         else:
             ghost.animation_data_create().action = self.ghost_action
             ghost.animation_data.action_slot = self.ghost_action.slots[0]
 
-    def _add_trails(self, mode: str, lane: bpy.types.Object) -> None:
+    def _add_actor(self, name: str, lane: bpy.types.Object, poses: Poses, material: bpy.types.Material) -> None:
+        actor = self._child(lane, name, self.cast.mesh)
+        actor.rotation_mode = "QUATERNION"
+        _paint(actor, tinted_slots(self.cast.mesh), material)
+        bake_poses(actor, self.cast.timeline.frames, poses)
+        actor.animation_data.action.name = name
+
+    def _add_trails(self, mode: str, lane: bpy.types.Object, cell: layout.Cell) -> None:
         cast, rate, metres = self.cast, self.cast.timeline.rate, self.cast.layout.metres
-        trail = trails.polyline(f"{mode} trail", cast.timeline.fine_frames, cast.path_of(cast.motion.modes[mode]))
+        trail = trails.polyline(f"{mode} trail", cast.timeline.fine_frames, cast.path_of(cast.deviated[mode]))
         window = {"Past": PATH_BEHIND_SECONDS * rate, "Ahead": PATH_AHEAD_SECONDS * rate}
         keys = cast.motion.keys[mode]
         marks = trails.polyline(f"{mode} keys", cast.motion.key_frames[mode], cast.path_of(keys), joined=False)
         crowded = max(1.0, sum(window.values()) / (MARKS_SHOWN * cast.timeline.frames_per_key(len(keys))))
+        width, height = cell.room * metres / 2.0
+        picture = {
+            "Middle": layout.unproject(np.append(cell.view * metres, 0.0)),
+            "Right": layout.RIGHT / width,
+            "Up": layout.UP / height,
+        }
         apply_group(
             self._child(lane, f"{mode} trail", trail),
             self.trail_group,
@@ -142,7 +173,8 @@ class Lanes:
             Ahead=0.0,
             Radius=TRAIL_RADIUS * metres,
             Taper=0.9,
-            Material=ink(f"Trail {mode}", palette.colour_of(mode)),
+            Material=ink(f"Trail {mode}", colour_on(cast.theme, mode)),
+            **picture,
         )
         apply_group(
             self._child(lane, f"{mode} recording path", self.path),
@@ -151,6 +183,7 @@ class Lanes:
             Radius=PATH_RADIUS * metres,
             Taper=0.0,
             Material=self.faint,
+            **picture,
         )
         apply_group(
             self._child(lane, f"{mode} keys", marks),
@@ -158,53 +191,57 @@ class Lanes:
             **{side: frames / crowded for side, frames in window.items()},
             Radius=MARK_RADIUS * metres,
             Material=self.ink,
+            **picture,
         )
 
-    def _add_caption(self, mode: str, cell: layout.Cell) -> None:
+    def _add_caption(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
+        """From the top the title and the names of the modes, at the foot the error: a number, and a graph of it."""
+        mode = modes[0]
         card = captions.card(f"{mode} card", cell.width, cell.height, self.card)
         self._put(bpy.data.objects.new(card.name, card), cell.x, cell.y, 1)
         width, height = cell.caption
-        inset = min(0.02, 0.08 * width)
+        unit = min(1.0, height / layout.CAPTION_HEIGHT, width / layout.CAPTION_WIDTH)
+        inset = 0.022 * unit
         left, right, room = cell.left + inset, cell.left + width - inset, width - 2.0 * inset
-        line = cell.foot + 0.33 * layout.CAPTION_HEIGHT
-        if cell.beside:
-            label, label_size = captions.in_two_lines(label_of(mode)), min(0.034, room / self.broken_label_width)
-            label_line, id_size, number_size = cell.foot + height - 0.046, min(0.027, 0.15 * room), 0.26 * room
-            id_line = line + 1.2 * min(0.046, number_size)
-        else:
-            label, label_size = label_of(mode), min(0.033, room / self.label_width)
-            label_line, id_size, number_size = cell.foot + 0.7 * height, min(0.027, 0.1 * room), 0.2 * room
-            id_line = line
-        number_size = min(0.046, number_size)
-        self._put(captions.words(f"{mode} label", label, label_size, self.ink), left, label_line)
-        note = self.cast.notes[mode]
-        taken = self.note_width * id_size + (0.0 if cell.beside else NUMBER_WIDTH * number_size)
-        if taken > room:
-            note = captions.in_two_lines(note)
-        if "\n" in note:
-            id_size *= 0.8
-            id_line += id_size
-        elif taken > room:
-            # What cannot be broken shrinks, and the number with it.
-            id_size, number_size = id_size * room / taken, number_size * room / taken
-        self._put(captions.words(f"{mode} id", note, id_size, self.faint), left, id_line)
-        self._put(captions.words(f"{mode} unit", "mm", 0.6 * number_size, self.faint, "RIGHT"), right, line)
-        number = captions.readout(
-            f"{mode} error", self.readout, number_size, self.cast.timeline.frames, self.cast.errors[mode]
-        )
-        self._put(number, right - 1.2 * number_size, line)
-        self._add_bar(mode, left, cell.foot + 0.018, room)
+        title = min(TITLE * unit, room / self.title_width)
+        line = cell.foot + height - inset - 0.75 * TITLE * unit
+        self._put(captions.words(f"{mode} title", _title(mode), title, self.ink), left, line)
 
-    def _add_bar(self, mode: str, left: float, y: float, length: float) -> None:
-        track = captions.card(f"{mode} track", length, BAR_HEIGHT, self.track, corner=0.0)
-        self._put(bpy.data.objects.new(track.name, track), left + length / 2.0, y)
-        mesh = captions.card(f"{mode} bar", length, BAR_HEIGHT, ink(f"Bar {mode}", palette.colour_of(mode)), corner=0.0)
-        mesh.transform(Matrix.Translation((length / 2.0, 0.0, 0.0)))
-        bar = bpy.data.objects.new(mesh.name, mesh)
-        self._put(bar, left, y, 3)
-        full = self.cast.errors[mode] / (self.cast.largest_error or 1.0)
-        write_channel(bar, "scale", self.cast.timeline.frames, np.stack([full, *np.ones((2, len(full)))], axis=-1))
-        bar.animation_data.action.name = mesh.name
+        number, graph = NUMBER * unit, GRAPH * unit
+        self._add_graph(mode, left, cell.foot + inset, room, graph)
+        foot = cell.foot + inset + graph + 0.25 * number
+        self._put(captions.words(f"{mode} unit", "mm", UNIT * unit, self.faint, "RIGHT"), right, foot)
+        error = captions.readout(
+            f"{mode} error", self.readout, number, self.cast.timeline.frames, self.cast.errors[mode]
+        )
+        self._put(error, right - 1.9 * UNIT * unit, foot)
+
+        # The names shrink until their lines fit between the title and the number.
+        space, size = line - foot - 0.3 * TITLE * unit - 0.8 * number, NAME * unit
+        names = [*modes, *filter(None, (self.cast.notes.get(mode),))]
+        text = captions.wrapped(names, room / size)
+        while (text.count("\n") + 1.4) * size > space or captions.width_of(text) * size > room:
+            size *= 0.95
+            text = captions.wrapped(names, room / size)
+        self._put(captions.words(f"{mode} names", text, size, self.faint), left, line - 1.4 * size)
+
+    def _add_graph(self, mode: str, left: float, foot: float, width: float, height: float) -> None:
+        """The error over time, all of it faint, and what has passed in the colour of the mode."""
+        cast = self.cast
+        heights = height * cast.errors[mode] / (cast.largest_error or 1.0)
+        mesh = trails.graph(f"{mode} graph", cast.timeline.frames, heights, width)
+        for name, material, lift in (
+            ("graph", ink(f"Graph {mode}", colour_on(cast.theme, mode)), 4),
+            ("graph to come", self.track, 3),
+        ):
+            graph = bpy.data.objects.new(f"{mode} {name}", mesh.copy() if lift == 3 else mesh)
+            if lift == 3:
+                graph.data.materials.append(material)
+            else:
+                apply_group(graph, self.graph_group, Material=material)
+            self._put(graph, left, foot, lift)
+        base = captions.card(f"{mode} base", width, 0.0025, self.track, corner=0.0)
+        self._put(bpy.data.objects.new(base.name, base), left + width / 2.0, foot - 0.00125)
 
     def _child(self, lane: bpy.types.Object, name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:
         child = bpy.data.objects.new(name, mesh)
@@ -214,6 +251,11 @@ class Lanes:
 
     def _put(self, obj: bpy.types.Object, x: float, y: float, lift: int = 2) -> None:
         captions.put(obj, self.frame, self.collection, x, y, lift)
+
+
+def _title(mode: str) -> str:
+    """What a mode is called, without the algebra in brackets: its id tells."""
+    return label_of(mode).partition(" (")[0]
 
 
 def _paint(obj: bpy.types.Object, slots: list[int] | range, material: bpy.types.Material) -> None:

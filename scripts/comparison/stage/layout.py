@@ -20,14 +20,14 @@ UP = np.array((0.0, np.sin(ELEVATION), np.cos(ELEVATION)))
 AWAY = np.array((0.0, np.cos(ELEVATION), -np.sin(ELEVATION)))
 
 MARGIN = 0.022
-HEADER = 0.062
-FOOTER = 0.04
+HEADER = 0.066
+FOOTER = 0.045
 GAP = 0.014
 PADDING = 0.014
-CAPTION_HEIGHT = 0.13
+CAPTION_HEIGHT = 0.3
 """Of a caption below its view."""
 
-CAPTION_WIDTH = 0.21
+CAPTION_WIDTH = 0.34
 """Of a caption beside its view, in cells that are wide enough for that."""
 
 WRAP_GAIN = 0.85
@@ -36,7 +36,7 @@ WRAP_GAIN = 0.85
 DIRECTIONS = 1024
 """Spread over the sphere as on a sunflower (a spherical Fibonacci lattice)."""
 
-SHOWN_RATIO = 6.0
+SHOWN_RATIO = 2.5
 """A path longer than so many times the object makes the object grow for display."""
 
 

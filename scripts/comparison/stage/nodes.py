@@ -42,6 +42,10 @@ class Group:
     def math(self, operation: str, *values: Any, clamp: bool = False) -> Socket:
         return self.add("ShaderNodeMath", *values, settings={"operation": operation, "use_clamp": clamp})
 
+    def vector(self, operation: str, *values: Any) -> Socket:
+        outputs = self.add("ShaderNodeVectorMath", *values, settings={"operation": operation}).node.outputs
+        return outputs["Value" if operation in ("DOT_PRODUCT", "DISTANCE", "LENGTH") else "Vector"]
+
     def attribute(self, name: str) -> Socket:
         """A number that each point of the geometry carries."""
         return self.add("GeometryNodeInputNamedAttribute", name, settings={"data_type": "FLOAT"})

@@ -13,11 +13,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from addon.motion.quaternions import rotate
-
-from .. import palette
-from ..study.reconstructions import Reconstruction
+from ..palette import DARK, THEMES, linear
+from ..study.reconstructions import Reconstruction, identical_modes
 from . import captions, layout
+from .deviations import largest_deviation, magnification, magnified
+from .framing import SMOOTHING, Framing
 from .lanes import Cast, Lanes
 from .settings import SMALL_PICTURE, StageSettings
 from .subject import load_subject, vertices_of
@@ -35,52 +35,54 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     scene.name = f"{reconstruction.clip.name} {reconstruction.choice.name}"
+    theme = THEMES[settings.theme]
     timeline = Timeline.of(reconstruction, settings.fps, settings.slow_motion)
     motion = ShownMotion.of(reconstruction, timeline)
-    mesh = load_subject(settings.subject)
-    magnification = layout.display_scale(motion.recording.positions, float(np.ptp(vertices_of(mesh), axis=0).max()))
-    mesh.transform(Matrix.Scale(magnification, 4))
+    lanes_of = identical_modes([reconstruction]) if settings.distinct else tuple((mode,) for mode in motion.modes)
 
+    mesh = load_subject(settings.subject)
+    smoothing = SMOOTHING * settings.fps * timeline.steps
     outline = layout.outermost(vertices_of(mesh))
-    yaw = layout.heading(layout.swept_points(motion.recording, outline))
-    low, high = _extent(motion, outline, yaw)
+    framing = Framing.of(motion.recording, outline, smoothing)
+    enlarged = layout.display_scale(motion.recording.positions - framing.focus, float(np.ptp(outline, axis=0).max()))
+    mesh.transform(Matrix.Scale(enlarged, 4))
+    outline = outline * enlarged
+
+    size, middle = float(np.ptp(outline, axis=0).max()), (outline.min(axis=0) + outline.max(axis=0)) / 2.0
+    farthest = max(largest_deviation(poses, motion.recording, outline) for poses in motion.modes.values())
+    deviation = settings.deviation or magnification(farthest, size)
+    deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
+    low, high = framing.extent([motion.recording, *deviated.values()], outline)
     width, height = settings.resolution
-    plan = layout.arrange(len(motion.modes), (high - low)[:2], width / height)
+    plan = layout.arrange(len(lanes_of), (high - low)[:2], width / height)
     errors = _errors_in_mm(reconstruction, timeline)
     cast = Cast(
         timeline=timeline,
         motion=motion,
+        deviated=deviated,
+        framing=framing,
         layout=plan,
-        yaw=yaw,
         middle=np.append((low + high)[:2] / 2.0, high[2]),
         errors=errors,
         largest_error=max(float(error.max()) for error in errors.values()),
         mesh=mesh,
         notes=_notes(reconstruction),
         traced=layout.telling_point(motion.recording, outline),
+        theme=theme,
     )
 
     frame = make_frame(plan.metres)
     lanes = Lanes(cast, frame)
-    for mode, cell in zip(motion.modes, plan.cells, strict=True):
-        lanes.build(mode, cell)
-    _make_header(reconstruction, settings, cast, lanes, magnification)
+    for modes, cell in zip(lanes_of, plan.cells, strict=True):
+        lanes.build(modes, cell)
+    _make_header(reconstruction, settings, cast, lanes, _legend(cast, settings, deviation, enlarged))
     make_camera(scene, plan.metres, depth=float(high[2] - low[2]))
     make_lights(scene)
-    set_up_render(scene, settings, timeline.count)
+    set_up_render(scene, settings, timeline.count, theme.background)
     scene["recording_centre_m"] = motion.centre.tolist()
     scene["recording_start_s"] = timeline.start
+    scene["deviation_shown_times"] = deviation
     return scene
-
-
-def _extent(motion: ShownMotion, outline: np.ndarray, yaw: float) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest and the highest of right, up and away, shape (3,) each, that anything which moves reaches."""
-    turn = layout.yaw_quaternion(yaw)
-    seen = [
-        layout.project(rotate(turn, layout.swept_points(poses, outline)))
-        for poses in (motion.recording, *motion.modes.values())
-    ]
-    return np.min([points.min(axis=0) for points in seen], axis=0), np.max([p.max(axis=0) for p in seen], axis=0)
 
 
 def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[str, np.ndarray]:
@@ -93,12 +95,24 @@ def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[st
 
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
-    """Mode id to itself, or to its own number of keys where the modes have different ones."""
+    """Mode id to its own number of keys, where the modes have different ones."""
     counts = {mode: len(keys) for mode, keys in reconstruction.keys.items()}
     if len(set(counts.values())) == 1:
-        return {mode: mode for mode in counts}
+        return {}
     duration = float(np.ptp(reconstruction.times[[0, -1]]))
-    return {mode: f"{(count - 1) / duration:.1f} keys/s on average" for mode, count in counts.items()}
+    return {mode: f"{(count - 1) / duration:.1f} keys/s" for mode, count in counts.items()}
+
+
+def _legend(cast: Cast, settings: StageSettings, deviation: float, enlarged: float) -> str:
+    """How to read the picture."""
+    full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
+    drawn = f", deviation drawn {deviation:g} times as large" if deviation > 1.0 else ""
+    parts = ["grey: recording", f"colour: mode{drawn}", "dots: keys", f"mm: shell error (graphs up to {full})"]
+    if settings.slow_motion != 1.0:
+        parts.append(f"{settings.slow_motion:g} times slower than life")
+    if enlarged > 1.0:
+        parts.append(f"object shown {enlarged:.3g} times its size")
+    return "   \u00b7   ".join(parts)
 
 
 def make_frame(metres: float) -> bpy.types.Object:
@@ -111,7 +125,7 @@ def make_frame(metres: float) -> bpy.types.Object:
 
 
 def _make_header(
-    reconstruction: Reconstruction, settings: StageSettings, cast: Cast, lanes: Lanes, magnification: float
+    reconstruction: Reconstruction, settings: StageSettings, cast: Cast, lanes: Lanes, legend: str
 ) -> None:
     """What is written above and below the lanes: clip, rate and time, and how to read the picture."""
     collection = bpy.data.collections.new("Captions")
@@ -134,15 +148,8 @@ def _make_header(
     put(captions.readout("Time", decimals, 0.046, ends, timeline.times_of(ends) - timeline.start), right - 0.03, line)
     put(captions.words("Seconds", "s", 0.034, lanes.faint, "RIGHT"), right, line)
 
-    full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
-    parts = ["translucent: the recording", "dots: the keys kept", f"number and bar: shell error (full bar {full} mm)"]
-    if settings.slow_motion != 1.0:
-        parts.append(f"{settings.slow_motion:g} times slower than life")
-    if magnification > 1.0:
-        parts.append(f"object shown {magnification:.3g} times its size")
-    legend = "    ".join(parts)
-    size = min(0.026, (right - left) / captions.width_of(legend))
-    put(captions.words("Legend", legend, size, lanes.faint), left, -0.5 + layout.MARGIN + 0.002)
+    size = min(0.032, (right - left) / captions.width_of(legend))
+    put(captions.words("Legend", legend, size, lanes.faint), left, -0.5 + layout.MARGIN + 0.004)
 
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
@@ -171,7 +178,7 @@ def make_lights(scene: bpy.types.Scene) -> None:
 
 
 def set_up_render(
-    scene: bpy.types.Scene, settings: StageSettings, frames: int, background: str = palette.BACKGROUND
+    scene: bpy.types.Scene, settings: StageSettings, frames: int, background: str = DARK.background
 ) -> None:
     """Engine, size, colours and encoder of a scene of so many frames."""
     scene.frame_start, scene.frame_end = 1, frames
@@ -214,7 +221,7 @@ def _set_up_video(scene: bpy.types.Scene) -> None:
 def _set_background(scene: bpy.types.Scene, background: str) -> None:
     """One colour, for Workbench and for the others."""
     scene.world = bpy.data.worlds.new("World")
-    colour = palette.linear(background)
+    colour = linear(background)
     scene.world.color = colour
     if scene.world.node_tree is None:  # Blender 5 makes it, and warns of the switch.
         scene.world.use_nodes = True

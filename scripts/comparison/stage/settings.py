@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..palette import THEMES
+
 ENGINES = ("workbench", "eevee", "cycles")
 ANTIALIASING = ("OFF", "FXAA", "5", "8", "11", "16", "32")
 
@@ -44,6 +46,15 @@ class StageSettings:
     samples: int = 16
     """Of EEVEE and Cycles."""
 
+    theme: str = "dark"
+    """One of `palette.THEMES`."""
+
+    deviation: float | None = None
+    """How many times larger than it is a mode's deviation from the recording is shown; None for what shows it well."""
+
+    distinct: bool = False
+    """Whether modes that are one motion share a lane."""
+
     def __post_init__(self) -> None:
         if self.engine not in ENGINES:
             raise ValueError(f"engine {self.engine!r}: there are {', '.join(ENGINES)}")
@@ -55,6 +66,10 @@ class StageSettings:
             raise ValueError(f"slow motion by {self.slow_motion}: give a number above 0; 4 is four times slower")
         if not 1 <= self.samples <= 4096:
             raise ValueError(f"{self.samples} samples: give 1 to 4096")
+        if self.theme not in THEMES:
+            raise ValueError(f"theme {self.theme!r}: there are {', '.join(THEMES)}")
+        if self.deviation is not None and not 1.0 <= self.deviation <= 1000.0:
+            raise ValueError(f"deviations {self.deviation:g} times as large: give 1 to 1000")
         if self.antialiasing not in (None, *ANTIALIASING):
             raise ValueError(f"antialiasing {self.antialiasing!r}: there are {', '.join(ANTIALIASING)}")
 

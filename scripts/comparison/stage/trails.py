@@ -1,7 +1,8 @@
-"""Trails and key marks: the way of one point of the object, drawn around the frame that is shown.
+"""Trails, key marks and graphs: what was and what will be, drawn around the frame that is shown.
 
-A trail is a tube along a polyline, a mark a small ball at a vertex. Each vertex carries, as the attribute `frame`, when
-the object is there; the node groups keep what lies within a window of frames around the current one.
+A trail is a tube along the way of one point of the object, a mark a small ball at a vertex, a graph an area that grows
+from left to right. Each vertex carries its moment as the attribute `frame`; the node groups keep what lies within a
+window of frames around the current one, and of trails what lies within a window of the picture.
 """
 
 from __future__ import annotations
@@ -34,28 +35,96 @@ def polyline(name: str, frames: np.ndarray, points: np.ndarray, *, joined: bool 
     return mesh
 
 
-def trail_group() -> bpy.types.NodeTree:
-    """A tube from `Past` frames ago to `Ahead` frames from now, that thins by `Taper` towards its old end."""
-    group = Group("Trail", Past="Float", Ahead="Float", Radius="Float", Taper="Float", Material="Material")
+WINDOW = {"Middle": "Vector", "Right": "Vector", "Up": "Vector"}
+"""What trails are kept within: the middle of a window of the picture in the world, and one over its half width and half
+height, along the directions in which these are."""
+
+FADE = 0.15
+"""Of the window's half: how far from its edge what is drawn begins to thin."""
+
+
+def trail_group(*, windowed: bool = False) -> bpy.types.NodeTree:
+    """A tube from `Past` frames ago to `Ahead` frames from now, that thins by `Taper` towards its old end.
+
+    Windowed, also with the inputs of `WINDOW`, outside of which there is none.
+    """
+    inputs = {"Past": "Float", "Ahead": "Float", "Radius": "Float", "Taper": "Float", "Material": "Material"}
+    group = Group("Trail", **inputs, **(WINDOW if windowed else {}))
     age, points = _within_window(group)
-    curve = group.add("GeometryNodeMeshToCurve", points)
     worn = group.math("MULTIPLY", group.math("DIVIDE", age, group.inputs["Past"], clamp=True), group.inputs["Taper"])
     radius = group.math("MULTIPLY", group.inputs["Radius"], group.math("SUBTRACT", 1.0, worn))
+    if windowed:
+        points, thinned = _within_picture(group, points)
+        radius = group.math("MULTIPLY", radius, thinned)
+    curve = group.add("GeometryNodeMeshToCurve", points)
     profile = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=6, Radius=1.0)
     tube = _tube(group, curve, profile, radius)
     return group.finish(group.add("GeometryNodeSetMaterial", tube, Material=group.inputs["Material"]))
 
 
 def marks_group() -> bpy.types.NodeTree:
-    """A ball at each key from `Past` frames ago to `Ahead` frames from now; it swells while its key is reached."""
-    group = Group("Key marks", Past="Float", Ahead="Float", Radius="Float", Material="Material")
+    """A ball at each key from `Past` frames ago to `Ahead` frames from now; it swells while its key is reached.
+
+    None outside of the `WINDOW`.
+    """
+    group = Group("Key marks", Past="Float", Ahead="Float", Radius="Float", Material="Material", **WINDOW)
     age, points = _within_window(group)
+    points, thinned = _within_picture(group, points)
     near = group.math("SUBTRACT", 1.0, group.math("DIVIDE", group.math("ABSOLUTE", age), FLASH_FRAMES), clamp=True)
     radius = group.math("MULTIPLY", group.inputs["Radius"], group.math("MULTIPLY_ADD", near, 0.6, 1.0))
+    radius = group.math("MULTIPLY", radius, thinned)
     ball = group.add("GeometryNodeMeshIcoSphere", 1.0, 2)
     ball = group.add("GeometryNodeSetShadeSmooth", ball)
     ball = group.add("GeometryNodeSetMaterial", ball, Material=group.inputs["Material"])
     return group.finish(group.add("GeometryNodeInstanceOnPoints", points, Instance=ball, Scale=radius))
+
+
+def graph(name: str, frames: np.ndarray, heights: np.ndarray, width: float) -> bpy.types.Mesh:
+    """The area below a curve, from the origin to the right, whose vertices know their frame.
+
+    Parameters
+    ----------
+    name : str
+    frames : array, shape (n,)
+    heights : array, shape (n,)
+        Not below zero.
+    width : float
+        From the first frame to the last.
+    """
+    count = len(frames)
+    right = width * (frames - frames[0]) / max(float(np.ptp(frames)), 1e-9)
+    points = np.zeros((2, count, 3))
+    points[:, :, 0], points[1, :, 1] = right, heights
+    steps = np.arange(count - 1)
+    faces = np.stack((steps, steps + 1, steps + 1 + count, steps + count), axis=-1)
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(points.reshape(-1, 3).tolist(), [], faces.tolist())
+    moments = np.tile(frames, 2).astype(np.float32)
+    mesh.attributes.new(FRAME, "FLOAT", "POINT").data.foreach_set("value", moments)
+    return mesh
+
+
+def graph_group() -> bpy.types.NodeTree:
+    """What a graph has up to now."""
+    group = Group("Graph", Material="Material")
+    future = group.math("GREATER_THAN", group.attribute(FRAME), group.math("ADD", group.frame(), 1e-3))
+    kept = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], future, settings={"domain": "POINT"})
+    return group.finish(group.add("GeometryNodeSetMaterial", kept, Material=group.inputs["Material"]))
+
+
+def _within_picture(group: Group, points: Socket) -> tuple[Socket, Socket]:
+    """The points within the window, and how much is left of what is drawn there: 1, and 0 at its edge."""
+    itself = group.add("GeometryNodeSelfObject")
+    world = group.add("GeometryNodeObjectInfo", itself).node.outputs["Transform"]
+    place = group.add("FunctionNodeTransformPoint", group.add("GeometryNodeInputPosition"), world)
+    offset = group.vector("SUBTRACT", place, group.inputs["Middle"])
+    shares = [
+        group.math("ABSOLUTE", group.vector("DOT_PRODUCT", offset, group.inputs[side])) for side in ("Right", "Up")
+    ]
+    share = group.math("MAXIMUM", *shares)
+    outside = group.math("GREATER_THAN", share, 1.0)
+    kept = group.add("GeometryNodeDeleteGeometry", points, outside, settings={"domain": "POINT"})
+    return kept, group.math("DIVIDE", group.math("SUBTRACT", 1.0, share), FADE, clamp=True)
 
 
 def _within_window(group: Group) -> tuple[Socket, Socket]:

@@ -33,10 +33,6 @@ def lab(rgb: np.ndarray) -> np.ndarray:
     return np.array((116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)))
 
 
-def luminance(colour: str) -> float:
-    return float(XYZ[1] @ palette.linear(colour))
-
-
 @pytest.mark.parametrize("vision", VISION)
 def test_people_of_any_colour_vision_can_tell_the_modes_apart(vision):
     seen = {mode: lab(VISION[vision] @ palette.linear(palette.colour_of(mode))) for mode in SHOWN}
@@ -44,9 +40,23 @@ def test_people_of_any_colour_vision_can_tell_the_modes_apart(vision):
 
 
 @pytest.mark.parametrize("mode", SHOWN)
-@pytest.mark.parametrize("ground", [palette.BACKGROUND, palette.CARD])
-def test_modes_stand_out_from_what_they_stand_before(mode, ground):
-    assert (luminance(palette.colour_of(mode)) + 0.05) / (luminance(ground) + 0.05) > 3.0
+@pytest.mark.parametrize("theme", palette.THEMES)
+def test_modes_stand_out_from_what_they_stand_before(mode, theme):
+    colour = XYZ[1] @ palette.linear(palette.colour_on(palette.THEMES[theme], mode))
+    card = XYZ[1] @ palette.linear(palette.THEMES[theme].card)
+    assert (max(colour, card) + 0.05) / (min(colour, card) + 0.05) > 3.0
+
+
+@pytest.mark.parametrize("theme", palette.THEMES.values(), ids=palette.THEMES)
+@pytest.mark.parametrize("word", ["ink", "faint"])
+@pytest.mark.parametrize("ground", ["card", "background"])
+def test_words_can_be_read(theme, word, ground):
+    lights = sorted(XYZ[1] @ palette.linear(getattr(theme, name)) + 0.05 for name in (word, ground))
+    assert lights[1] / lights[0] > 4.5
+
+
+def test_on_the_dark_stage_modes_have_their_own_colours():
+    assert {mode: palette.colour_on(palette.DARK, mode) for mode in SHOWN} == palette.MODE_COLOURS
 
 
 def test_every_mode_has_a_colour_of_its_own():

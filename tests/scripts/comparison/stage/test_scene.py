@@ -60,6 +60,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
     for mode in KEYFRAME_MODES:
         lane = bpy.data.objects[f"Lane {mode}"]
         turn = np.array(lane.matrix_world.to_quaternion())
+        places = read_poses(lane, timeline.frames).positions
         kept = reconstruction.keys[mode]
         shown = {
             mode: interpolate(clip.times[kept], clip.poses[kept], times, mode),
@@ -69,7 +70,7 @@ def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
             found = read_poses(bpy.data.objects[name], timeline.frames)
             wanted = to_blender(poses, axes)
             at_home = Poses(
-                rotate(conjugate(turn), found.positions - np.array(lane.matrix_world.translation)) + centre,
+                rotate(conjugate(turn), found.positions - places) + centre,
                 multiply(conjugate(turn), found.quaternions),
             )
             assert_same_poses(at_home, wanted)
@@ -116,7 +117,8 @@ def test_everything_that_moves_stays_within_its_own_card(clip, modes):
             card = bpy.data.objects[f"{mode} card"]
             size = card.data.vertices
             half = np.abs([vertex.co[:2] for vertex in size]).max(axis=0)
-            for name in (mode, f"{mode} recording"):
+            deviating = f"{mode} deviating"
+            for name in (deviating if deviating in bpy.data.objects else mode, f"{mode} recording"):
                 obj = bpy.data.objects[name]
                 world = np.array(obj.matrix_world)
                 points = layout.outermost(vertices_of(obj.data)) @ world[:3, :3].T + world[:3, 3]
@@ -140,26 +142,28 @@ def test_everything_that_is_written_is_within_the_picture():
             assert scene.camera.data.clip_start < depth < scene.camera.data.clip_end
 
 
-def test_the_number_and_the_bar_show_the_error_of_the_frame():
+def test_the_number_and_the_graph_show_the_error_of_the_frame():
     reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
     scene = build_stage(reconstruction, SETTINGS)
     timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
-    largest = 0.0
-    errors = {}
+    times = timeline.times_of(timeline.frames)
+    errors = {mode: 1e3 * np.interp(times, reconstruction.times, reconstruction.errors[mode].shell) for mode in TWO}
+    tallest = {mode: vertices_of(bpy.data.objects[f"{mode} graph"].data)[:, 1].max() for mode in TWO}
+    ratio = errors["dq_sclerp"].max() / errors["lerp_slerp"].max()
+    assert tallest["dq_sclerp"] / tallest["lerp_slerp"] == pytest.approx(ratio, rel=1e-5)
     for mode in TWO:
-        times = timeline.times_of(timeline.frames)
-        errors[mode] = 1e3 * np.interp(times, reconstruction.times, reconstruction.errors[mode].shell)
-        largest = max(largest, errors[mode].max())
-    for mode in TWO:
-        number, bar = bpy.data.objects[f"{mode} error"], bpy.data.objects[f"{mode} bar"]
+        number, graph = bpy.data.objects[f"{mode} error"], bpy.data.objects[f"{mode} graph"]
         path = input_path(number.modifiers[0], "Value")
         written = channelbag_of(number).fcurves.find(path, index=0)
+        base = graph.matrix_world.translation.x
+        width = np.ptp(vertices_of(graph.data)[:, 0]) * graph.matrix_world.to_scale().x
         drawn = []
         for frame, error in enumerate(errors[mode], start=1):
             scene.frame_set(frame)
             assert written.evaluate(frame) == pytest.approx(error, abs=1e-4)
-            assert bar.scale.x == pytest.approx(error / largest, abs=1e-5)
             drawn.append(evaluated_points(number))
+            passed = (evaluated_points(graph)[:, 0].max(initial=base) - base) / width
+            assert passed == pytest.approx((frame - 1) / (scene.frame_end - 1), abs=1e-4)
         assert all(len(points) for points in drawn)
         assert any(len(points) != len(drawn[0]) for points in drawn)
 
@@ -181,9 +185,9 @@ def test_the_trail_ends_at_the_object_and_follows_it_for_a_while():
     for mode in TWO:
         trail = bpy.data.objects[f"{mode} trail"]
         path = vertices_of(trail.data)
+        scene.frame_set(frame)
         world = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world)
         path = path @ world[:3, :3].T + world[:3, 3]
-        scene.frame_set(frame)
         drawn = evaluated_points(trail)
         reach = 0.02 * bpy.data.objects["Frame"].scale.x
         gaps = np.linalg.norm(drawn[None] - path[:, None], axis=-1).min(axis=1)
@@ -247,6 +251,8 @@ def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
         ({"fps": 0}, "0 frames a second"),
         ({"slow_motion": 0.0}, "slow motion by 0.0"),
         ({"antialiasing": "7"}, "antialiasing '7'"),
+        ({"theme": "sepia"}, "theme 'sepia': there are dark, light"),
+        ({"deviation": 0.5}, "deviations 0.5 times as large: give 1 to 1000"),
     ],
 )
 def test_settings_that_make_no_film_are_refused(wrong, said):
@@ -266,19 +272,59 @@ def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counte
         frames = np.empty(len(marks.vertices), dtype=np.float32)
         marks.attributes["frame"].data.foreach_get("value", frames)
         assert np.allclose(frames, timeline.frames_of(reconstruction.clip.times[keys]), atol=1e-4)
-        caption = " ".join(bpy.data.curves[f"{mode} id"].body.split())
-        assert caption == f"{(len(keys) - 1) / 1.0:.1f} keys/s on average"
+        caption = " ".join(bpy.data.curves[f"{mode} names"].body.split())
+        assert caption == f"{mode}, {(len(keys) - 1) / 1.0:.1f} keys/s"
 
 
 @pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
 @pytest.mark.parametrize("clip", [1.0, (0.0, 0.0, 3.0)], ids=["as recorded", "up and down"])
-def test_the_count_of_keys_does_not_run_into_the_error(modes, clip):
-    build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), SETTINGS)
-    for mode in modes:
-        count, number = bpy.data.objects[f"{mode} id"], bpy.data.objects[f"{mode} error"]
-        corners = np.array([count.matrix_local @ Vector(corner) for corner in count.bound_box])
-        label = bpy.data.objects[f"{mode} label"]
-        assert corners[:, 1].max() < min((label.matrix_local @ Vector(corner)).y for corner in label.bound_box)
-        digits = 4 * 0.5 * number.scale.x
-        beside, above = number.location.x - digits, number.location.y + 0.75 * number.scale.y
-        assert corners[:, 0].max() < beside or corners[:, 1].min() > above
+@pytest.mark.parametrize("distinct", [False, True], ids=["each", "distinct"])
+def test_what_a_caption_says_stands_apart(modes, clip, distinct):
+    settings = dataclasses.replace(SETTINGS, distinct=distinct)
+    build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), settings)
+    for mode in [obj.name.removesuffix(" names") for obj in bpy.data.objects if obj.name.endswith(" names")]:
+        low, high = {}, {}
+        for part in ("title", "names", "error", "graph"):
+            obj = bpy.data.objects[f"{mode} {part}"]
+            inside = obj.parent.matrix_world.inverted()
+            found = (
+                evaluated_points(obj) if obj.type == "MESH" else [obj.matrix_world @ Vector(c) for c in obj.bound_box]
+            )
+            corners = np.array([inside @ Vector(corner) for corner in found])
+            low[part], high[part] = corners.min(axis=0), corners.max(axis=0)
+        for upper, lower in (("title", "names"), ("names", "error"), ("error", "graph")):
+            assert low[upper][1] > high[lower][1]
+
+
+def test_modes_that_are_one_motion_share_a_lane_that_names_them_all():
+    made = reconstruct(swinging_clip(seconds=1.0), "5")
+    scene = build_stage(made, dataclasses.replace(SETTINGS, distinct=True))
+    lanes = [child.name for child in scene.collection.children if child.name.startswith("Lane ")]
+    assert lanes == ["Lane lerp_slerp", "Lane dq_sclerp", "Lane pga_lerp", "Lane motor_spline"]
+    names = bpy.data.curves["dq_sclerp names"].body.replace(",", " ").split()
+    assert names == ["dq_sclerp", "pga_slerp", "cga_slerp"]
+
+
+def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_much():
+    clip = swinging_clip(seconds=1.0)
+    settings = dataclasses.replace(SETTINGS, deviation=20.0)
+    made = reconstruct(clip, "10", TWO)
+    scene = build_stage(made, settings)
+    assert scene["deviation_shown_times"] == 20.0
+    assert "deviation drawn 20 times as large" in bpy.data.curves["Legend"].body
+    for mode in TWO:
+        true, shown, truth = (bpy.data.objects[name] for name in (mode, f"{mode} deviating", f"{mode} recording"))
+        assert true.hide_render
+        assert not shown.hide_render
+        frames = np.arange(1.0, scene.frame_end + 1.0)
+        poses = [read_poses(obj, frames) for obj in (true, shown, truth)]
+        middle = np.mean([vertices_of(true.data).min(axis=0), vertices_of(true.data).max(axis=0)], axis=0)
+        places = [layout.swept_points(some, middle[None]) for some in poses]
+        assert np.allclose(places[1] - places[2], 20.0 * (places[0] - places[2]), atol=1e-5)
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_letters_stand_out_from_their_cards(theme):
+    build_stage(reconstruct(swinging_clip(seconds=0.6), "5", TWO), dataclasses.replace(SETTINGS, theme=theme))
+    card, ink = (np.array(bpy.data.materials[name].diffuse_color)[:3].mean() for name in ("Card", "Ink"))
+    assert (ink > card) == (theme == "dark")
