@@ -13,6 +13,7 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -22,10 +23,11 @@ if str(ROOT) not in sys.path:
 from addon.motion import KEYFRAME_MODES, MODES
 from scripts.command_line import as_typed, number, own_arguments
 from scripts.comparison import steps
+from scripts.comparison.palette import THEMES
 from scripts.comparison.planning import Wanted, comparison_tasks, look_into, reading_tasks
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.stage.settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
-from scripts.comparison.steps import KEYS_NEEDED, REPORT
+from scripts.comparison.steps import FILM, KEYS_NEEDED, REPORT
 from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform
 from scripts.comparison.study.modes import BEST_OF, single_modes
 from scripts.comparison.version import blender_version, program_version
@@ -50,8 +52,8 @@ from scripts.workplan import (
 RATES = "5,10,15,20"
 """Keys a second where none are asked for."""
 
-ALL = "all"
-"""Stands for the modes that are compared where none are named."""
+ALL, DISTINCT = "all", "distinct"
+"""Stand for all modes that keyframes can have, with a lane in the film for each, or for each motion that comes out."""
 
 EPILOG = """
 inputs:
@@ -113,9 +115,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--modes",
         type=_modes,
-        default=",".join(KEYFRAME_MODES),
+        default=DISTINCT,
         metavar="MODE,...",
-        help="what fills them in (%(default)s); all for all of these, and best_of for the best of each segment",
+        help=f"what fills them in: {DISTINCT} for all, in the film those together that are one motion (the default); "
+        f"{ALL} for all on their own; or some of {', '.join(MODES)}; and {BEST_OF} for the best of each segment",
     )
     parser.add_argument(
         "--output", type=Path, default=ROOT / "renders" / "comparison", help="folder to write to (renders/comparison)"
@@ -152,7 +155,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
-    video.add_argument("--resolution", type=_resolution, default="960x540", metavar="WxH", help="(%(default)s)")
+    video.add_argument("--resolution", type=_resolution, default="1280x720", metavar="WxH", help="(%(default)s)")
     video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
     video.add_argument(
         "--slow-motion", type=_positive, default=1.0, metavar="N", help="times slower than life (%(default)s)"
@@ -162,6 +165,19 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         default="drill",
         metavar="OBJECT",
         help="what moves: drill, controller, or FILE.blend:NAME (%(default)s)",
+    )
+    video.add_argument(
+        "--films",
+        choices=("fewest", ALL),
+        default="fewest",
+        help="of each recording the one with the fewest keys, or with every choice of keys (%(default)s)",
+    )
+    video.add_argument("--theme", choices=THEMES, default="dark", help="(%(default)s)")
+    video.add_argument(
+        "--deviation",
+        type=_positive,
+        metavar="N",
+        help="draw what a mode is off by N times as large; 1 as it is (by default a round number that shows it well)",
     )
     video.add_argument(
         "--antialiasing",
@@ -179,6 +195,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             subject=options.object,
             antialiasing=options.antialiasing,
             samples=options.samples,
+            theme=options.theme,
+            deviation=options.deviation,
+            distinct=options.modes.distinct,
         )
     except ValueError as error:
         parser.error(str(error))
@@ -306,11 +325,24 @@ class _Run:
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        tasks = comparison_tasks(found.studies, there, wanted(self.options, self.command))
-        outcome = self._do(tasks, "Comparing")
+        asked = wanted(self.options, self.command)
+        tasks = comparison_tasks(found.studies, there, asked)
+        if self._films_are_missing(tasks):
+            # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
+            numbers = self._do(comparison_tasks(found.studies, there, asked, numbers=True), "Measuring")
+            if numbers.interrupted or numbers.problem:
+                return 130 if numbers.interrupted else 2
+            self.progress.note(
+                f"All numbers are there, and films come as they are made: {self.workspace.output / REPORT}"
+            )
+        outcome = self._do(tasks, "Filming" if asked.stage else "Comparing")
         outcome.states |= read.states
         self._say(outcome, tasks, time.perf_counter() - started)
         return 130 if outcome.interrupted else 2 if outcome.problem else int(State.FAILED in outcome.states.values())
+
+    def _films_are_missing(self, tasks: list[Task]) -> bool:
+        films = [path for task in tasks for path in task.outputs if path.endswith(FILM)]
+        return any(not (self.workspace.output / path).is_file() for path in films)
 
     def _do(self, tasks: list[Task], title: str) -> Outcome:
         outcome = run(
@@ -365,10 +397,11 @@ def wanted(options: argparse.Namespace, command: str) -> Wanted:
     )
     return Wanted(
         choices=tuple(options.choices),
-        modes=tuple(options.modes),
+        modes=options.modes.names,
         radius=options.radius,
         settings=settings,
         stage=None if options.no_video else stage,
+        every_film=options.films == ALL,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
     )
@@ -387,22 +420,32 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
     return parse_amounts
 
 
-def _modes(text: str) -> list[str]:
+@dataclass(frozen=True)
+class Modes:
+    """The modes of a run."""
+
+    names: tuple[str, ...]
+    distinct: bool
+    """Whether those that are one motion share a lane."""
+
+
+def _modes(text: str) -> Modes:
     written = [part.strip() for part in text.split(",") if part.strip()]
-    named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part == ALL else (part,))))
+    named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part in (ALL, DISTINCT) else (part,))))
     modes = single_modes(named)
     wrong = [mode for mode in modes if mode not in MODES]
     if wrong or not named:
         raise argparse.ArgumentTypeError(
-            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, ALL, BEST_OF))}"
+            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, DISTINCT, ALL, BEST_OF))}"
         )
+    distinct = DISTINCT in written
     if BEST_OF not in named:
-        return list(modes)
+        return Modes(tuple(modes), distinct)
     if len(modes) < 2:
         raise argparse.ArgumentTypeError(
             f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
         )
-    return [*modes, BEST_OF]
+    return Modes((*modes, BEST_OF), distinct)
 
 
 def _jobs(text: str) -> int:

@@ -23,14 +23,14 @@ from . import steps
 from .report.pages import ON_ONE_PAGE, Settings
 from .stage.settings import StageSettings, place_of_subject
 from .stage.timeline import Timeline
-from .study.choices import Choice, choice_parts
+from .study.choices import Choice, choice_parts, fewest_keys
 from .study.metrics import table_names
 from .study.reading import folder_names
 from .study.storage import ClipReference, file_names, read_facts, read_times
 
 MODULE = steps.__name__
 
-PIECE = 120
+PIECE = 60
 """Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
 where one is interrupted."""
 
@@ -50,6 +50,9 @@ class Wanted:
     stage: StageSettings | None
     """How to make the films; None for a run without."""
 
+    every_film: bool
+    """Whether there is a film of every choice of keys, or only of the one with the fewest keys."""
+
     count_keys: bool
     """Whether to find out how many keys every mode needs."""
 
@@ -65,6 +68,12 @@ class Study:
     samples: int
     choices: dict[Choice, tuple[float, float]]
     """Each with the times of the first and the last key."""
+
+    def filmed(self, wanted: Wanted) -> list[Choice]:
+        """The choices that there are films of."""
+        if wanted.stage is None:
+            return []
+        return list(self.choices) if wanted.every_film else fewest_keys(self.choices)
 
     @property
     def parts(self) -> tuple[str, list[tuple[str, str]]]:
@@ -149,8 +158,13 @@ def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> 
 # -- comparing --------------------------------------------------------------------------------------------------------
 
 
-def comparison_tasks(studies: Sequence[Study], read: Sequence[Task], wanted: Wanted) -> list[Task]:
-    """All tasks of a comparison, those that read the recordings among them, in the order in which they are wanted."""
+def comparison_tasks(
+    studies: Sequence[Study], read: Sequence[Task], wanted: Wanted, *, numbers: bool = False
+) -> list[Task]:
+    """All tasks of a comparison, those that read the recordings among them, in the order in which they are wanted.
+
+    With `numbers`, only those for all numbers, and for a report that leaves room for the films.
+    """
     readers = {task.arguments["recording"]: task for task in read}
     reader_of = {study.clip.name: readers[study.clip.recording].name for study in studies}
     # All numbers first: they take seconds, and are there whatever becomes of the videos.
@@ -159,9 +173,9 @@ def comparison_tasks(studies: Sequence[Study], read: Sequence[Task], wanted: Wan
     if wanted.count_keys:
         counts = [_count(study, reader_of[study.clip.name], wanted) for study in studies]
         tasks += [*counts, _table(steps.KEYS_NEEDED, "tabulate_keys", studies, [*measures, *counts])]
-    if wanted.stage:
+    if wanted.stage and not numbers:
         tasks += [task for study in studies for task in _films(study, wanted, wanted.stage)]
-    return [*tasks, *_reports(studies, {task.name for task in tasks}, wanted)]
+    return [*tasks, *_reports(studies, {task.name for task in tasks}, wanted, coming=numbers)]
 
 
 def _measures(study: Study, reader: str, wanted: Wanted) -> Iterator[Task]:
@@ -214,7 +228,8 @@ def _table(path: str, function: str, studies: Sequence[Study], before: Iterable[
 def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]:
     clip = study.clip.name
     seconds_a_frame = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
-    for choice, (start, end) in study.choices.items():
+    for choice in study.filmed(wanted):
+        start, end = study.choices[choice]
         count = Timeline.between(start, end, stage.fps, stage.slow_motion).count
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
@@ -258,20 +273,31 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
         )
 
 
-def _reports(studies: Sequence[Study], names: set[str], wanted: Wanted) -> list[Task]:
+def _reports(studies: Sequence[Study], names: set[str], wanted: Wanted, *, coming: bool) -> list[Task]:
     """The report: of a few clips on one page, of more on a page each. `names` are of the tasks that there are."""
     settings = {name: value for name, value in vars(wanted.settings).items() if name != "date"}
-    shared = {"settings": settings, "videos": wanted.stage is not None}
+    shared = {"settings": settings, "coming": coming}
+    filmed = {
+        study.clip.name: [(study.clip.name, choice_parts(choice)) for choice in study.filmed(wanted)]
+        for study in studies
+    }
     shown = {study.clip.name: _shown_of(study, names) for study in studies}
     everything = [name for some in shown.values() for name in some]
     parts = [study.parts for study in studies]
     if len(studies) <= ON_ONE_PAGE:
-        return [_report(steps.REPORT, "report", {"studies": parts, **shared}, everything)]
+        return [
+            _report(
+                steps.REPORT,
+                "report",
+                {"studies": parts, "filmed": [film for some in filmed.values() for film in some], **shared},
+                everything,
+            )
+        ]
     pages = [
         _report(
             steps.page_of(study.clip.name),
             "clip_page",
-            {"studies": [study.parts], **shared},
+            {"studies": [study.parts], "filmed": filmed[study.clip.name], **shared},
             shown[study.clip.name],
             steps.paging(study.clip.name),
         )

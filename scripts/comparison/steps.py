@@ -6,6 +6,7 @@ What passes between tasks lies in `PARTS` of the output folder: recordings (`sto
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from scripts.files import write_text
@@ -27,7 +28,7 @@ from .version import program_version
 
 PARTS = ".parts"
 
-METRICS, KEYS_NEEDED, REPORT = "metrics.csv", "keys_needed.csv", "report.html"
+METRICS, KEYS_NEEDED, REPORT, FILM = "metrics.csv", "keys_needed.csv", "report.html", "comparison.mp4"
 
 
 # -- where things are, and the tasks that make them -------------------------------------------------------------------
@@ -84,7 +85,7 @@ def piece_of(clip: str, choice: Choice, first: int) -> str:
 
 
 def film_of(clip: str, choice: Choice) -> str:
-    return f"{folder_of(clip, choice)}/comparison.mp4"
+    return f"{folder_of(clip, choice)}/{FILM}"
 
 
 def blend_of(clip: str, choice: Choice) -> str:
@@ -241,15 +242,17 @@ class Clips:
                 facts = read[0][0]
                 yield ClipResults(facts, tuple(result for _, result in read), self._needed(clip))
 
-    def films(self) -> Films:
-        """The films of all of them."""
-        return {
-            (clip, choice.name): self._job.reads(film_of(clip, choice))
-            if filming(clip, choice) in self._job.finished
-            else None
-            for clip, choices in self._studies
-            for choice in choices
-        }
+    def films(self, filmed: Sequence[tuple[str, Sequence[str]]], *, coming: bool) -> Films:
+        """These films, each a clip and a choice as plain data, whether they are there, or coming."""
+        films: dict[tuple[str, str], Path | None] = {}
+        for clip, parts in filmed:
+            choice = choice_from(*parts)
+            if coming:
+                films[clip, choice.name] = self._job.output / film_of(clip, choice)
+            else:
+                there = filming(clip, choice) in self._job.finished
+                films[clip, choice.name] = self._job.reads(film_of(clip, choice)) if there else None
+        return films
 
     def pages(self) -> dict[str, str | None]:
         """The pages of all of them."""
@@ -263,10 +266,12 @@ class Clips:
 
 
 @step
-def report(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], videos: bool) -> None:
+def report(
+    job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], filmed: Sequence[Any], coming: bool
+) -> None:
     """Write the report of a few clips on one page."""
     clips = Clips(job, studies)
-    films = clips.films() if videos else {}
+    films = clips.films(filmed, coming=coming)
     path = job.writes(REPORT)
     write_report(
         path, clips, films=films, settings=Settings(**settings), folder=job.output, advance=_counted(job, studies)
@@ -274,7 +279,9 @@ def report(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], vid
 
 
 @step
-def clip_page(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], videos: bool) -> None:
+def clip_page(
+    job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], filmed: Sequence[Any], coming: bool
+) -> None:
     """Write the page of a clip, the only one of these studies."""
     clips = Clips(job, studies)
     (clip,) = clips
@@ -282,7 +289,7 @@ def clip_page(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], 
     write_clip_page(
         job.writes(path),
         clip,
-        films=clips.films() if videos else {},
+        films=clips.films(filmed, coming=coming),
         settings=Settings(**settings),
         folder=(job.output / path).parent,
         overview=f"../{REPORT}",

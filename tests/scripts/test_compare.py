@@ -546,7 +546,7 @@ def test_the_best_of_each_segment_has_a_lane_in_the_video(short_clip, tmp_path):
     asked = ("--rates", "8", "--modes", "lerp_slerp,motor_spline,best_of")
     assert run(short_clip, "--output", tmp_path, *asked, *SMALL) == 0
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "toss" / "8" / "comparison.blend"))
-    assert bpy.data.objects["best_of label"].data.body == "Best per Segment"
+    assert bpy.data.objects["best_of title"].data.body == "Best per Segment"
     assert {"lerp_slerp", "motor_spline", "best_of"} <= set(bpy.data.objects.keys())
 
 

@@ -23,7 +23,7 @@ from .markup import Content, Markup, element
 from .needed_section import clip_part
 
 Films = Mapping[tuple[str, str], Path | None]
-"""(clip name, name of the choice) to its video, None where it could not be made."""
+"""(clip name, name of the choice) to its video, which may not be there yet; None where it could not be made."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +146,8 @@ def _error_over_rate(name: str, results: Sequence[Result]) -> Markup:
 def _rate_section(name: str, clip: str, result: Result, films: Films, folder: Path) -> Markup:
     rows, choice = result.rows, result.choice
     charts: list[Content] = [Markup(result.charts())]
-    if films:
-        charts = [_film(name, films.get((clip, choice.name)), folder), element("div", charts)]
+    if (clip, choice.name) in films:
+        charts = [_film(name, films[clip, choice.name], folder), element("div", charts)]
     own_counts = len({row.keys for row in rows}) > 1
     counted = "Each mode has keys of its own" if own_counts else f"{rows[0].keys} keys"
     sent = "" if own_counts else f", {rows[0].bytes_per_s:.0f} bytes/s"
@@ -186,9 +186,16 @@ def _best_of(found: SegmentModes, rows: Sequence[Metrics]) -> Markup:
 
 
 def _film(name: str, film: Path | None, folder: Path) -> Markup:
-    if film is None or not film.is_file():
-        return element("p", "There is no video with these keys.", class_="film note")
+    if film is None:
+        return element("p", "The video could not be made.", class_="film note")
     link = quote(Path(os.path.relpath(film, folder)).as_posix())
+    if not film.is_file():
+        return element(
+            "div",
+            element("p", "The video is being rendered, and shows here once it is there.", class_="note"),
+            class_="film coming",
+            data_coming=link,
+        )
     return element(
         "div",
         element("p", element("a", "Video file", href=link), class_="note"),

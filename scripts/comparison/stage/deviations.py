@@ -9,7 +9,7 @@ from addon.motion.quaternions import conjugate, multiply, rotate
 
 from . import layout
 
-SHARE = 0.3
+SHARE = 0.4
 """Of the object's size: how large the largest deviation is shown at most, where it is magnified."""
 
 STEPS = (1.0, 2.0, 5.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -194,6 +195,14 @@ def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np
 
 KINDS: dict[str, type[Choice]] = {kind.__name__.lower(): kind for kind in (Uniform, Budget, Tolerance)}
 """What choices are called where they are plain data."""
+
+
+def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:
+    """Of each kind of choice that which keeps the fewest keys, where modes differ most."""
+    kinds: dict[type[Choice], list[Choice]] = {}
+    for choice in choices:
+        kinds.setdefault(type(choice), []).append(choice)
+    return [(max if kind is Tolerance else min)(some, key=lambda choice: choice.size) for kind, some in kinds.items()]
 
 
 def choice_parts(choice: Choice) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from scripts.comparison import steps
 from scripts.comparison.planning import PIECE, Study, Wanted, comparison_tasks, look_into, reading_tasks
 from scripts.comparison.report.pages import ON_ONE_PAGE, Settings
 from scripts.comparison.stage.settings import StageSettings
-from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts
+from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts, fewest_keys
 from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.reading import folder_names
 from scripts.comparison.study.reconstructions import reconstruct
@@ -29,6 +29,7 @@ WANTED = Wanted(
     radius=0.1,
     settings=Settings(radius=0.1, program="Rigid Motion", blender="5", command="compare.py"),
     stage=StageSettings(),
+    every_film=True,
     count_keys=True,
 )
 
@@ -38,10 +39,12 @@ def study(name: str, task: Task, seconds: float = 3.0) -> Study:
     return Study(clip, round(seconds * 90), dict.fromkeys(WANTED.choices, (0.0, seconds)))
 
 
-def tasks_of(names: Sequence[str], wanted: Wanted = WANTED, seconds: float = 3.0) -> dict[str, Task]:
+def tasks_of(
+    names: Sequence[str], wanted: Wanted = WANTED, seconds: float = 3.0, *, numbers: bool = False
+) -> dict[str, Task]:
     read = reading_tasks([f"{name}.csv" for name in names], "blender")
     studies = [study(name, task, seconds) for name, task in zip(names, read, strict=True)]
-    return {task.name: task for task in comparison_tasks(studies, read, wanted)}
+    return {task.name: task for task in comparison_tasks(studies, read, wanted, numbers=numbers)}
 
 
 def test_the_tasks_make_a_plan_with_all_numbers_before_the_first_film() -> None:
@@ -67,6 +70,24 @@ def test_the_pieces_of_a_film_are_all_its_frames_once(seconds: float) -> None:
 def test_a_run_without_videos_makes_none() -> None:
     tasks = tasks_of(["reach"], replace(WANTED, stage=None, count_keys=False))
     assert {name.split()[0] for name in tasks} == {"read", "measure", "metrics.csv", "report.html"}
+
+
+def test_a_film_of_the_fewest_keys_of_each_kind_is_enough_unless_all_are_asked_for() -> None:
+    choices = (Uniform("15"), Uniform("7.5"), Tolerance("5mm"), Tolerance("1cm"))
+    assert fewest_keys(choices) == [Uniform("7.5"), Tolerance("1cm")]
+    tasks = tasks_of(["reach"], replace(WANTED, every_film=False))
+    assert sum(name.startswith("encode") for name in tasks) == 2
+    assert tasks[steps.REPORT].arguments["filmed"] == [["reach", ["uniform", "5"]], ["reach", ["tolerance", "5mm"]]]
+
+
+def test_the_numbers_can_be_had_before_the_films() -> None:
+    everything, numbers = tasks_of(["reach"]), tasks_of(["reach"], numbers=True)
+    assert {name for name in everything if name not in numbers} == {
+        name for name in everything if name.split()[0] in ("build", "render", "encode")
+    }
+    assert {name for name, task in numbers.items() if everything[name] != task} == {steps.REPORT}
+    assert numbers[steps.REPORT].arguments["coming"]
+    assert not everything[steps.REPORT].arguments["coming"]
 
 
 def test_many_clips_have_a_page_each() -> None:

@@ -1,17 +1,35 @@
 "use strict";
 
+function newVideo() {
+  const video = document.createElement("video");
+  Object.assign(video, { controls: true, loop: true, muted: true, playsInline: true, preload: "metadata" });
+  video.setAttribute("aria-label", "Video: the modes side by side");
+  return video;
+}
+
 // Videos: the base64 at the end of the page becomes a Blob when its place comes into view.
 function showFilm(place) {
   const source = document.getElementById(place.dataset.film);
   if (!source) return;
   const bytes = Uint8Array.from(atob(source.textContent), (c) => c.charCodeAt(0));
   source.remove();
-  const video = document.createElement("video");
-  Object.assign(video, { controls: true, loop: true, muted: true, playsInline: true, preload: "metadata" });
-  video.setAttribute("aria-label", "Video: the modes side by side");
+  const video = newVideo();
   video.src = URL.createObjectURL(new Blob([bytes], { type: "video/mp4" })) + "#t=0.001"; // Safari shows no first frame else.
   place.prepend(video);
 }
+
+// A video that is still being rendered is looked for until it is there.
+function awaitFilm(place) {
+  const video = newVideo();
+  video.addEventListener("error", () => setTimeout(look, 4000));
+  video.addEventListener("loadedmetadata", () => place.replaceChildren(video));
+  function look() {
+    video.src = `${place.dataset.coming}?${Date.now()}#t=0.001`; // Or the browser remembers that it was not there.
+  }
+  look();
+}
+
+document.querySelectorAll("[data-coming]").forEach(awaitFilm);
 
 const films = new IntersectionObserver(
   (entries) => {

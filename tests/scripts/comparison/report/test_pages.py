@@ -232,13 +232,23 @@ def test_a_video_is_in_the_page_byte_for_byte_with_a_link_to_its_file(
 def test_a_rate_without_its_video_says_so_where_others_have_theirs(tmp_path: Path, runs: list[Reconstruction]) -> None:
     film = tmp_path / "comparison.mp4"
     film.write_bytes(b"film")
-    page = report(tmp_path, runs, {("reach", "5"): film, ("reach", "20"): tmp_path / "interrupted.mp4"})
-    assert page.source.count("There is no video with these keys.") == 5
+    page = report(tmp_path, runs, {("reach", "5"): film, ("reach", "20"): None})
+    assert page.source.count("The video could not be made.") == 1
     assert len(list(page.find("script", type="text/plain"))) == 1
 
 
+def test_a_video_that_is_being_rendered_is_looked_for_where_it_will_be(
+    tmp_path: Path, runs: list[Reconstruction]
+) -> None:
+    page = report(tmp_path, runs, {("reach", "5"): tmp_path / "re ach#1" / "5" / "comparison.mp4"})
+    ((place, text),) = page.find("div", class_="film coming")
+    assert place["data-coming"] == "re%20ach%231/5/comparison.mp4"
+    assert "being rendered" in text
+    assert not list(page.find("script", type="text/plain"))
+
+
 def test_a_run_without_videos_does_not_speak_of_them(page: Page) -> None:
-    assert "There is no video" not in page.source
+    assert "The video" not in page.source
     assert not list(page.find("script", type="text/plain"))
     assert not list(page.find("div", class_="film"))
 
@@ -476,7 +486,7 @@ def test_the_page_of_a_clip_leads_back_and_shows_its_film(tmp_path: Path, runs: 
     links = assert_links_lead_somewhere(page)
     assert [link for link in links if not link.startswith("#")] == ["../report.html", "5/comparison.mp4"]
     assert [text for _, text in page.find("h2")] == ["reach"]
-    assert page.source.count("There is no video with these keys.") == 2
+    assert page.source.count("The video could not be made.") == 2
     assert len(list(page.find("script", type="text/plain"))) == 1
 
 

@@ -316,6 +316,8 @@ def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_muc
         true, shown, truth = (bpy.data.objects[name] for name in (mode, f"{mode} deviating", f"{mode} recording"))
         assert true.hide_render
         assert not shown.hide_render
+        true.hide_viewport = False
+        bpy.context.view_layer.update()
         frames = np.arange(1.0, scene.frame_end + 1.0)
         poses = [read_poses(obj, frames) for obj in (true, shown, truth)]
         middle = np.mean([vertices_of(true.data).min(axis=0), vertices_of(true.data).max(axis=0)], axis=0)
