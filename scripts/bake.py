@@ -21,20 +21,15 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from scripts.hushing import hushed
-from scripts.system_libraries import way_out
+from scripts.system_libraries import require_blender
 
 if __name__ == "__main__" and signal.getsignal(signal.SIGINT) == signal.default_int_handler:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # An exception would leave Blender half loaded, and it crashes then.
 
-try:
-    with hushed():  # Where OCIO is set, it says so.
-        import bpy
-except ImportError as error:
-    print(f"bake.py: {error}\n{way_out(str(error), 'bake.py')}", file=sys.stderr)
-    sys.exit(2)
+require_blender("bake.py")
 
 import addon_utils
+import bpy
 
 from addon import animation
 from addon.animation.transforms import BoneTransform, Transform

@@ -18,13 +18,11 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from scripts.system_libraries import way_out
+from scripts.system_libraries import require_blender
 
-try:
-    import bpy
-except ImportError as error:
-    print(f"build_extension.py: {error}\n{way_out(str(error))}", file=sys.stderr)
-    sys.exit(2)
+require_blender("build_extension.py")
+
+import bpy
 
 from scripts.files import written_beside
 

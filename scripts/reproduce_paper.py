@@ -15,14 +15,11 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from scripts.system_libraries import missing_for_rendering, way_out
+from scripts.system_libraries import missing_for_rendering, require_blender, way_out
 
-try:
-    import bpy
-except ImportError as error:
-    print(f"reproduce_paper.py: {error}\n{way_out(str(error))}", file=sys.stderr)
-    sys.exit(2)
+require_blender("reproduce_paper.py")
 
+import bpy
 import numpy as np
 
 from scripts.command_line import own_arguments

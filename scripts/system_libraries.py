@@ -6,6 +6,8 @@ import ctypes
 import re
 import sys
 
+from scripts.hushing import hushed
+
 DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
 """Packages of Debian and Ubuntu."""
 
@@ -27,6 +29,16 @@ def missing_for_rendering() -> str | None:
         except OSError as error:
             return str(error)
     return None
+
+
+def require_blender(script: str) -> None:
+    """Load Blender, or end a script with code 2 and what to do about it."""
+    try:
+        with hushed():  # Where OCIO is set, it says so.
+            import bpy  # noqa: F401
+    except ImportError as error:
+        print(f"{script}: {error}\n{way_out(str(error), script)}", file=sys.stderr)
+        sys.exit(2)
 
 
 def way_out(error: str, script: str = "compare.py") -> str:

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scripts.rows import read_rows
+
 from . import claims, strips, triangle
 from .bandwidths import Bandwidth
 from .bows import Bow
 from .catching import View
 from .motions import ASSETS, RECORDINGS, Motion
-from .rows import read_rows
 from .table import UNIFORM, YARDSTICKS, LookAhead, Needed
 from .timing import Timing
 

@@ -20,6 +20,7 @@ from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.modes import REFERENCE
 from scripts.comparison.study.reading import folder_names, read_clips
 from scripts.files import write_text
+from scripts.rows import read_rows, write_rows
 from scripts.workplan import Job, Plan, Task, step
 
 from . import bows, catching, engines, strips, table, timing, triangle
@@ -27,7 +28,6 @@ from .bandwidths import Bandwidth, bandwidths
 from .motions import ASSETS, RECORDINGS, Motion, read_motion
 from .page import write_page
 from .results import Results
-from .rows import read_rows, write_rows
 
 ADAPTIVE = (REFERENCE, "motor_spline")
 """Modes that are given keys where they need them as well."""

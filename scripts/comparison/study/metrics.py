@@ -6,8 +6,6 @@ reads back exactly what was computed.
 
 from __future__ import annotations
 
-import csv
-import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +15,7 @@ import numpy as np
 from addon.motion import Poses
 from addon.motion.measures import rms
 from scripts.files import replacing
+from scripts.rows import write_rows
 
 from .choices import Choice
 from .modes import BEST_OF
@@ -131,10 +130,7 @@ def geometric_mean(values: np.ndarray) -> np.ndarray:
 
 def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
     """Write `metrics.csv`: a header and a row for every clip, choice of keys and mode."""
-    with replacing(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(field.name for field in dataclasses.fields(Metrics))
-        writer.writerows(dataclasses.astuple(row) for row in rows)
+    write_rows(path, Metrics, rows)
 
 
 def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:

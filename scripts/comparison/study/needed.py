@@ -8,17 +8,15 @@ the points of the curve of error over keys a second. Errors are in metres.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from addon.motion import Poses, decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
-from scripts.files import write_text
+from scripts.rows import write_rows
 
 from .clips import Clip
 from .metrics import NOTHING, geometric_mean
@@ -37,11 +35,20 @@ DECIMATIONS = ("uniform", "adaptive", "fitted")
 TRIES = 3
 """How often fewer keys are fitted, to find how few will do."""
 
-COLUMNS = (
-    *("clip", "mode", "decimation", "as_good_as_hz", "wanted_rms_shell_m"),
-    *("keys", "keys_per_s", "share", "rms_shell_m"),
-)
-"""Of keys_needed.csv."""
+
+@dataclass(frozen=True)
+class NeededRow:
+    """A row of keys_needed.csv. The last four are None where every sample would be needed."""
+
+    clip: str
+    mode: str
+    decimation: str
+    as_good_as_hz: str
+    wanted_rms_shell_m: float
+    keys: int | None
+    keys_per_s: float | None
+    share: float | None
+    rms_shell_m: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,21 +299,20 @@ def _place(clip: KeysNeeded, mode: str) -> int:
 
 
 def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
-    """Write a row for every clip, mode, decimation and rate.
+    """Write a row for every clip, mode, decimation and rate, but where the reference has no error to be as good as."""
+    write_rows(path, NeededRow, (row for clip in clips for row in _rows(clip)))
 
-    The last four cells are empty where every sample would be needed, and there is no row where the reference has no
-    error to be as good as.
-    """
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for clip in clips:
-        for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
-            at = group, decimation, rate
-            found = [float(values[at]) for values in (clip.keys_per_s, clip.shares, clip.reached)]
-            needed = [int(clip.keys[at]), *found] if np.isfinite(clip.keys[at]) else [""] * 4
-            for mode in clip.groups[group]:
-                writer.writerow(
-                    [clip.clip, mode, DECIMATIONS[decimation], clip.rates[rate], float(clip.targets[rate]), *needed]
-                )
-    write_text(path, table.getvalue())
+
+def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
+    for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
+        at = group, decimation, rate
+        found = [None] * 4
+        if np.isfinite(clip.keys[at]):
+            found = [
+                int(clip.keys[at]),
+                *(float(values[at]) for values in (clip.keys_per_s, clip.shares, clip.reached)),
+            ]
+        for mode in clip.groups[group]:
+            yield NeededRow(
+                clip.clip, mode, DECIMATIONS[decimation], clip.rates[rate], float(clip.targets[rate]), *found
+            )

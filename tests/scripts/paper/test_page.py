@@ -16,10 +16,10 @@ from scripts.paper.catching import View
 from scripts.paper.motions import ASSETS, RECORDINGS, Motion
 from scripts.paper.page import write_page
 from scripts.paper.results import Results
-from scripts.paper.rows import write_rows
 from scripts.paper.strips import Instant
 from scripts.paper.table import ADAPTIVE, UNIFORM, LookAhead, Needed
 from scripts.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Timing
+from scripts.rows import write_rows
 
 MODES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
 

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import csv
-import io
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import TypeVar
 
-from scripts.files import write_text
+from scripts.files import replacing
 
 Row = TypeVar("Row")
 
 READERS = {"str": str, "int": int, "float": float}
 
 
-def write_rows(path: Path, kind: type[Row], rows: Sequence[Row]) -> None:
-    """Write a header and the rows."""
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(field.name for field in fields(kind))
-    writer.writerows(astuple(row) for row in rows)
-    write_text(path, table.getvalue())
+def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
+    """Write a header and the rows; None is an empty cell."""
+    with replacing(path) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(field.name for field in fields(kind))
+        writer.writerows(astuple(row) for row in rows)
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:
