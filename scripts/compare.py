@@ -326,6 +326,8 @@ class _Run:
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
         asked = wanted(self.options, self.command)
+        for note in filter(None, (study.left_out(asked.stage) for study in found.studies if asked.stage)):
+            self.progress.note(note)
         tasks = comparison_tasks(found.studies, there, asked)
         if self._films_are_missing(tasks):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.

@@ -35,6 +35,10 @@ PIECE = 60
 where one is interrupted."""
 
 
+MOST_FRAMES = 216_000
+"""Of a film: an hour at 60 frames a second."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What is wanted of every clip."""
@@ -71,9 +75,23 @@ class Study:
 
     def filmed(self, wanted: Wanted) -> list[Choice]:
         """The choices that there are films of."""
-        if wanted.stage is None:
-            return []
-        return list(self.choices) if wanted.every_film else fewest_keys(self.choices)
+        asked = list(self.choices) if wanted.every_film else fewest_keys(self.choices)
+        return [choice for choice in asked if wanted.stage and self._frames(choice, wanted.stage) <= MOST_FRAMES]
+
+    def left_out(self, stage: StageSettings) -> str:
+        """Why there is no film of the clip, for the user; empty where there can be one."""
+        frames = max(self._frames(choice, stage) for choice in self.choices)
+        if frames <= MOST_FRAMES:
+            return ""
+        start, end = next(iter(self.choices.values()))
+        return (
+            f"{self.clip.name}: no video: its {end - start:.6g} s make {frames:.6g} frames, {MOST_FRAMES} are the most; "
+            "see whether its times are in seconds, cut it, or give a lower --fps or --slow-motion"
+        )
+
+    def _frames(self, choice: Choice, stage: StageSettings) -> float:
+        start, end = self.choices[choice]
+        return (end - start) * stage.fps * stage.slow_motion + 1.0
 
     @property
     def parts(self) -> tuple[str, list[tuple[str, str]]]:

@@ -80,6 +80,24 @@ def test_a_film_of_the_fewest_keys_of_each_kind_is_enough_unless_all_are_asked_f
     assert tasks[steps.REPORT].arguments["filmed"] == [["reach", ["uniform", "5"]], ["reach", ["tolerance", "5mm"]]]
 
 
+@pytest.mark.parametrize("seconds", [1e6, 1e12, 1e25])
+def test_a_film_that_nobody_can_watch_is_left_out_and_the_user_told(seconds: float) -> None:
+    tasks = tasks_of(["reach"], seconds=seconds)
+    assert {name.split()[0] for name in tasks} == {
+        "read",
+        "measure",
+        "count",
+        "metrics.csv",
+        "keys_needed.csv",
+        "report.html",
+    }
+    (reading,) = reading_tasks(["reach.csv"], "blender")
+    told = Study(ClipReference("reach", "", 0), 90, {Uniform("5"): (0.0, seconds)}).left_out(WANTED.stage)
+    assert told.startswith("reach: no video: its 1e+")
+    assert "times are in seconds" in told
+    assert not study("reach", reading).left_out(WANTED.stage)
+
+
 def test_the_numbers_can_be_had_before_the_films() -> None:
     everything, numbers = tasks_of(["reach"]), tasks_of(["reach"], numbers=True)
     assert {name for name in everything if name not in numbers} == {
