@@ -48,7 +48,7 @@ STILLS = {
 def main() -> None:
     """Render everything anew."""
     for picture, still in STILLS.items():
-        settings = StageSettings(resolution=still.resolution, antialiasing="8", subject=still.subject)
+        settings = StageSettings(resolution=still.resolution, antialiasing="8", subject=still.subject, distinct=True)
         (clip,), _ = read_clips([str(DOCS.parent / "assets" / f"{still.asset}.csv")], "blender")
         scene = build_stage(reconstruct(clip, Uniform(still.rate), still.modes, radius=0.1), settings)
         if hasattr(scene.render.image_settings, "media_type"):

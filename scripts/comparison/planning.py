@@ -85,7 +85,7 @@ class Study:
             return ""
         start, end = next(iter(self.choices.values()))
         return (
-            f"{self.clip.name}: no video: its {end - start:.6g} s make {frames:.6g} frames, {MOST_FRAMES} are the most; "
+            f"{self.clip.name}: no video: its {end - start:.6g} s make {frames:.6g} frames, more than {MOST_FRAMES}; "
             "see whether its times are in seconds, cut it, or give a lower --fps or --slow-motion"
         )
 

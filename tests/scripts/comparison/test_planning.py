@@ -83,14 +83,8 @@ def test_a_film_of_the_fewest_keys_of_each_kind_is_enough_unless_all_are_asked_f
 @pytest.mark.parametrize("seconds", [1e6, 1e12, 1e25])
 def test_a_film_that_nobody_can_watch_is_left_out_and_the_user_told(seconds: float) -> None:
     tasks = tasks_of(["reach"], seconds=seconds)
-    assert {name.split()[0] for name in tasks} == {
-        "read",
-        "measure",
-        "count",
-        "metrics.csv",
-        "keys_needed.csv",
-        "report.html",
-    }
+    assert not [name for name in tasks if name.startswith(("build", "render", "encode"))]
+    assert tasks[steps.REPORT].arguments["filmed"] == []
     (reading,) = reading_tasks(["reach.csv"], "blender")
     told = Study(ClipReference("reach", "", 0), 90, {Uniform("5"): (0.0, seconds)}).left_out(WANTED.stage)
     assert told.startswith("reach: no video: its 1e+")
