@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
+from scripts.comparison.stage import film
 from scripts.comparison.study.reading import folder_names
 from scripts.workplan import Workspace
 from scripts.workplan import __main__ as workplan
@@ -241,6 +242,40 @@ def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_c
         *("manifest.json", "metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend")
     }
     assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
+
+
+def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_clip, tmp_path, capsys, monkeypatch):
+    pages = []
+    render = film.render_piece
+
+    def render_piece(*arguments: object) -> float:
+        pages.append((tmp_path / "report.html").read_text(encoding="utf-8"))
+        return render(*arguments)
+
+    monkeypatch.setattr(film, "render_piece", render_piece)
+    assert run(short_clip, "--output", tmp_path, "--rates", "5,10", *SMALL) == 0
+    assert pages
+    assert all(
+        "The video is being rendered" in page and 'data-coming="toss/5/comparison.mp4"' in page for page in pages
+    )
+    assert pages[0].count("<table") == (tmp_path / "report.html").read_text(encoding="utf-8").count("<table") > 2
+    assert "The video is being rendered" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert [path.parent.name for path in tmp_path.glob("toss/*/comparison.mp4")] == ["5"]
+    assert f"films come as they are made: {tmp_path / 'report.html'}" in capsys.readouterr().err
+    assert run(short_clip, "--output", tmp_path, "--rates", "5,10", *SMALL) == 0
+    assert "films come" not in capsys.readouterr().err
+    assert len(pages) == 1
+
+
+@pytest.mark.parametrize(
+    ("modes", "distinct"), [((), True), (("--modes", "all"), False), (("--modes", "dq_sclerp,pga_slerp"), False)]
+)
+def test_modes_that_are_one_motion_share_a_lane_unless_they_are_asked_for(modes, distinct):
+    options = compare.parse(["take.csv", *modes])
+    assert options.stage.distinct == distinct
+    assert options.modes.names == (
+        tuple(KEYFRAME_MODES) if len(options.modes.names) > 2 else ("dq_sclerp", "pga_slerp")
+    )
 
 
 def test_rates_and_modes_can_be_chosen(short_clip, tmp_path):
