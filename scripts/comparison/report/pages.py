@@ -3,7 +3,8 @@
 A few clips are one page. Where there are many, each has a page of its own, and one page says what they come to and
 leads to them. The page, its style and its script are in `page/`; this module fills them in. Videos follow the page's
 content as base64 and become Blobs when they are first looked at (Safari plays no `data:` URIs), so that a large report
-opens at once. A content security policy forbids every request and every script but the page's own.
+opens at once. A content security policy forbids every request and every script but the page's own; while videos are
+being rendered, it allows those beside the page.
 """
 
 from __future__ import annotations
@@ -33,6 +34,9 @@ from .needed_section import keys_section
 from .summary_section import lead, summary_section
 
 PAGE = Path(__file__).parent / "page"
+
+BESIDE_THE_PAGE = "'self' file:"
+"""Where a page may take videos from that are not in it: a server's page from that server, a file from other files."""
 
 ON_ONE_PAGE = 24
 """So many clips are one page; more have a page each."""
@@ -116,7 +120,15 @@ def write_report(
         "modes": _modes_section(summaries[0], settings),
         "settings": _settings_section(summaries, settings),
     }
-    _write_page(path, "Rigid Motion: a comparison of interpolation modes", content, settings, sections(), videos())
+    _write_page(
+        path,
+        "Rigid Motion: a comparison of interpolation modes",
+        content,
+        settings,
+        sections(),
+        videos(),
+        coming=_coming(films),
+    )
 
 
 def write_clip_page(
@@ -139,7 +151,15 @@ def write_clip_page(
         **dict.fromkeys(("summary", "needed", "modes", "settings"), ""),
     }
     section = clip_section("clip-1", clip, films, folder, with_needed=True)
-    _write_page(path, f"{name}: a comparison", content, settings, [section], _videos_of("clip-1", clip, films))
+    _write_page(
+        path,
+        f"{name}: a comparison",
+        content,
+        settings,
+        [section],
+        _videos_of("clip-1", clip, films),
+        coming=_coming(films),
+    )
 
 
 def write_overview(
@@ -213,12 +233,18 @@ def _write_page(
     settings: Settings,
     clips: Iterable[Markup],
     films: Iterable[tuple[str, Path]],
+    *,
+    coming: bool = False,
 ) -> None:
-    """Write a page, a clip and a film at a time: a report may be larger than what one wants in memory."""
+    """Write a page, a clip and a film at a time: a report may be larger than what one wants in memory.
+
+    `coming` says that there are films which are not there yet.
+    """
     script = (PAGE / "page.js").read_text(encoding="utf-8")
     page = Template((PAGE / "page.html").read_text(encoding="utf-8")).substitute(
         content,
         title=escape(title),
+        media=f"blob: {BESIDE_THE_PAGE}" if coming else "blob:",
         script=script,
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         style=(PAGE / "page.css").read_text(encoding="utf-8"),
@@ -244,6 +270,11 @@ def _of_all(needed: Sequence[KeysNeeded]) -> list[tuple[str, str]]:
     """The places of what is said of all clips."""
     middle = [("needed", "Keys needed")] if needed else []
     return [("summary", "Summary"), *middle, ("modes", "Modes and measures")]
+
+
+def _coming(films: Films) -> bool:
+    """Whether there are films that are not there yet."""
+    return any(film is not None and not film.is_file() for film in films.values())
 
 
 def _videos_of(place: str, clip: ClipResults, films: Films) -> Iterable[tuple[str, Path]]:

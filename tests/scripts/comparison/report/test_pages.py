@@ -200,6 +200,7 @@ def test_the_policy_allows_the_pages_own_script_and_no_request(page: Page) -> No
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     assert f"script-src 'sha256-{digest}'" in policy["content"]
     assert policy["content"].startswith("default-src 'none';")
+    assert "media-src blob:;" in policy["content"]
     assert "http" not in policy["content"]
 
 
@@ -244,6 +245,7 @@ def test_a_video_that_is_being_rendered_is_looked_for_where_it_will_be(
     ((place, text),) = page.find("div", class_="film coming")
     assert place["data-coming"] == "re%20ach%231/5/comparison.mp4"
     assert "being rendered" in text
+    assert "media-src blob: 'self' file:;" in page.source
     assert not list(page.find("script", type="text/plain"))
 
 
