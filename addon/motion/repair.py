@@ -16,6 +16,15 @@ from .quaternions import align_signs, normalise
 GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
 
+MOST_STRAYS = 0.05
+"""The share of the rows up to which those at an end, far away in time, are strays and not a part of the recording."""
+
+FAR = 10.0
+"""How many times longer than all the rest the pause before strays is: nobody records for so small a part of the time."""
+
+MOST_NAMED = 5
+"""Rows, and times, that are named of one kind of fault."""
+
 LARGEST = 1e30
 """A number beyond this is damage, and well within what can be interpolated: splines shoot over."""
 
@@ -37,8 +46,8 @@ class Repair:
     """The rows of the recording where, from 0. For a gap, the row after it."""
 
     def __str__(self) -> str:
-        shown = ", ".join(str(row) for row in self.rows[:5].tolist())
-        return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > 5 else ''})"
+        shown = ", ".join(str(row) for row in self.rows[:MOST_NAMED].tolist())
+        return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > MOST_NAMED else ''})"
 
 
 def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Repair]]:
@@ -63,7 +72,8 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     Notes
     -----
     Of several rows with one time the last is kept, being the newest. Of times that run backwards, as few rows are
-    dropped as can be, so that one wild time stamp does not cost the rest of the recording. Gaps stay gaps.
+    dropped as can be, so that one wild time stamp does not cost the rest of the recording; nor does one at an end make
+    it last for years. Gaps stay gaps.
     """
     repairs: list[Repair] = []
     rows = np.arange(len(times))
@@ -79,7 +89,11 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
         finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
     keep(finite, "dropped rows with numbers that are missing, not finite or too large")
     keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
-    keep(_rising(times), "dropped rows whose time runs backwards")
+    keep(rising(times), "dropped rows whose time runs backwards")
+    near = _near(times)
+    if not near.all():
+        away = ", ".join(f"{time:.6g} s" for time in times[~near][:MOST_NAMED].tolist())
+        keep(near, f"dropped rows whose time is far from that of all others: {away}")
     keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
@@ -97,12 +111,28 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     return times, Poses(poses.positions, aligned, poses.scales), repairs
 
 
+def _near(times: np.ndarray) -> np.ndarray:
+    """A mask of rising times without those few at an end that a pause far longer than all the rest sets apart."""
+    first, last = 0, len(times)
+    while last - first > 2:
+        intervals = np.diff(times[first:last])
+        gap = int(np.argmax(intervals))
+        before, after = gap + 1, last - first - gap - 1
+        stray, rest = min(before, after), (intervals[gap + 1 :] if before < after else intervals[:gap]).sum()
+        if stray > MOST_STRAYS * len(times) or intervals[gap] <= FAR * rest:
+            break
+        first, last = (first + before, last) if before < after else (first, first + before)
+    near = np.zeros(len(times), dtype=bool)
+    near[first:last] = True
+    return near
+
+
 def _usable(numbers: np.ndarray) -> np.ndarray:
     """Which numbers are there, finite and of a size that anything has: NaN is neither small nor large."""
     return np.abs(numbers) < LARGEST
 
 
-def _rising(times: np.ndarray) -> np.ndarray:
+def rising(times: np.ndarray) -> np.ndarray:
     """A mask of the longest part of `times` that never falls: the whole, where the recording is sound."""
     if np.all(np.diff(times) >= 0.0):
         return np.ones(len(times), dtype=bool)
