@@ -20,7 +20,7 @@ MOST_STRAYS = 0.05
 """The share of the rows up to which those at an end, far away in time, are strays and not a part of the recording."""
 
 FAR = 10.0
-"""How many times longer than all the rest the pause before strays is: nobody records for so small a part of the time."""
+"""How many times longer than all the rest the pause beside strays is: nobody waits so long for a few samples."""
 
 MOST_NAMED = 5
 """Rows, and times, that are named of one kind of fault."""

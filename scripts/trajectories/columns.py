@@ -14,7 +14,7 @@ from .options import TICKS, ReadingOptions
 from .recordings import listed, shown
 
 POSITION = ("x", "y", "z")
-QUATERNION = ("qw", "qx", "qy", "qz")
+QUATERNION = ("qx", "qy", "qz", "qw")
 EULER = ("rx", "ry", "rz")
 
 KNOWN = "t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w"
@@ -190,13 +190,22 @@ def _missing(
             "say which is which: --columns rx=roll,ry=pitch,rz=yaw in ROS, rx=pitch,ry=yaw,rz=roll in Unity",
             known,
         )
-    way_out = f"known are {KNOWN}; name others with --columns {','.join(f'{one}=NAME' for one in missing[:3])}"
-    if len(missing) > 3:
-        way_out += ",..."
+    others = ",".join(f"{one}=NAME" for one in missing[:3]) + ",..." * (len(missing) > 3)
+    way_out = f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
+        if all(map(_is_number, cells)):
+            way_out = f"write a first line of names: {','.join(('t', *needed))}"
         return ColumnProblem(f"no column has a known name (found {found(cells)})", way_out, 0)
     lacking = f" for {shown(nearest.label)}" if nearest.label else ""
     return ColumnProblem(f"no column named {', '.join(missing)}{lacking} (found {found(cells)})", way_out, known)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _example(angles: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .columns import EULER, POSITION, QUATERNION, ColumnProblem, Layout, found, layout_of, metres_of
+from .columns import EULER, POSITION, ColumnProblem, Layout, found, layout_of, metres_of
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
@@ -131,7 +131,7 @@ def _trajectory(
         angles, warnings = _radians(angles, [layout.units.get(body.columns[one], "") for one in EULER], options)
         quaternions = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order)
     else:
-        quaternions = np.column_stack([held[one] for one in QUATERNION])
+        quaternions = np.column_stack([held[one] for one in ("qw", "qx", "qy", "qz")])
     scales = held.get("scale")
     if scales is not None and not np.any(scales != 1.0):
         scales = None

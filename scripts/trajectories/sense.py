@@ -102,8 +102,8 @@ def _of_times(times: np.ndarray, way_out: str) -> list[str]:
     if lost > MIXED * len(times):
         row = 1 + np.flatnonzero(np.diff(times) < 0.0)[0]
         found.append(
-            f"its time runs backwards at row {row}, and {lost} of {len(times)} rows are lost to that: these are several "
-            "recordings or devices; split the file, or name the column that tells them apart, --columns device=NAME"
+            f"its time runs backwards at row {row}, and {lost} of {len(times)} rows are lost to that: these are "
+            "several recordings or devices; split the file, or name the column of devices, --columns device=NAME"
         )
     return found
 
@@ -120,6 +120,6 @@ def _of_lengths(times: np.ndarray, positions: np.ndarray) -> list[str]:
     if fast <= HIGHEST_SPEED and extent <= WIDEST:
         return []
     return [
-        f"a twentieth of its speeds are above {fast:.3g} m/s, and it is {extent:.3g} m wide, which no hand's motion is; "
+        f"a twentieth of its speeds are above {fast:.3g} m/s, and it is {extent:.3g} m wide, as no hand's motion is; "
         "if its lengths are centimetres, --scale 0.01, if millimetres, --scale 0.001"
     ]

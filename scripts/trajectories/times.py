@@ -36,10 +36,13 @@ def typical_interval(times: np.ndarray) -> float:
 
     One wild time stamp, a clock that is set back and times that come twice make no difference to it.
     """
-    times = times[np.abs(times) < LARGEST]
-    steps = np.diff(times)
-    forward = steps[steps > 0.0]
+    forward = _steps_forward(times)
     return float(np.median(forward)) if len(forward) else np.nan
+
+
+def _steps_forward(times: np.ndarray) -> np.ndarray:
+    steps = np.diff(times[np.abs(times) < LARGEST])
+    return steps[steps > 0.0]
 
 
 def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
@@ -83,7 +86,7 @@ def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
         What the file or the user says; empty for nothing.
     """
     interval = typical_interval(times)
-    if time_unit or np.count_nonzero(np.diff(times) > 0.0) < ENOUGH or not interval > 1.0 / TOO_SLOW:
+    if time_unit or len(_steps_forward(times)) < ENOUGH or interval <= 1.0 / TOO_SLOW:
         return
     likely = [unit for unit in LONG_NAMES if SLOWEST <= TICKS[unit] / interval <= FASTEST]
     problem = f"t goes in steps of {interval:.6g}: as seconds that is one sample in {interval:.3g} s"
