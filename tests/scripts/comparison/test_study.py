@@ -25,7 +25,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch):
     """Lets a source hold these bodies."""
 
     def hold(*bodies: Trajectory) -> None:
-        monkeypatch.setattr(study, "read_trajectories", lambda source: Recording(Path("take.csv"), bodies))
+        monkeypatch.setattr(study, "read_trajectories", lambda source, options: Recording(Path("take.csv"), bodies))
 
     return hold
 
