@@ -23,7 +23,7 @@ FAR = 10.0
 """How many times longer than all the rest the pause beside strays is: nobody waits so long for a few samples."""
 
 MOST_NAMED = 5
-"""Rows, and times, that are named of one kind of fault."""
+"""Rows that are named of one kind of fault."""
 
 LARGEST = 1e30
 """A number beyond this is damage, and well within what can be interpolated: splines shoot over."""
@@ -89,11 +89,10 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
         finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
     keep(finite, "dropped rows with numbers that are missing, not finite or too large")
     keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
-    keep(rising(times), "dropped rows whose time runs backwards")
+    forward = rising(times)
+    keep(forward, f"dropped rows whose time runs backwards, such as {_first(times, ~forward)}")
     near = _near(times)
-    if not near.all():
-        away = ", ".join(f"{time:.6g} s" for time in times[~near][:MOST_NAMED].tolist())
-        keep(near, f"dropped rows whose time is far from that of all others: {away}")
+    keep(near, f"dropped rows whose time is far from that of all others, such as {_first(times, ~near)}")
     keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
@@ -125,6 +124,11 @@ def _near(times: np.ndarray) -> np.ndarray:
     near = np.zeros(len(times), dtype=bool)
     near[first:last] = True
     return near
+
+
+def _first(times: np.ndarray, rows: np.ndarray) -> str:
+    """The first time in the rows of a mask, to be read; nothing where there is none."""
+    return f"{times[rows][0]:.6g} s" if rows.any() else ""
 
 
 def _usable(numbers: np.ndarray) -> np.ndarray:

@@ -103,7 +103,9 @@ def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict
         wanted = column.strip().lower()
         if wanted not in written:
             raise ColumnProblem(
-                f"no column is named {shown(column)}", f"--columns {meaning}=NAME takes one of {found(cells)}", known
+                f"no column is named {shown(column)}",
+                f"--columns {meaning}=NAME takes one of {columns_found(cells)}",
+                known,
             )
         explicit[meaning] = written.index(wanted)
     return explicit
@@ -181,7 +183,7 @@ def _missing(
         shown_angles = ", ".join(cells[nearest.columns[one][0]] for one in angles[:3])
         return ColumnProblem(
             f"rotations are Euler angles here ({shown_angles}), and their order is not said",
-            f"say it with {_example(angles)}, and --degrees where they are; docs/csv.md lists the orders of programs",
+            "say it: --euler ORDER, with --degrees if they are (Unity: --euler YXZ --degrees; docs/csv.md has others)",
             known,
         )
     if set(EULER) & set(missing) and set(TURNS) & set(angles):
@@ -195,9 +197,11 @@ def _missing(
     if not any(names) and not explicit:
         if all(map(_is_number, cells)):
             way_out = f"write a first line of names: {','.join(('t', *needed))}"
-        return ColumnProblem(f"no column has a known name (found {found(cells)})", way_out, 0)
+        return ColumnProblem(f"no column has a known name (found {columns_found(cells)})", way_out, 0)
     lacking = f" for {shown(nearest.label)}" if nearest.label else ""
-    return ColumnProblem(f"no column named {', '.join(missing)}{lacking} (found {found(cells)})", way_out, known)
+    return ColumnProblem(
+        f"no column named {', '.join(missing)}{lacking} (found {columns_found(cells)})", way_out, known
+    )
 
 
 def _is_number(cell: str) -> bool:
@@ -208,12 +212,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _example(angles: Sequence[str]) -> str:
-    """How to say the order of these angles."""
-    return "--euler XYZ" if angles[0] in EULER else "--euler ZYX --columns rx=roll,ry=pitch,rz=yaw"
-
-
-def found(cells: Sequence[str]) -> str:
+def columns_found(cells: Sequence[str]) -> str:
     """The columns that a file has, for an error."""
     names = [cell if len(cell) <= 24 else f"{cell[:24]}..." for cell in dict.fromkeys(cells) if cell]
     return listed(names, limit=MOST_FOUND) or "none"

@@ -17,7 +17,7 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .columns import EULER, POSITION, ColumnProblem, Layout, found, layout_of, metres_of
+from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
@@ -71,8 +71,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
             trajectory = _trajectory(body, times[body.rows], held, layout, options)
         except ColumnProblem as problem:
             raise TrajectoryError(path, problem.problem, problem.way_out, line) from None
-        way_out = f"name the column that tells them apart with --columns device=NAME (found {found(header.cells)}), or "
-        require_one_body(trajectory, path, f"{way_out}split the file", line)
+        way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
+        require_one_body(trajectory, path, f"{way_out}, or split the file", line)
         trajectories.append(trajectory)
     return trajectories
 
