@@ -17,10 +17,10 @@ GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
 
 MOST_STRAYS = 0.05
-"""The share of the rows up to which those at an end, far away in time, are strays and not a part of the recording."""
+"""The share of the rows that at either end may be strays, whose time is wild, and no part of the recording."""
 
 FAR = 10.0
-"""How many times longer than all the rest the pause beside strays is: nobody waits so long for a few samples."""
+"""How many times further away than all the rest lasts strays are: nobody waits so long for so few samples."""
 
 MOST_NAMED = 5
 """Rows that are named of one kind of fault."""
@@ -111,19 +111,11 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
 
 
 def _near(times: np.ndarray) -> np.ndarray:
-    """A mask of rising times without those few at an end that a pause far longer than all the rest sets apart."""
-    first, last = 0, len(times)
-    while last - first > 2:
-        intervals = np.diff(times[first:last])
-        gap = int(np.argmax(intervals))
-        before, after = gap + 1, last - first - gap - 1
-        stray, rest = min(before, after), (intervals[gap + 1 :] if before < after else intervals[:gap]).sum()
-        if stray > MOST_STRAYS * len(times) or intervals[gap] <= FAR * rest:
-            break
-        first, last = (first + before, last) if before < after else (first, first + before)
-    near = np.zeros(len(times), dtype=bool)
-    near[first:last] = True
-    return near
+    """A mask of rising times without those few at either end that are far from all between."""
+    ends = int(MOST_STRAYS * len(times))
+    first, last = (times[ends], times[-1 - ends]) if len(times) else (0.0, 0.0)
+    reach = FAR * (last - first) if last > first else np.inf
+    return (times >= first - reach) & (times <= last + reach)
 
 
 def _first(times: np.ndarray, rows: np.ndarray) -> str:

@@ -25,6 +25,12 @@ ENOUGH = 2
 EXACT = 2.0**53
 """Beyond this a float64 leaves out whole numbers, such as nanoseconds since 1970."""
 
+LARGEST_WHOLE = 2.0**62
+"""Beyond this the difference of two whole numbers might be none that fits 64 bits."""
+
+WILD = 10.0
+"""How many times further from the median than half of all others a wild time is; of even times all are within two."""
+
 LARGEST = 1e30
 """As `addon.motion.repair` has it: a number beyond is damage."""
 
@@ -60,18 +66,26 @@ def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
     Returns
     -------
     array, shape (n,)
-        Seconds as they are in the file; of other units those since the time that is nearest to 0, which is the first
-        one of a sound recording: of a clock that counts from 1970 nothing is lost, whatever a wild time stamp says.
+        Seconds as they are in the file; of other units those since the earliest time, wild ones not counted: of a
+        clock that counts from 1970 nothing is lost.
     """
     if TICKS.get(unit, 1.0) == 1.0 or not np.isfinite(ticks).any():
         return ticks
-    if EXACT < np.nanmax(np.abs(ticks)) < np.iinfo(np.int64).max / 2:
+    if EXACT < np.nanmax(np.abs(ticks)) < LARGEST_WHOLE:
         # With fractions, or without a number in some row, they are not whole, and as near as floats are.
         with suppress(TrajectoryError):
             ticks = table.parse(["t"], np.int64)[:, 0]
-    nearest = np.nanargmin(np.abs(ticks))
     with np.errstate(over="ignore", invalid="ignore"):
-        return (ticks - ticks[nearest]) / TICKS[unit]
+        return (ticks - _earliest(ticks)) / TICKS[unit]
+
+
+def _earliest(ticks: np.ndarray) -> float:
+    """The earliest time, without wild ones."""
+    usable = ticks[np.abs(ticks) < LARGEST]
+    if not len(usable):
+        return 0.0
+    away = np.abs(usable - np.median(usable))
+    return usable[away <= WILD * np.median(away)].min(initial=usable[np.argmin(away)])
 
 
 def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
@@ -89,7 +103,7 @@ def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
     if time_unit or len(_steps_forward(times)) < ENOUGH or interval <= 1.0 / TOO_SLOW:
         return
     likely = [unit for unit in LONG_NAMES if SLOWEST <= TICKS[unit] / interval <= FASTEST]
-    problem = f"t goes in steps of {interval:.6g}: as seconds that is one sample in {interval:.3g} s"
+    problem = f"t goes in steps of {interval:.4g}: as seconds that is one sample in {interval:.3g} s"
     if likely:
         (unit,) = likely[:1]
         rate = TICKS[unit] / interval

@@ -344,7 +344,7 @@ def loggers(draw: st.DrawFn) -> tuple[str, ReadingOptions, str, int]:
     return text, ReadingOptions(**said), unit, start
 
 
-@settings(max_examples=tried(200))
+@settings(max_examples=tried(100))
 @given(loggers())
 def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(
     tmp_path_factory: pytest.TempPathFactory, logger: tuple[str, ReadingOptions, str, int]
