@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,9 @@ from .times import require_seconds, seconds_of
 
 MOST_LABELS = 0.5
 """The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""
+
+MOST_DEVICES = 1000
+"""Different texts in a column beyond are no names of devices."""
 
 LARGEST_RADIANS = 4.0 * np.pi
 """Two turns. Angles beyond, of which nothing says that they are radians, are degrees."""
@@ -55,8 +59,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     """The bodies that are wanted. One without a name of its own has the file's."""
     header, layout = _find_header(path, options)
     width, line = len(header.cells), header.number
-    bodies = _bodies(Table(path, header.separator, {}, width, line), layout, bool(dict(options.columns).get("device")))
-    taken = selection.of([body.name for body in bodies])
+    bodies = _bodies(Table(path, header.separator, {}, width, line), layout, "device" in dict(options.columns))
+    taken = set(selection.of([body.name for body in bodies]))
     wanted = [body for body in bodies if body.name in taken]
     columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
     table = Table(path, header.separator, columns, width, line)
@@ -90,9 +94,9 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
     raise TrajectoryError(path, problem.problem, problem.way_out, number)
 
 
-def _bodies(table: Table, layout: Layout, forced: bool) -> list[_Body]:
-    """All bodies of the file, in the order of its columns and rows."""
-    groups = _devices(table, layout.devices, forced)
+def _bodies(table: Table, layout: Layout, named: bool) -> list[_Body]:
+    """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
+    groups = _devices(table, layout.devices, named)
     bodies = [
         (f"{device} {prefix}".strip() or table.path.stem, prefix, columns, rows)
         for device, rows in groups.items()
@@ -102,13 +106,17 @@ def _bodies(table: Table, layout: Layout, forced: bool) -> list[_Body]:
     return [_Body(name, *rest) for name, (_, *rest) in zip(names, bodies, strict=True)]
 
 
-def _devices(table: Table, columns: Sequence[int], forced: bool) -> dict[str, np.ndarray | slice]:
+def _devices(table: Table, columns: Sequence[int], named: bool) -> dict[str, np.ndarray | slice]:
     """The rows of each device: of the first column that tells several apart, or else that tells the one there is."""
     only = ""
     for column in columns:
         codes: dict[str, int] = {}
-        of_rows = np.fromiter((codes.setdefault(text, len(codes)) for text in table.texts(column)), np.int64)
-        if len(codes) > max(MOST_LABELS * len(of_rows), 1) and not forced:
+        texts = takewhile(lambda _, codes=codes: len(codes) <= MOST_DEVICES, table.texts(column))
+        of_rows = np.fromiter((codes.setdefault(text, len(codes)) for text in texts), np.int64)
+        if len(codes) > MOST_DEVICES and named:
+            problem = f"more than {MOST_DEVICES} different values in the column of devices"
+            raise TrajectoryError(table.path, problem, "name another with --columns device=NAME", table.header)
+        if len(codes) > min(max(MOST_LABELS * len(of_rows), 1), MOST_DEVICES) and not named:
             continue
         if len(codes) > 1:
             order = np.argsort(of_rows, kind="stable")

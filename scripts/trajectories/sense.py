@@ -59,7 +59,8 @@ def require_one_body(trajectory: Trajectory, path: object, way_out: str, line: i
         earlier = positions[LOOK_BACK - lag : len(positions) - lag]
         nearest = np.minimum(nearest, np.linalg.norm(positions[LOOK_BACK:] - earlier, axis=-1))
     steps = np.abs(np.diff(times)[LOOK_BACK - 1 :])
-    speeds = jumps / np.where(steps > 0.0, steps, interval)
+    with np.errstate(over="ignore"):
+        speeds = jumps / np.where(steps > 0.0, steps, interval)
     impossible = (speeds > HIGHEST_SPEED) | ((steps == 0.0) & (jumps > SAME_TIME))
     mixed = impossible & (jumps > NEARER * nearest)
     count = np.count_nonzero(mixed)

@@ -105,8 +105,7 @@ def require_seconds(table: Table, times: np.ndarray, time_unit: str) -> None:
     likely = [unit for unit in LONG_NAMES if SLOWEST <= TICKS[unit] / interval <= FASTEST]
     problem = f"t goes in steps of {interval:.4g}: as seconds that is one sample in {interval:.3g} s"
     if likely:
-        (unit,) = likely[:1]
-        rate = TICKS[unit] / interval
+        unit, rate = likely[0], TICKS[likely[0]] / interval
         way_out = f"these look like {LONG_NAMES[unit]} ({rate:.3g} samples a second): --time-unit {unit}"
         raise TrajectoryError(table.path, problem, f"{way_out}, or --time-unit s if they are seconds", table.header)
     way_out = f"say what it counts: --time-unit {', '.join(TICKS)}"

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
+from scripts.trajectories import ReadingOptions
 from scripts.trajectories.column_names import ColumnName, column_name, unit_in
+from scripts.trajectories.columns import layout_of
 from tests.scripts.trajectories import logs
 
 
@@ -86,3 +91,40 @@ def test_what_says_nothing_is_not_guessed_at(name: str) -> None:
 @pytest.mark.parametrize(("name", "unit"), [("when_ms", "ms"), ("a [cm]", "cm"), ("ms", ""), ("height", "")])
 def test_a_unit_is_found_in_a_name_that_says_nothing_else(name: str, unit: str) -> None:
     assert unit_in(name) == unit
+
+
+# -- the page on logs -------------------------------------------------------------------------------------------------
+
+PAGE = (Path(__file__).parents[3] / "docs" / "csv.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("row", "kinds"),
+    [
+        ("time", {"time"}),
+        ("position", {"position"}),
+        ("quaternion", {"quaternion", "rotation"}),
+        ("Euler angles", {"euler", "rotation"}),
+        ("scale", {"scale"}),
+        ("whose row it is", {"device"}),
+    ],
+)
+def test_the_names_on_the_page_are_known(row: str, kinds: set[str]) -> None:
+    (line,) = (line for line in PAGE.splitlines() if line.startswith(f"| {row} |"))
+    names = [name for name in re.findall("`(.+?)`", line) if name not in ("w", "--euler")]
+    assert len(names) > 1
+    for name in names:
+        assert column_name(name).kind in kinds, name
+
+
+def test_the_logger_on_the_page_writes_what_is_read_without_options() -> None:
+    (header,) = re.findall(r'log\.WriteLine\("(.+)"\)', PAGE)
+    assert list(layout_of(header.split(","), ReadingOptions()).bodies) == [""]
+    assert len(re.findall(r"\{\d:R\}", PAGE)) == len(header.split(","))
+
+
+def test_the_orders_on_the_page_are_orders() -> None:
+    orders = re.findall(r"`--euler (\w+)", PAGE)
+    assert len(orders) >= 4
+    for order in orders:
+        assert ReadingOptions(euler=order).intrinsic_order.isupper()

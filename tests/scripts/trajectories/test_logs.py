@@ -212,6 +212,13 @@ def test_a_running_number_is_no_device(write) -> None:
     assert read_one(write("log.csv", text)).name == "log"
 
 
+def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusal) -> None:
+    rows = "".join(f"{number},0.1,0,0,0,0,0,0,1\n" for number in range(1200))
+    source = write("log.csv", f"id,t,x,y,z,qx,qy,qz,qw\n{rows}")
+    _, message = refusal(source, columns=[("device", "id"), ("t", "t")])
+    assert message.startswith("more than 1000 different values in the column of devices; name another with --columns")
+
+
 def test_a_device_that_is_alone_is_asked_for_by_its_name(write) -> None:
     rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
     text = "\n".join([f"hand,{rows[0]}", *(f"left,{row}" for row in rows[1:])])
