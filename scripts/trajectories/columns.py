@@ -87,7 +87,7 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     if explicit.keys() >= set(needed):
         whole = {"": _Found()}
     if not times or not whole:
-        raise _missing(cells, names, bodies.values(), bool(times), needed, explicit, known)
+        raise _missing(cells, names, bodies, bool(times), needed, explicit, known)
     where = {found.label: _columns_of(found, cells, (*needed, "scale"), explicit, known) for found in whole.values()}
     time = _only("t", times, cells, known)
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
@@ -167,14 +167,17 @@ def _devices(names: Sequence[ColumnName | None], explicit: Mapping[str, int]) ->
 def _missing(
     cells: Sequence[str],
     names: Sequence[ColumnName | None],
-    bodies: Iterable[_Found],
+    bodies: Mapping[str, _Found],
     timed: bool,
     needed: Sequence[str],
     explicit: Mapping[str, int],
     known: int,
 ) -> ColumnProblem:
     """What is missing to a header of which nobody is whole: of the body that lacks the least."""
-    nearest = max(bodies, key=lambda body: sum(one in body.columns for one in needed))
+    nearest = max(bodies.values(), key=lambda body: sum(one in body.columns for one in needed))
+    if not nearest.columns.keys() >= set(POSITION):
+        # Something by chance ends like an axis.
+        nearest = bodies[""]
     missing = [one for one in ("t", *needed) if one not in explicit and one not in nearest.columns]
     if timed:
         missing.remove("t")

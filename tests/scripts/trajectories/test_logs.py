@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -206,6 +207,18 @@ def test_a_column_of_devices_under_another_name_may_be_said(write) -> None:
     assert_holds_both(source, ["left", "right"], columns=[("device", "who")])
 
 
+@pytest.mark.parametrize("name", ["log.csv", "log.tum"])
+def test_devices_that_nothing_tells_apart_are_refused_with_the_columns_there_are(write, refusal, name: str) -> None:
+    rows = [line.rpartition(",")[0] for line in long_log("who").splitlines()]
+    text = "\n".join(rows) if name == "log.csv" else "# " + "\n".join(rows).replace(",", " ")
+    _, message = refusal(write(name, text))
+    assert re.match(
+        r"\d+ of 48 samples jump from one place to another and back, at [\d.]+ m/s: these are several", message
+    )
+    found = "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file"
+    assert message.endswith(found if name == "log.csv" else "; write a file for each")
+
+
 def test_a_running_number_is_no_device(write) -> None:
     rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
     text = "\n".join([f"id,{rows[0]}", *(f"{number},{row}" for number, row in enumerate(rows[1:]))])
@@ -246,6 +259,11 @@ def test_a_body_without_rotations_is_no_body(write) -> None:
             "no column has a known name (found 0, 1, 2, 3, 4, 5, 6, 7); write a first line of names",
         ),
         ("t,x,y,z,qx,qy,qz,r", {}, "no column named qw (found t, x, y, z, qx, qy, qz, r); known are t, time, time"),
+        (
+            "frame,button,hp_x",
+            {},
+            "no column named t, x, y, z, qx, qy, qz, qw (found frame, button, hp_x); known are t,",
+        ),
         ("when,x,y,z,qx,qy,qz,qw", {}, "no column named t (found when, x,"),
         ("t,left_x,left_y,left_z,left_qx", {}, "no column named qy, qz, qw for 'left' (found t, left_x,"),
         ("t,time,x,y,z,qx,qy,qz,qw", {}, "two columns mean t ('t', 'time'); say which with --columns t=NAME, or"),
