@@ -90,6 +90,12 @@ def test_a_unit_of_time_may_be_said(write, name: str, unit: str, start: int) -> 
     assert_is_the_motion(read_one(write(name, text), time_unit=unit), MOTIONS["left"], start=start, unit=unit)
 
 
+@pytest.mark.parametrize("time", ["t", "t_s", "t [ns]", "t [min]"])
+def test_a_unit_of_time_that_is_said_goes_before_that_in_the_name(write, time: str) -> None:
+    source = write("take.csv", log(names(time, "{}", "q{}"), "ms"))
+    assert_is_the_motion(read_one(source, time_unit="ms"), MOTIONS["left"], unit="ms")
+
+
 @pytest.mark.parametrize("position", ["{}", "{}_mm", "{} [furlongs]"])
 def test_a_scale_goes_before_the_unit_in_the_name(write, position: str) -> None:
     text = log(["t", *(position.format(axis) for axis in "xyz"), "qx", "qy", "qz", "qw"], metres=0.01)
