@@ -33,6 +33,7 @@ from scripts.comparison.study.modes import BEST_OF, single_modes
 from scripts.comparison.version import blender_version, program_version
 from scripts.progress import Progress
 from scripts.system_libraries import missing_for_rendering, way_out
+from scripts.trajectories.arguments import add_reading_options, reading_options
 from scripts.trajectories.axes import AXES
 from scripts.workplan import (
     Executor,
@@ -57,14 +58,16 @@ ALL, DISTINCT = "all", "distinct"
 
 EPILOG = """
 inputs:
-  CSV with named columns (t,x,y,z,qx,qy,qz,qw in any order), TUM, EuRoC, Motive (OptiTrack) CSV,
-  A-Frame motion capture JSON, BVH, .blend. FILE:BODY takes one body of several, FILE:* all of them.
+  CSV with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM, EuRoC,
+  Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, .blend. FILE:BODY takes one body of several, FILE:* all.
   Of a .blend a body is an object (FILE.blend:OBJECT) or a bone of a rig (FILE.blend:OBJECT/BONE), as Blender shows it
   in the world, with parents, constraints, drivers and NLA strips. FILE.blend:* is every object that is animated.
 
 examples:
   python scripts/compare.py
   python scripts/compare.py hand_left.csv hand_right.csv --axes unity
+  python scripts/compare.py log.csv:left --columns t=when,device=who --time-unit ms --scale 0.01
+  python scripts/compare.py unity.csv --axes unity --euler YXZ --degrees
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
   python scripts/compare.py shot.blend:Camera --no-video
@@ -127,6 +130,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--radius", type=_positive, default=0.1, metavar="M", help="of the shell error, in metres (%(default)s)"
     )
+    add_reading_options(parser)
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
         "--jobs", type=_jobs, metavar="N", help="processes that work; 0 for none but this one (one for each processor)"
@@ -203,6 +207,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         parser.error(str(error))
     try:
         options.choices = _choices(options)
+        options.reading = reading_options(options)
     except ValueError as error:
         parser.error(str(error))
     if not options.inputs:
@@ -308,7 +313,7 @@ class _Run:
         """Read the recordings, see what there is to do, do it, and say what came of it."""
         started = time.perf_counter()
         options = self.options
-        reading = reading_tasks(options.inputs, options.axes)
+        reading = reading_tasks(options.inputs, options.axes, options.reading)
         read = self._do(list({task.name: task for task in reading}.values()), "Reading")
         if read.interrupted:
             return 130

@@ -161,7 +161,7 @@ def _file_and_body(source: str) -> tuple[Path, str | None]:
 
 def make_plan(options: argparse.Namespace, command: str) -> tuple[Plan | None, int]:
     """The plan of a comparison, None where there is nothing to do, and how many recordings could not be read."""
-    reading = reading_tasks(options.inputs, options.axes)
+    reading = reading_tasks(options.inputs, options.axes, options.reading)
     version = program_version()
     with (
         Progress() as progress,

@@ -16,6 +16,15 @@ from .quaternions import align_signs, normalise
 GAP = 1.75
 """A pause of more median intervals than this is reported as a gap: timer jitter stays below, a lost sample is above."""
 
+MOST_STRAYS = 0.05
+"""The share of the rows that at either end may be strays, whose time is wild, and no part of the recording."""
+
+FAR = 10.0
+"""How many times further away than all the rest lasts strays are: nobody waits so long for so few samples."""
+
+MOST_NAMED = 5
+"""Rows that are named of one kind of fault."""
+
 LARGEST = 1e30
 """A number beyond this is damage, and well within what can be interpolated: splines shoot over."""
 
@@ -37,8 +46,8 @@ class Repair:
     """The rows of the recording where, from 0. For a gap, the row after it."""
 
     def __str__(self) -> str:
-        shown = ", ".join(str(row) for row in self.rows[:5].tolist())
-        return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > 5 else ''})"
+        shown = ", ".join(str(row) for row in self.rows[:MOST_NAMED].tolist())
+        return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > MOST_NAMED else ''})"
 
 
 def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Repair]]:
@@ -63,7 +72,8 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     Notes
     -----
     Of several rows with one time the last is kept, being the newest. Of times that run backwards, as few rows are
-    dropped as can be, so that one wild time stamp does not cost the rest of the recording. Gaps stay gaps.
+    dropped as can be, so that one wild time stamp does not cost the rest of the recording; nor does one at an end make
+    it last for years. Gaps stay gaps.
     """
     repairs: list[Repair] = []
     rows = np.arange(len(times))
@@ -79,7 +89,10 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
         finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
     keep(finite, "dropped rows with numbers that are missing, not finite or too large")
     keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
-    keep(_rising(times), "dropped rows whose time runs backwards")
+    forward = rising(times)
+    keep(forward, f"dropped rows whose time runs backwards, such as {_first(times, ~forward)}")
+    near = _near(times)
+    keep(near, f"dropped rows whose time is far from that of all others, such as {_first(times, ~near)}")
     keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
@@ -97,12 +110,25 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     return times, Poses(poses.positions, aligned, poses.scales), repairs
 
 
+def _near(times: np.ndarray) -> np.ndarray:
+    """A mask of rising times without those few at either end that are far from all between."""
+    ends = int(MOST_STRAYS * len(times))
+    first, last = (times[ends], times[-1 - ends]) if len(times) else (0.0, 0.0)
+    reach = FAR * (last - first) if last > first else np.inf
+    return (times >= first - reach) & (times <= last + reach)
+
+
+def _first(times: np.ndarray, rows: np.ndarray) -> str:
+    """The first time in the rows of a mask, to be read; nothing where there is none."""
+    return f"{times[rows][0]:.6g} s" if rows.any() else ""
+
+
 def _usable(numbers: np.ndarray) -> np.ndarray:
     """Which numbers are there, finite and of a size that anything has: NaN is neither small nor large."""
     return np.abs(numbers) < LARGEST
 
 
-def _rising(times: np.ndarray) -> np.ndarray:
+def rising(times: np.ndarray) -> np.ndarray:
     """A mask of the longest part of `times` that never falls: the whole, where the recording is sound."""
     if np.all(np.diff(times) >= 0.0):
         return np.ones(len(times), dtype=bool)

@@ -15,7 +15,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from scripts.trajectories import TrajectoryError
+import numpy as np
+
+from scripts.trajectories import ReadingOptions, TrajectoryError
+from scripts.trajectories.options import AS_THE_FILE_SAYS
 from scripts.trajectories.reading import split_source
 from scripts.workplan import Task
 
@@ -37,6 +40,9 @@ where one is interrupted."""
 
 MOST_FRAMES = 216_000
 """Of a film: an hour at 60 frames a second."""
+
+RATE_MARGIN = 0.01
+"""By what share a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
 
 
 @dataclass(frozen=True)
@@ -102,13 +108,13 @@ class Study:
 # -- reading ----------------------------------------------------------------------------------------------------------
 
 
-def reading_tasks(sources: Iterable[str], axes: str) -> list[Task]:
+def reading_tasks(sources: Iterable[str], axes: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Task]:
     """A task for every source, in their order; for a source that is named twice the same one twice."""
-    return [_reading(source, axes) for source in sources]
+    return [_reading(source, axes, options) for source in sources]
 
 
-def _reading(source: str, axes: str) -> Task:
-    digest = hashlib.sha256(json.dumps([source, axes]).encode()).hexdigest()[:16]
+def _reading(source: str, axes: str, options: ReadingOptions) -> Task:
+    digest = hashlib.sha256(json.dumps([source, axes, asdict(options)]).encode()).hexdigest()[:16]
     recording = steps.recording_of(digest)
     try:
         inputs = (str(split_source(source)[0]),)
@@ -117,7 +123,7 @@ def _reading(source: str, axes: str) -> Task:
     return Task(
         name=f"read {digest}",
         function=f"{MODULE}:read",
-        arguments={"source": source, "axes": axes, "recording": recording},
+        arguments={"source": source, "axes": axes, "options": asdict(options), "recording": recording},
         inputs=inputs,
         outputs=file_names(recording),
         title=source,
@@ -165,12 +171,20 @@ def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> 
             for choice, found in ends.items()
             if found is None
         ]
+        notes += [f"{name}: {note}" for note in asked_in_vain(times, choices)]
         long_enough = {
             choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
         }
         if long_enough:
             studies.append(Study(clip, len(times), long_enough))
     return Found(tuple(studies), tuple(notes))
+
+
+def asked_in_vain(times: np.ndarray, choices: Iterable[Choice]) -> list[str]:
+    """What to say of rates that are above that of a recording with these times, shape (n,)."""
+    rate = 1.0 / float(np.median(np.diff(times)))
+    above = [choice.rate for choice in choices if choice.rate and float(choice.rate) > rate * (1.0 + RATE_MARGIN)]
+    return [f"it has {rate:.3g} samples a second: {', '.join(above)} keys a second cannot be had of it"] * bool(above)
 
 
 # -- comparing --------------------------------------------------------------------------------------------------------

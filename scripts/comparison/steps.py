@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from scripts.files import write_text
-from scripts.trajectories import TrajectoryError
+from scripts.trajectories import ReadingOptions, TrajectoryError
 from scripts.workplan import Job, TaskError, step
 
 from .report.clip_section import Films
@@ -110,10 +110,10 @@ def identify(job: Job, *, path: str) -> None:
 
 
 @step
-def read(job: Job, *, source: str, axes: str, recording: str) -> None:
+def read(job: Job, *, source: str, axes: str, options: Mapping[str, Any], recording: str) -> None:
     """Read a source, and repair its clips."""
     try:
-        clips, note = read_source(source, axes)
+        clips, note = read_source(source, axes, ReadingOptions(**options))
     except TrajectoryError as error:
         raise TaskError(str(error)) from None
     arrays, facts = file_names(recording)

@@ -4,7 +4,8 @@ Everything is returned as it was recorded: the file's own axes, units and signs,
 `axes` turns poses to Blender's axes.
 """
 
+from .options import ReadingOptions
 from .reading import read_trajectories
 from .recordings import Recording, Trajectory, TrajectoryError
 
-__all__ = ["Recording", "Trajectory", "TrajectoryError", "read_trajectories"]
+__all__ = ["ReadingOptions", "Recording", "Trajectory", "TrajectoryError", "read_trajectories"]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from . import aframe, blend, bvh, euroc, motive, named_csv, tum
+from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
+from .sense import doubts
 from .tables import encoding_of
 
 HEAD = 65536
@@ -21,9 +25,17 @@ class Format:
 
     label: str
     extensions: tuple[str, ...]
-    read: Callable[[Path, Selection], list[Trajectory]]
+    read: Callable[..., list[Trajectory]]
+    """Given the path, the bodies that are wanted and, where it honours any but the scale, the options."""
+
     recognises: Callable[[list[str]], bool] | None = None
     """Given the first lines. None where the extension is enough."""
+
+    honours: tuple[str, ...] = ()
+    """The options that it takes besides the scale: for what its files do not say themselves."""
+
+    doubted: bool = True
+    """Whether it holds what people recorded, and not what they animated, which may go at any speed."""
 
 
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
@@ -31,15 +43,20 @@ class Format:
 FORMATS = (
     Format("Motive CSV", (".csv",), motive.read, motive.recognises),
     Format("EuRoC CSV", (".csv",), euroc.read, euroc.recognises),
-    Format("TUM", (".csv", ".txt", ".tum"), tum.read, tum.recognises),
-    Format("CSV with named columns", (".csv", ".tsv", ".txt"), named_csv.read),
+    Format("TUM", (".csv", ".txt", ".tum"), tum.read, tum.recognises, ("time_unit",)),
+    Format(
+        "CSV with named columns",
+        (".csv", ".tsv", ".txt"),
+        named_csv.read,
+        honours=("columns", "time_unit", "euler", "degrees"),
+    ),
     Format("A-Frame recording", (".json",), aframe.read),
     Format("BVH", (".bvh",), bvh.read),
-    Format("Blender file", (".blend",), blend.read),
+    Format("Blender file", (".blend",), blend.read, doubted=False),
 )
 
 
-def read_trajectories(source: str) -> Recording:
+def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> Recording:
     """Read a recording.
 
     Parameters
@@ -47,6 +64,8 @@ def read_trajectories(source: str) -> Recording:
     source : str
         A path; with `:BODY` behind it for one body by name, with `:*` for all bodies. A path alone asks for the first
         body: a BVH's root, the first animated object of a .blend. A bone of a .blend is `:OBJECT/BONE`.
+    options : ReadingOptions
+        What the file does not say of itself.
 
     Returns
     -------
@@ -56,7 +75,8 @@ def read_trajectories(source: str) -> Recording:
     Raises
     ------
     TrajectoryError
-        One line: the file, the line in it, what is wrong and the way out. Also where no body has two samples.
+        One line: the file, the line in it, what is wrong and the way out. Also where no body has two samples, where an
+        option is given that means nothing to the format, and where a recording cannot be meant as it is read.
 
     Notes
     -----
@@ -67,7 +87,7 @@ def read_trajectories(source: str) -> Recording:
     path, body = split_source(source)
     selection = Selection(path, body)
     try:
-        trajectories = _format_of(path).read(path, selection)
+        trajectories = _read(path, selection, options)
     except OSError as error:
         problem = f"this file cannot be read ({error.strerror})"
         raise TrajectoryError(path, problem, "check its permissions") from None
@@ -75,6 +95,25 @@ def read_trajectories(source: str) -> Recording:
         problem = ", ".join(f"{shown(one.name)} has {len(one.times)} samples" for one in trajectories[:3])
         raise TrajectoryError(path, problem, "a trajectory needs at least 2")
     return selection.recording(trajectories)
+
+
+def _read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    found = _format_of(path)
+    for name in options.given:
+        if name != "scale" and name not in found.honours:
+            labels = " and ".join(known.label for known in FORMATS if name in known.honours)
+            problem = f"--{name.replace('_', '-')} is for {labels}, and this is {found.label}"
+            raise TrajectoryError(path, problem, "leave it out; its files say that themselves")
+    trajectories = found.read(path, selection, options) if found.honours else found.read(path, selection)
+    if options.scale is not None:
+        trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
+    if found.doubted:
+        trajectories = [_doubted(trajectory, "time_unit" in found.honours) for trajectory in trajectories]
+    return trajectories
+
+
+def _doubted(trajectory: Trajectory, time_unit: bool) -> Trajectory:
+    return replace(trajectory, warnings=(*trajectory.warnings, *doubts(trajectory, time_unit=time_unit)))
 
 
 def split_source(source: str) -> tuple[Path, str | None]:
@@ -91,9 +130,32 @@ def split_source(source: str) -> tuple[Path, str | None]:
         drive = end == 1 and source[:1].isalpha() and source[2:3] in ("\\", "/")
         if not drive and os.path.isfile(source[:end]):
             return Path(source[:end]), source[end + 1 :] if end < len(source) else None
-    if os.path.isdir(source):
-        raise TrajectoryError(source, "this is a folder", "name a file in it")
+    for end in [len(source), *reversed(colons)]:
+        if found := _what_is_no_file(source[:end]):
+            raise TrajectoryError(source[:end], *found)
     raise TrajectoryError(source, "no such file", "check the path")
+
+
+def _what_is_no_file(path: str) -> tuple[str, str] | None:
+    """What is at a path where there is no file, and the way out; None for nothing. It is looked at, and not opened."""
+    try:
+        mode = os.stat(path).st_mode
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            return "this is a symbolic link that leads in a circle", "name the file itself"
+        if os.path.islink(path):
+            return f"this is a symbolic link to {shown(os.readlink(path))}, where nothing is", "name the file itself"
+        return None
+    except ValueError:
+        return None
+    kinds = {
+        stat.S_ISDIR: ("this is a folder", "name a file in it"),
+        stat.S_ISFIFO: ("this is a pipe (FIFO), not a file", "write what comes out of it to a file, and name that"),
+        stat.S_ISSOCK: ("this is a socket, not a file", "write what comes out of it to a file, and name that"),
+        stat.S_ISCHR: ("this is a device, not a file", "name a file"),
+        stat.S_ISBLK: ("this is a device, not a file", "name a file"),
+    }
+    return next((told for is_kind, told in kinds.items() if is_kind(mode)), None)
 
 
 def _format_of(path: Path) -> Format:

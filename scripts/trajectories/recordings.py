@@ -36,6 +36,9 @@ class Trajectory:
     remark: str = ""
     """What whoever asked for this body should know of it."""
 
+    warnings: tuple[str, ...] = ()
+    """What is hard to believe of this recording, a sentence each with the way out."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:

@@ -69,11 +69,18 @@ class Table:
 
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
         """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
+        wanted = {name: self.columns[name] for name in columns}
+        return parse_rows(self.path, self._rows(), self.separator, wanted, self.width, dtype)
+
+    def texts(self, column: int) -> Iterator[str]:
+        """The cells of the column at this index, without quotes, row by row; empty where a row is too short."""
+        for _, line in self._rows():
+            cells = line.replace('"', "").split(self.separator)
+            yield cells[column].strip() if column < len(cells) else ""
+
+    def _rows(self) -> Iterator[tuple[int, str]]:
         stripped = ((number, line.strip(" ")) for number, line in lines_of(self.path, after=self.header))
-        rows = ((number, line) for number, line in stripped if line.strip() and not line.startswith("#"))
-        return parse_rows(
-            self.path, rows, self.separator, {name: self.columns[name] for name in columns}, self.width, dtype
-        )
+        return ((number, line) for number, line in stripped if line.strip() and not line.startswith("#"))
 
     def trajectory(self, name: str) -> Trajectory:
         """The columns t, x, y, z, qw, qx, qy, qz and, if there, scale."""
@@ -160,6 +167,42 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
         raise TrajectoryError(path, f"this line is no header ({error})", "name a file of columns", number) from None
 
 
+@dataclass(frozen=True)
+class HeaderLine:
+    """A line that may name the columns."""
+
+    number: int
+    separator: str | None
+    cells: list[str]
+
+
+def header_lines(path: Path) -> Iterator[HeaderLine]:
+    """The lines that may name the columns: comments, as `numpy.savetxt` and EuRoC have it, and the first line behind.
+
+    The last one is that line, without cells where there are only comments. Blank lines are skipped, and so is what
+    tells spreadsheets the separator (`sep=;`).
+
+    Raises
+    ------
+    TrajectoryError
+        Where the file is empty.
+    """
+    number = comments = 0
+    for number, line in lines_of(path):
+        text = line.strip()
+        if not text or text.lower().startswith("sep="):
+            continue
+        header = text.lstrip("# \t")
+        separator = max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
+        yield HeaderLine(number, separator, cells_of(path, number, header, separator))
+        comments += 1
+        if not text.startswith("#") or comments > MOST_COMMENTS:
+            return
+    if not comments:
+        raise TrajectoryError(path, "the file is empty", "it needs a line that names its columns, and rows")
+    yield HeaderLine(number, None, [])
+
+
 def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[str] = ()) -> Table:
     """The table whose header names all the columns in `names`.
 
@@ -173,36 +216,23 @@ def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[
 
     Notes
     -----
-    The header is the first line, or a comment before it, as `numpy.savetxt` and EuRoC have it. Blank lines and
-    comments (`#`) between the rows are skipped.
+    The header is one of `header_lines`. Blank lines and comments (`#`) between the rows are skipped.
     """
     expected = ", ".join(aliases[0] for aliases in names.values())
     partial: tuple[int, list[str]] | None = None
-    number = first = comments = 0
-    for number, line in lines_of(path):
-        text = line.strip()
-        if not text:
-            continue
-        first = number
-        header = text.lstrip("# \t")
-        separator = max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
-        cells = [cell.partition("[")[0].strip().lower() for cell in cells_of(path, number, header, separator)]
+    first = 0
+    for line in header_lines(path):
+        first = line.number
+        cells = [cell.partition("[")[0].strip().lower() for cell in line.cells]
         meanings = [_meaning_of(cell, {**names, **optional}) for cell in cells]
         columns = {meaning: index for index, meaning in enumerate(meanings) if meaning}
         missing = [meaning for meaning in names if meaning not in columns]
         if not missing:
             if repeated := [meaning for meaning in columns if meanings.count(meaning) > 1]:
-                raise TrajectoryError(path, f"two columns mean {repeated[0]}", "rename or delete one of them", number)
-            return Table(path, separator, columns, len(cells), number)
+                raise TrajectoryError(path, f"two columns mean {repeated[0]}", "rename or delete one of them", first)
+            return Table(path, line.separator, columns, len(cells), first)
         if columns and (partial is None or len(missing) < len(partial[1])):
-            partial = number, missing
-        comments += 1
-        if not text.startswith("#") or comments > MOST_COMMENTS:
-            break
-    else:
-        if not first:
-            raise TrajectoryError(path, "the file is empty", f"it needs the columns {expected}")
-        first = number
+            partial = first, missing
     if default and not (partial and partial[0] == first):
         columns = {meaning: index for index, meaning in enumerate(default)}
         return Table(path, None, columns, len(default), first - 1)

@@ -6,11 +6,26 @@ order, the names are believed.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from .named_csv import NAMES, OPTIONAL_NAMES
+from .options import ReadingOptions
 from .recordings import Selection, Trajectory
+from .sense import require_one_body
 from .tables import read_table
+from .times import require_seconds, seconds_of
+
+NAMES = {
+    "t": ("t", "time", "timestamp"),
+    "x": ("x", "tx"),
+    "y": ("y", "ty"),
+    "z": ("z", "tz"),
+    "qx": ("qx",),
+    "qy": ("qy",),
+    "qz": ("qz",),
+    "qw": ("qw",),
+}
+OPTIONAL_NAMES = {"scale": ("s", "scale")}
 
 
 def recognises(head: list[str]) -> bool:
@@ -24,7 +39,12 @@ def recognises(head: list[str]) -> bool:
     return True
 
 
-def read(path: Path, selection: Selection) -> list[Trajectory]:
+def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """The one body of the file, which has the file's name."""
     (name,) = selection.of([path.stem])
-    return [read_table(path, NAMES, OPTIONAL_NAMES, default=tuple(NAMES)).trajectory(name)]
+    table = read_table(path, NAMES, OPTIONAL_NAMES, default=tuple(NAMES))
+    trajectory, unit = table.trajectory(name), options.time_unit or ""
+    require_seconds(table, trajectory.times, unit)
+    trajectory = replace(trajectory, times=seconds_of(table, trajectory.times, unit))
+    require_one_body(trajectory, path, "write a file for each", table.header + 1)
+    return [trajectory]

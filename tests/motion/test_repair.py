@@ -60,6 +60,40 @@ def test_a_clock_that_jumps_back_loses_as_few_rows_as_can_be():
     assert "backwards" in str(repairs[0])
 
 
+@pytest.mark.parametrize("time", [-1e25, 0.0, 1e6, 1.7e12, 1e25])
+@pytest.mark.parametrize("row", [0, 7, 19])
+def test_one_wild_time_stamp_costs_its_row_wherever_it_is_and_is_told(time: float, row: int):
+    times, poses = recording()
+    times += 1.7e9
+    times[row] = time
+    kept, _, repairs = repair(times, poses)
+    assert np.array_equal(kept, np.delete(times, row))
+    assert repairs[0].rows.tolist() == [row]
+    assert f"such as {time:.6g} s (1: row {row})" in str(repairs[0])
+
+
+def test_wild_times_at_both_ends_are_dropped_though_they_rise():
+    times, poses = recording(count=100)
+    times[:2], times[-2:] = [-1e20, -1e6], [1e6, 1e25]
+    kept, _, repairs = repair(times, poses)
+    assert np.array_equal(kept, times[2:-2])
+    assert "far from that of all others, such as -1e+20 s (4: row 0, 1, 98, 99)" in faults(repairs)
+
+
+@pytest.mark.parametrize(("count", "pause"), [(2, 1e25), (3, 1e25), (100, 5.0)], ids=["two", "three", "a break"])
+def test_what_may_be_a_pause_is_left(count: int, pause: float):
+    times, poses = recording(count)
+    times[-1] += pause
+    kept, _, _ = repair(times, poses)
+    assert np.array_equal(kept, times)
+
+
+def test_two_halves_far_apart_are_both_left():
+    times, poses = recording()
+    times[10:] += 1e6
+    assert np.array_equal(repair(times, poses)[0], times)
+
+
 def test_lengths_are_made_unit_and_only_said_where_they_were_off():
     times, poses = recording()
     poses.quaternions[2] *= 3.0

@@ -33,7 +33,7 @@ class Clip:
     """Shape (n,), signs aligned."""
 
     repairs: tuple[str, ...]
-    """What had to be repaired in the recording, a sentence each."""
+    """What is hard to believe of the recording, and what had to be repaired in it, a sentence each."""
 
     metres_per_unit: float = 1.0
     """The length of the recording's unit. Errors, and what Blender shows, are in metres."""

@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from addon.motion import repair
-from scripts.trajectories import Trajectory, TrajectoryError, read_trajectories
+from scripts.trajectories import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
+from scripts.trajectories.options import AS_THE_FILE_SAYS
 from scripts.trajectories.recordings import shown
 
 from .clips import Clip
@@ -28,7 +29,9 @@ DEVICES = {"con", "prn", "aux", "nul"} | {
 """Names that Windows keeps for devices, whatever follows them after a dot."""
 
 
-def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]]:
+def read_clips(
+    sources: Iterable[str], axes: str, options: ReadingOptions = AS_THE_FILE_SAYS
+) -> tuple[list[Clip], list[str]]:
     """Read, repair and name the clips of all sources.
 
     Parameters
@@ -37,6 +40,8 @@ def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]
         As `scripts.trajectories.read_trajectories` takes them.
     axes : str
         A name in `scripts.trajectories.axes.AXES`.
+    options : ReadingOptions
+        What the files do not say of themselves.
 
     Returns
     -------
@@ -49,7 +54,7 @@ def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]
     TrajectoryError
         For the first source that cannot be read, or of which fewer than two poses are left.
     """
-    read = [read_source(source, axes) for source in sources]
+    read = [read_source(source, axes, options) for source in sources]
     clips = [clip for some, _ in read for clip in some]
     names = folder_names(clip.name for clip in clips)
     return [replace(clip, name=name) for clip, name in zip(clips, names, strict=True)], [
@@ -57,13 +62,13 @@ def read_clips(sources: Iterable[str], axes: str) -> tuple[list[Clip], list[str]
     ]
 
 
-def read_source(source: str, axes: str) -> tuple[list[Clip], str]:
+def read_source(source: str, axes: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> tuple[list[Clip], str]:
     """The clips of one source, repaired but not yet told apart by their names, and a note on it, which may be empty.
 
     Of several bodies those are left out, with a note, that there are no two poses of. Raises TrajectoryError where the
     source cannot be read, or nothing of it is left.
     """
-    recording = read_trajectories(source)
+    recording = read_trajectories(source, options)
     stem, several = recording.path.stem, len(recording.trajectories) > 1
     clips, notes = [], [recording.note] if recording.note else []
     for trajectory in recording.trajectories:
@@ -85,7 +90,8 @@ def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip
     if len(times) < 2:
         found = "; ".join(map(str, repairs))
         raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
-    return Clip(name, source, axes, times, poses, tuple(map(str, repairs)), trajectory.metres_per_unit)
+    notes = (*trajectory.warnings, *map(str, repairs))
+    return Clip(name, source, axes, times, poses, notes, trajectory.metres_per_unit)
 
 
 def folder_names(wanted: Iterable[str]) -> list[str]:

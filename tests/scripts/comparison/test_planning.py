@@ -19,6 +19,7 @@ from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.reading import folder_names
 from scripts.comparison.study.reconstructions import reconstruct
 from scripts.comparison.study.storage import ClipReference, file_names, write_recording
+from scripts.trajectories import ReadingOptions
 from scripts.workplan import Plan, Task
 from tests.scripts.comparison.recordings import swinging_clip
 from tests.thoroughness import tried
@@ -126,6 +127,9 @@ def test_a_source_that_is_named_twice_is_read_once_and_gives_two_clips(tmp_path:
     read = reading_tasks(["hand.csv", "hand.csv"], "blender")
     assert read[0] == read[1]
     assert reading_tasks(["hand.csv"], "unity") != read[:1]
+    in_centimetres = reading_tasks(["hand.csv"], "blender", ReadingOptions(scale=0.01))[0]
+    assert in_centimetres.arguments["recording"] != read[0].arguments["recording"]
+    assert ReadingOptions(**in_centimetres.arguments["options"]) == ReadingOptions(scale=0.01)
     store(tmp_path, read[0], [swinging_clip("hand", repairs=("dropped 1 row",))])
     found = look_into(tmp_path, read, [Uniform("5")])
     assert [study.clip.name for study in found.studies] == ["hand", "hand-2"]
@@ -145,6 +149,17 @@ def test_a_choice_that_a_clip_is_too_short_for_is_left_out_and_said(tmp_path: Pa
     assert list(found.studies[0].choices) == [Uniform("10")]
     assert found.notes == ("hand: too short for two keys at 0.5 a second; left out",)
     assert look_into(tmp_path, read, [Uniform("0.5")]).studies == ()
+
+
+def test_rates_above_that_of_a_recording_are_said(tmp_path: Path) -> None:
+    read = reading_tasks(["hand.csv"], "blender")
+    clip = swinging_clip("hand", seconds=1.0)
+    store(tmp_path, read[0], [clip])
+    rate = 1.0 / np.median(np.diff(clip.times))
+    asked = [Uniform(f"{rate:.0f}"), Uniform(f"{2.0 * rate:.0f}"), Budget(f"{3.0 * rate:.0f}"), Tolerance("5mm")]
+    (note,) = look_into(tmp_path, read, asked).notes
+    above = f"{2.0 * rate:.0f}, {3.0 * rate:.0f}"
+    assert note == f"hand: it has {rate:.3g} samples a second: {above} keys a second cannot be had of it"
 
 
 CHOICES = (Uniform("0.3"), Uniform("2"), Uniform("7.5"), Uniform("400"), Budget("2"), Budget("0.4"), Tolerance("1cm"))

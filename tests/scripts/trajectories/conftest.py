@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.trajectories import TrajectoryError, read_trajectories
+from scripts.trajectories import ReadingOptions, TrajectoryError, read_trajectories
 
 
 @pytest.fixture
@@ -24,12 +24,12 @@ def write(tmp_path: Path) -> Callable[[str, str | bytes], str]:
 
 
 @pytest.fixture
-def refusal() -> Callable[[str], tuple[int | None, str]]:
-    """Read what cannot be read, and return the line and the rest of the error."""
+def refusal() -> Callable[..., tuple[int | None, str]]:
+    """Read what cannot be read, by these options, and return the line and the rest of the error."""
 
-    def _refusal(source: str) -> tuple[int | None, str]:
+    def _refusal(source: str, **options: object) -> tuple[int | None, str]:
         with pytest.raises(TrajectoryError) as caught:
-            read_trajectories(source)
+            read_trajectories(source, ReadingOptions(**options))
         message = str(caught.value)
         parts = re.fullmatch(r"(?P<path>.+?\.\w+)(:(?P<line>\d+))?: (?P<problem>.+?); (?P<way_out>.+)", message)
         assert parts, f"not of the form FILE:LINE: problem; way out: {message!r}"

@@ -24,6 +24,7 @@ NUMBERS = (
 PLAIN_WORDS = r"""
 * .. ../../x { } {} [ ] [] , ; : " "" ' # \ \u0000 \ud800 null true --> <script>
 t qw s scale time timestamp p_RS_R_x [ns] HIERARCHY ROOT JOINT OFFSET CHANNELS MOTION Frames: Xposition
+timestamp_ms t_ns x_mm pos_x left_x rot_w device hand roll euler_x
 Zrotation poses rotation Rotation Position Type XYZ Quaternion Meters
 """
 

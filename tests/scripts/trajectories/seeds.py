@@ -78,6 +78,7 @@ MOTION
 """A shoulder and an elbow in BVH, up to where the frames begin."""
 
 _SCALES = np.linspace(1.0, 1.2, COUNT)
+_POSE = ("px", "py", "pz", "qx", "qy", "qz", "qw")
 _EUROC = (
     "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],v_RS_R_x [m s^-1]\n"
 )
@@ -87,6 +88,12 @@ SEEDS: dict[str, tuple[str, ...]] = {
         "t,x,y,z,qx,qy,qz,qw\n" + _rows((TIMES, POSITIONS, XYZW)),
         "frame;Time;TX;TY;TZ;qw;qx;qy;qz;scale\n"
         + _rows((np.arange(COUNT), TIMES, POSITIONS, XYZW[:, 3], XYZW[:, :3], _SCALES), ";").replace(".", ","),
+        "timestamp_ms,PosX (cm),PosY (cm),PosZ (cm),rotation.x,rotation.y,rotation.z,rotation.w,hand\n"
+        + _rows((1e3 * TIMES, 1e2 * POSITIONS, XYZW)).replace("\n", ",left\n"),
+        "t_us\t"
+        + "\t".join(f"{body}_{name}" for body in ("left", "right") for name in _POSE)
+        + "\n"
+        + _rows((1e6 * TIMES, POSITIONS, XYZW, POSITIONS, XYZW), "\t"),
         '# a comment\n"t"\t"x"\t"y"\t"z"\t"qx"\t"qy"\t"qz"\t"qw"\n' + _rows((TIMES, POSITIONS, XYZW), "\t"),
     ),
     ".tum": (

@@ -28,6 +28,7 @@ PATIENCE = 30.0
 """Seconds, with `tracemalloc` looking on, on a busy machine."""
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n"
+COLUMNS = CSV.strip().split(",")[1:]
 EUROC = "#timestamp [ns],p_RS_R_x,p_RS_R_y,p_RS_R_z,q_RS_w,q_RS_x,q_RS_y,q_RS_z\n"
 MOTIVE = "Format Version,1.23,Rotation Type,Quaternion,Length Units,Meters\n"
 ROOT = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
@@ -51,6 +52,9 @@ BOMBS: dict[str, str] = {
     "short rows.csv": CSV + of("1\n"),
     "rows.csv": CSV + of("0,0,0,0,0,0,0,1\n"),
     "empty cells.csv": CSV + of(",,,,,,,\n"),
+    "devices.csv": "device," + CSV + "".join(f"{row // 9},0,0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
+    "names.csv": "name," + CSV + "".join(f"{row},0,0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
+    "bodies.csv": "t," + ",".join(f"b{body}_{column}" for body in range(300) for column in COLUMNS) + "\n" + of("0,"),
     "quotes.csv": CSV + of('"0","0","0","0","0","0","0","1"\n'),
     "1e308.csv": CSV + of("1e308,1e308,1e308,1e308,1e308,1e308,1e308,1e308\n"),
     "long numbers.csv": CSV + of("9" * 50_000 + ",0,0,0,0,0,0,1\n"),

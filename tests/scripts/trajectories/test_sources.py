@@ -1,5 +1,7 @@
 """What the user names: files, bodies in them, and what is told about the rest."""
 
+import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -82,6 +84,26 @@ def test_a_missing_file_is_told(folder: Path, source: str) -> None:
 def test_a_folder_is_told(folder: Path) -> None:
     with pytest.raises(TrajectoryError, match="this is a folder; name a file in it"):
         read_trajectories(str(folder))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
+@pytest.mark.parametrize("body", ["", ":left", ":*"])
+def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> None:
+    os.mkfifo("pipe.csv")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket.csv")
+        Path("circle.csv").symlink_to("circle.csv")
+        Path("dangling.csv").symlink_to("gone.csv")
+        told = {
+            "pipe.csv": r"this is a pipe \(FIFO\), not a file; write what comes out of it to a file, and name that",
+            "socket.csv": "this is a socket, not a file; write what comes out of it",
+            "/dev/zero": "this is a device, not a file; name a file",
+            "circle.csv": "this is a symbolic link that leads in a circle; name the file itself",
+            "dangling.csv": "this is a symbolic link to 'gone.csv', where nothing is; name the file itself",
+        }
+        for path, problem in told.items():
+            with pytest.raises(TrajectoryError, match=f"^{path}: {problem}"):
+                read_trajectories(f"{path}{body}")
 
 
 def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) -> None:

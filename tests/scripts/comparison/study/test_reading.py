@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch):
     """Lets a source hold these bodies."""
 
     def hold(*bodies: Trajectory) -> None:
-        monkeypatch.setattr(study, "read_trajectories", lambda source: Recording(Path("take.csv"), bodies))
+        monkeypatch.setattr(study, "read_trajectories", lambda source, options: Recording(Path("take.csv"), bodies))
 
     return hold
 
@@ -35,6 +36,13 @@ def test_a_body_without_two_poses_is_left_out_and_named(recorded):
     clips, note = study.read_source("take.csv:*", "blender")
     assert [clip.name for clip in clips] == ["take-left", "take-right"]
     assert note.startswith("'tracker' is left out: 1 usable poses are left")
+
+
+def test_what_is_hard_to_believe_comes_before_what_was_repaired(recorded):
+    recorded(replace(body("left", 5, lost=1), warnings=("as slow as a snail",)))
+    ((clip,), _) = study.read_source("take.csv", "blender")
+    assert clip.repairs[0] == "as slow as a snail"
+    assert clip.repairs[1].startswith("dropped rows with numbers that are missing")
 
 
 @pytest.mark.parametrize("bodies", [("left",), ("left", "right")])

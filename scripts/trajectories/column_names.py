@@ -1,0 +1,195 @@
+"""What the name of a column in somebody's log says: what it holds, of which axis, in which unit, of which body.
+
+Loggers write `t`, `timestamp_ms` and `Time (s)`, `x`, `px`, `PosX`, `pos_x_cm` and `position.x`, `qw`, `rot_w` and
+`Rotation W`; with several bodies in a row `left_pos_x` and `LeftHand.position.x`. A name is cut into words, at dots,
+dashes, blanks and capitals; words with a meaning are taken away, and what is left is the body's name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+from .options import TICKS
+
+LONGEST_NAME = 100
+"""Characters. What is longer is no name of a column that is known."""
+
+UNITS = {
+    "s": "s sec secs second seconds",
+    "ms": "ms msec msecs milli millis millisecond milliseconds",
+    "us": "us usec usecs micro micros microsecond microseconds",
+    "ns": "ns nsec nsecs nano nanos nanosecond nanoseconds",
+    "m": "m meter meters metre metres",
+    "cm": "cm centimeter centimeters centimetre centimetres",
+    "mm": "mm millimeter millimeters millimetre millimetres",
+    "in": "in inch inches",
+    "ft": "ft feet",
+    "deg": "deg degs degree degrees °",
+    "rad": "rad rads radian radians",
+}
+"""Units, and how they are written."""
+
+UNIT_OF = {spelling: unit for unit, spellings in UNITS.items() for spelling in spellings.split()}
+
+METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+"""Units of length."""
+
+UNITS_AS_WORDS = {word for word, unit in UNIT_OF.items() if unit not in TICKS} - {"in", "feet"}
+"""Units that need no brackets to be told from parts of a body."""
+
+KINDS = {
+    "position": "p pos position positions t trans translation translate loc location coord coords coordinate",
+    "quaternion": "q quat quats quaternion",
+    "rotation": "r rot rots rotation rotations ori orient orientation att attitude",
+    "euler": "euler eulers angle angles rpy",
+}
+"""What axes are of, and how it is written. A rotation is a quaternion where it has a w, and Euler angles otherwise."""
+
+KIND_OF = {word: kind for kind, words in KINDS.items() for word in words.split()}
+
+TURNS = ("roll", "pitch", "yaw")
+"""Euler angles that do not name their axis."""
+
+_WORDS = {
+    "time": "t ts time times timestamp timestamps stamp clock elapsed realtime",
+    "beside time": "since start startup begin beginning launch recording session game app unity unreal system sys host "
+    "unix epoch utc posix absolute relative rel abs total sample capture log header field rosbag from of in at the "
+    "real level load unscaled scaled",
+    "devices": "device tracker controller body object node joint bone hand side role name id",
+    "beside devices": "label serial xr tracked rigid game",
+    "without meaning": "m local world global pose transform tf field data value component",
+}
+
+TIME = frozenset(_WORDS["time"].split())
+"""Words for time."""
+
+WITH_TIME = TIME | frozenset(_WORDS["beside time"].split())
+"""And those that may stand with them, and change nothing. `delta` and `frame` do."""
+
+DEVICES = tuple(_WORDS["devices"].split())
+"""Words for whose a row is, what tells most first."""
+
+WITH_DEVICES = frozenset(DEVICES).union(_WORDS["beside devices"].split())
+
+WITHOUT_MEANING = frozenset(_WORDS["without meaning"].split())
+"""Words beside a position or rotation that tell no body from another."""
+
+_UPPER = r"[^\W\d_a-z]"
+WORD = re.compile(rf"{_UPPER}+(?={_UPPER}[a-z])|{_UPPER}?[a-z]+|{_UPPER}+|\d+|°")
+BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
+TIME_WITH_UNIT = re.compile(r"^(t|time|timestamp)(sec|ms|us|ns)$")
+AXIS = re.compile(rf"({'|'.join(sorted(KIND_OF, key=len, reverse=True))})?([xyzw])(mm|cm|m)?")
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """What a name says."""
+
+    kind: str
+    """"time", "scale", "device", or one of `KINDS`."""
+
+    axis: str = ""
+    """x, y, z, w, or one of `TURNS`; of a device the word for it."""
+
+    unit: str = ""
+    """One of `UNITS`, or what stood in brackets; empty where nothing is said."""
+
+    body: str = ""
+    """As it was written."""
+
+
+@lru_cache(maxsize=4096)
+def column_name(text: str) -> ColumnName | None:
+    """What the name of a column says; None where that is nothing known."""
+    if len(text) > LONGEST_NAME:
+        return None
+    text, unit = _without_brackets(text)
+    spans = [match.span() for match in WORD.finditer(text)]
+    words = [text[start:end].lower() for start, end in spans]
+    return _time(words, unit) or _device(words) or _scale(text, words, spans) or _pose(text, words, spans, unit)
+
+
+def unit_in(text: str) -> str:
+    """The unit that a name ends with, whatever else it says; empty where it has none."""
+    text, unit = _without_brackets(text[-LONGEST_NAME:])
+    words = WORD.findall(text)
+    return unit or (UNIT_OF.get(words[-1].lower(), "") if len(words) > 1 else "")
+
+
+def _without_brackets(text: str) -> tuple[str, str]:
+    """A name without the unit in brackets, and the unit. An axis in brackets stays."""
+    text, unit = text.strip().replace("\u00b5", "u").replace("\u03bc", "u"), ""
+    for match in BRACKETS.finditer(text):
+        content = match[1].lower()
+        if content not in ("x", "y", "z", "w"):
+            # Of what has no unit one writes [], [1] or [-].
+            unit = UNIT_OF.get(content, content.strip("-1"))
+            text = text[: match.start()] + " " * len(match[0]) + text[match.end() :]
+    return text, unit
+
+
+def _time(words: list[str], unit: str) -> ColumnName | None:
+    parts = " ".join(TIME_WITH_UNIT.sub(r"\1 \2", word) for word in words).split()
+    units = [UNIT_OF[word] for word in parts if UNIT_OF.get(word) in TICKS]
+    others = [word for word in parts if UNIT_OF.get(word) not in TICKS]
+    # A plain s is a scale; any other unit of time tells that this is one.
+    timely = not TIME.isdisjoint(others) or (bool(units) and words != ["s"])
+    if not timely or not WITH_TIME.issuperset(others):
+        return None
+    return ColumnName("time", unit=unit or (units[-1] if units else ""))
+
+
+def _device(words: list[str]) -> ColumnName | None:
+    named = [word for word in DEVICES if word in words]
+    if not named or not WITH_DEVICES.issuperset(words):
+        return None
+    return ColumnName("device", named[0])
+
+
+def _scale(text: str, words: list[str], spans: list[tuple[int, int]]) -> ColumnName | None:
+    if words == ["s"]:
+        return ColumnName("scale")
+    if words and words[-1] == "scale":
+        return ColumnName("scale", body=_body(text, words, spans, {len(words) - 1}))
+    return None
+
+
+def _pose(text: str, words: list[str], spans: list[tuple[int, int]], unit: str) -> ColumnName | None:
+    taken: set[int] = set()
+    for place, word in enumerate(words):
+        # A single letter in between is rather part of a name.
+        if place and word in UNITS_AS_WORDS and (len(word) > 1 or place == len(words) - 1):
+            unit = unit or UNIT_OF[word]
+            taken.add(place)
+    axes = [place for place, word in enumerate(words) if place not in taken and (AXIS.fullmatch(word) or word in TURNS)]
+    if not axes:
+        return None
+    place = axes[-1]
+    kinds = {KIND_OF[word] for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF and other != place}
+    taken |= {other for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF}
+    if words[place] in TURNS:
+        return ColumnName("euler", words[place], unit, _body(text, words, spans, taken | {place}))
+    fused, axis, fused_unit = AXIS.fullmatch(words[place]).groups()
+    if fused:
+        kinds.add(KIND_OF[fused])
+    elif place and len(words[place - 1]) == 1 and words[place - 1] in KIND_OF:
+        kinds.add(KIND_OF[words[place - 1]])
+        taken.add(place - 1)
+    kind = next((kind for kind in ("quaternion", "euler", "rotation", "position") if kind in kinds), "position")
+    if axis == "w" and kind in ("position", "euler"):
+        return None
+    return ColumnName(kind, axis, unit or fused_unit or "", _body(text, words, spans, taken | {place}))
+
+
+def _body(text: str, words: list[str], spans: list[tuple[int, int]], taken: Iterable[int]) -> str:
+    """What is left of a name: as it was written, where it stands together."""
+    taken = set(taken)
+    left = [place for place, word in enumerate(words) if place not in taken and word not in WITHOUT_MEANING]
+    if not left:
+        return ""
+    if left[-1] - left[0] == len(left) - 1:
+        return text[spans[left[0]][0] : spans[left[-1]][1]].strip()
+    return "_".join(text[slice(*spans[place])] for place in left)

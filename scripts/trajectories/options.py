@@ -1,0 +1,69 @@
+"""What a user knows of a recording and its file does not say: names of columns, units, the order of Euler angles.
+
+Everything is plain data, so that it travels with a task as JSON.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+TICKS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+"""Units of time, and how many there are in a second."""
+
+MEANINGS = ("t", "x", "y", "z", "qw", "qx", "qy", "qz", "rx", "ry", "rz", "scale", "device")
+"""What a column can hold: time, position, quaternion, Euler angles about x, y and z, scale, and whose the row is."""
+
+
+@dataclass(frozen=True)
+class ReadingOptions:
+    """How to read a recording; what is left as it is, the file has to say. ValueError where a value is none."""
+
+    columns: tuple[tuple[str, str], ...] = ()
+    """Pairs of a name in `MEANINGS` and the column's name in the file. They go before what names are taken to mean."""
+
+    time_unit: str | None = None
+    """A name in `TICKS`; times are believed to be in it, whatever the file says of them."""
+
+    scale: float | None = None
+    """Metres for each unit of the positions, whatever the file says of them."""
+
+    euler: str | None = None
+    """The order of turns by Euler angles, as SciPy has it: "YXZ" about the axes as the earlier turns left them
+    (intrinsic), "zxy" about those of the world (extrinsic). The two are the same rotation."""
+
+    degrees: bool = False
+    """Whether angles are degrees, whatever their names say. Otherwise those are radians whose names do not say."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns", tuple((meaning, column) for meaning, column in self.columns))
+        meanings = [meaning for meaning, _ in self.columns]
+        for meaning in meanings:
+            if meaning not in MEANINGS:
+                raise ValueError(f"a column cannot mean {meaning!r}; known are {', '.join(MEANINGS)}")
+            if meanings.count(meaning) > 1:
+                raise ValueError(f"two columns for {meaning}; name one")
+        if self.time_unit is not None and self.time_unit not in TICKS:
+            raise ValueError(f"there is no unit of time {self.time_unit!r}; known are {', '.join(TICKS)}")
+        if self.scale is not None and not 0.0 < self.scale < math.inf:
+            raise ValueError(f"a unit cannot be {self.scale} metres long; give a number such as 0.01 for centimetres")
+        if self.euler is not None and sorted(self.euler) not in (list("XYZ"), list("xyz")):
+            raise ValueError(
+                f"{self.euler!r} is no order of Euler angles; give the three axes once each, in capitals (YXZ) for "
+                "turns about the moved axes, in small letters (zxy) about those of the world"
+            )
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The names of the fields that say anything."""
+        return tuple(name for name, value in vars(self).items() if value not in ((), None, False))
+
+    @property
+    def intrinsic_order(self) -> str:
+        """The order of turns about the moved axes: fixed axes in one order are moved axes in the opposite one."""
+        order = self.euler or ""
+        return order if order.isupper() else order[::-1].upper()
+
+
+AS_THE_FILE_SAYS = ReadingOptions()
+"""Nothing said."""
