@@ -26,7 +26,7 @@ from scripts.comparison.planning import Wanted, comparison_tasks, look_into, rea
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.stage.settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
 from scripts.comparison.steps import KEYS_NEEDED, REPORT
-from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform
+from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, distinct
 from scripts.comparison.study.modes import BEST_OF, single_modes
 from scripts.comparison.version import blender_version, program_version
 from scripts.progress import Progress
@@ -49,6 +49,8 @@ from scripts.workplan import (
 
 RATES = "5,10,15,20"
 """Keys a second where none are asked for."""
+
+STREAM_MODES = tuple(mode for mode in MODES if mode not in KEYFRAME_MODES)
 
 ALL = "all"
 """Stands for the modes that are compared where none are named."""
@@ -115,10 +117,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_modes,
         default=",".join(KEYFRAME_MODES),
         metavar="MODE,...",
-        help="what fills them in (%(default)s); all for all of these, and best_of for the best of each segment",
+        help=f"what fills them in ({', '.join(KEYFRAME_MODES)}); {ALL} for all of these, {', '.join(STREAM_MODES)} for "
+        f"streams, which know no later keys, and {BEST_OF} for the best of each segment",
     )
     parser.add_argument(
-        "--output", type=Path, default=ROOT / "renders" / "comparison", help="folder to write to (renders/comparison)"
+        "--output",
+        type=_folder,
+        default=ROOT / "renders" / "comparison",
+        help="folder to write to (renders/comparison)",
     )
     parser.add_argument("--axes", choices=AXES, default="blender", help="axes of the recordings (%(default)s)")
     parser.add_argument(
@@ -380,7 +386,7 @@ def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
     def parse_amounts(text: str) -> list[Choice]:
         written = ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]
         try:
-            return [kind(amount) for amount in dict.fromkeys(written)]
+            return distinct(map(kind, written))
         except ValueError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
 
@@ -403,6 +409,12 @@ def _modes(text: str) -> list[str]:
             f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
         )
     return [*modes, BEST_OF]
+
+
+def _folder(text: str) -> Path:
+    if not text.strip() or "\0" in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
+    return Path(text)
 
 
 def _jobs(text: str) -> int:

@@ -6,6 +6,7 @@ import csv
 import errno
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -19,7 +20,7 @@ import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
 from scipy.spatial.transform import Rotation
 
-from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
+from addon.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
 from scripts.comparison.study.reading import folder_names
 from scripts.workplan import Workspace
@@ -296,6 +297,8 @@ def test_what_is_repaired_is_said(short_clip, tmp_path, capsys):
         (["--resolution", "big"], "1280x720"),
         (["--fps", "0"], "1 to 240"),
         (["--axes", "maya"], "unity"),
+        (["--output", ""], "'' is no folder"),
+        (["--output", "a\0b"], "is no folder"),
         (["--jobs", "-1"], "no number of processes"),
         (["--jobs", "many"], "no number of processes"),
         (["--tolerance", "5mm"], "--tolerance is for keys that are chosen by the motion: add --decimate adaptive"),
@@ -357,11 +360,43 @@ def test_clips_too_short_for_every_budget_are_told_the_option_to_raise(short_cli
     assert "give higher --budget" in capsys.readouterr().err
 
 
-def test_help_has_examples(capsys):
+@pytest.mark.parametrize(
+    ("arguments", "folders"),
+    [
+        (["--rates", "5,7.5,5.0,05"], ["5", "7.5"]),
+        (["--decimate", "adaptive", "--budget", "10.0,10"], ["budget-10.0"]),
+        (["--decimate", "adaptive", "--tolerance", "5mm,0.5cm,0.005m,0.005"], ["tolerance-5mm", "tolerance-0.005"]),
+    ],
+)
+def test_the_same_amount_written_in_two_ways_is_one_choice(arguments, folders):
+    assert [choice.name for choice in compare.parse(arguments).choices] == folders
+
+
+def test_the_help_names_every_mode_there_is(capsys):
     assert exit_code("--help") == 0
-    said = capsys.readouterr().out
-    assert "blender --background --python scripts/compare.py --" in said
-    assert "--decimate adaptive --tolerance 5mm" in said
+    said = " ".join(capsys.readouterr().out.split("--output")[1].split())
+    assert [mode for mode in (*MODES, "all", "best_of") if mode not in said] == []
+
+
+EXAMPLE = re.compile(
+    r"^ +(?:blender --background --python scripts/compare\.py --"
+    r"|python scripts/(?:compare\.py|bootstrap\.py compare))(?P<arguments>.*)$",
+    re.MULTILINE,
+)
+"""A line of a page, or of the help, that calls the program."""
+
+
+@pytest.mark.parametrize("page", ["--help", "README.md", "docs/comparing.md", "docs/farm.md"])
+def test_the_printed_examples_work_as_printed(page, capsys):
+    if page == "--help":
+        assert exit_code("--help") == 0
+    else:
+        print((ROOT / page).read_text(encoding="utf-8"))
+    examples = EXAMPLE.findall(capsys.readouterr().out)
+    assert examples
+    for example in examples:
+        options = compare.parse(shlex.split(example, comments=True))
+        assert options.choices
 
 
 def rendering(output: Path) -> bool:
