@@ -337,8 +337,8 @@ class _Run:
 
     def _say(self, outcome: Outcome, tasks: list[Task], seconds: float) -> None:
         """What came of it, and last the path of the report."""
-        records = self.workspace.manifest.tasks
-        done = [records[name] for name in outcome.of(State.DONE)]
+        records = map(self.workspace.manifest.get, outcome.of(State.DONE))
+        done = [record for record in records if record]
         work = sum(record.seconds for record in done)
         rendering = sum(record.facts.get("rendering", 0.0) for record in done)
         share = f", {rendering:.1f} s ({rendering / work:.0%}) of them Blender's rendering" if rendering else ""

@@ -246,6 +246,8 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
                 title=title,
                 weight=seconds_a_frame * (last - first + 1),
                 temporary=True,
+                amount=last - first + 1,
+                unit="frame",
             )
         yield Task(
             name=steps.filming(clip, choice),

@@ -191,7 +191,7 @@ def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int)
     blend = job.reads(blend_of(clip, chosen))
     path = job.writes(piece_of(clip, chosen, first))
     try:
-        seconds = render_piece(blend, first, last, path, lambda done, of: job.progress(done, of, f"{done}/{of}"))
+        seconds = render_piece(blend, first, last, path, job.progress)
     except RuntimeError as error:
         raise TaskError(f"{clip} {chosen.phrase}: no video: {error}") from None
     return {"rendering": seconds}

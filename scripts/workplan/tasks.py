@@ -26,7 +26,7 @@ class TaskError(Exception):
     """Why a task cannot be done, in one line for the user: a recording that is damaged, a picture that is missing."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Task:
     """A piece of work.
 
@@ -68,6 +68,12 @@ class Task:
     temporary: bool = False
     """Nobody but the tasks after it wants its outputs: they are deleted when those tasks are done."""
 
+    amount: int = 0
+    """How many it makes of what is counted over all tasks."""
+
+    unit: str = ""
+    """What that is: "frame"."""
+
     def __post_init__(self) -> None:
         # What came back from JSON is what a worker, or the next run, will be given.
         object.__setattr__(self, "arguments", json.loads(json.dumps(self.arguments, allow_nan=False)))
@@ -77,7 +83,7 @@ class Task:
 
     def as_json(self) -> dict[str, Any]:
         """Every field, for `Task(**fields)`."""
-        return dict(vars(self))
+        return {name: getattr(self, name) for name in self.__slots__}
 
 
 def step(function: Step) -> Step:
