@@ -22,7 +22,7 @@ if str(ROOT) not in sys.path:
 from addon.motion import KEYFRAME_MODES, MODES
 from scripts.command_line import as_typed, number, own_arguments
 from scripts.comparison import steps
-from scripts.comparison.planning import Wanted, comparison_tasks, look_into, reading_tasks
+from scripts.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.stage.settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
 from scripts.comparison.steps import KEYS_NEEDED, REPORT
@@ -38,7 +38,6 @@ from scripts.workplan import (
     FolderInUse,
     ManifestError,
     Outcome,
-    Plan,
     ProcessExecutor,
     SerialExecutor,
     State,
@@ -320,7 +319,7 @@ class _Run:
 
     def _do(self, tasks: list[Task], title: str) -> Outcome:
         outcome = run(
-            Plan(tasks, self.version),
+            plan_of(tasks, self.version),
             self.workspace,
             self.executor,
             force=self.options.force,

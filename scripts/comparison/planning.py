@@ -17,7 +17,7 @@ from typing import Any
 
 from scripts.trajectories import TrajectoryError
 from scripts.trajectories.reading import split_source
-from scripts.workplan import Task
+from scripts.workplan import Plan, Task
 
 from . import steps
 from .report.pages import ON_ONE_PAGE, Settings
@@ -27,6 +27,7 @@ from .study.choices import Choice, choice_parts
 from .study.metrics import table_names
 from .study.reading import folder_names
 from .study.storage import ClipReference, file_names, read_facts, read_times
+from .version import step_versions
 
 MODULE = steps.__name__
 
@@ -73,6 +74,11 @@ class Study:
 
 
 # -- reading ----------------------------------------------------------------------------------------------------------
+
+
+def plan_of(tasks: Sequence[Task], version: str) -> Plan:
+    """The plan of some tasks, of which each is done again where what its step uses has changed."""
+    return Plan(tasks, version, versions=step_versions(task.function for task in tasks))
 
 
 def reading_tasks(sources: Iterable[str], axes: str) -> list[Task]:

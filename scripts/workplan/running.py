@@ -196,7 +196,7 @@ class _Run:
         self.shares: dict[str, float] = {}
         self.losses: Counter[str] = Counter()
         self.weight_done = 0.0
-        self.totals = _amounts({name: 1.0 for name in self.wanted}, plan)
+        self.totals = _amounts(dict.fromkeys(self.wanted, 1.0), plan)
         """How many there will be of what is counted."""
         self.made: Counter[str] = Counter()
         self.shown: dict[str, int] = {}
