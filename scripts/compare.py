@@ -22,10 +22,11 @@ if str(ROOT) not in sys.path:
 from addon.motion import KEYFRAME_MODES, MODES
 from scripts.command_line import as_typed, number, own_arguments
 from scripts.comparison import steps
+from scripts.comparison.explaining import explain_comparison
 from scripts.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.stage.settings import ANTIALIASING, ENGINES, StageSettings, SubjectError
-from scripts.comparison.steps import KEYS_NEEDED, REPORT
+from scripts.comparison.steps import KEYS_NEEDED, METRICS, REPORT
 from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, distinct
 from scripts.comparison.study.modes import BEST_OF, single_modes
 from scripts.comparison.version import blender_version, program_version
@@ -38,13 +39,14 @@ from scripts.workplan import (
     FolderInUse,
     ManifestError,
     Outcome,
+    Plan,
     ProcessExecutor,
     SerialExecutor,
     State,
-    Task,
     Workspace,
     run,
 )
+from scripts.workplan.ownership import OutputError, require_free, require_same_inputs
 
 RATES = "5,10,15,20"
 """Keys a second where none are asked for."""
@@ -136,7 +138,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     workers.add_argument(
         "--scheduler", metavar="ADDRESS", help="let the workers of a Dask scheduler do it: tcp://HOST:8786"
     )
-    parser.add_argument("--force", action="store_true", help="do everything again, also what is done already")
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="do everything again, also what is done already; replace another comparison, and files of other programs",
+    )
+    parser.add_argument("--explain", action="store_true", help="say what would be done and why, and do nothing")
     keys = parser.add_argument_group("choosing keys")
     keys.add_argument(
         "--decimate",
@@ -219,14 +226,22 @@ def _choices(options: argparse.Namespace) -> list[Choice]:
 def main(arguments: list[str]) -> int:
     """Run a comparison, and return the exit code."""
     options = parse(arguments)
-    missing = None if options.no_video or options.engine == "cycles" else missing_for_rendering()
+    command = as_typed("compare.py", arguments, options.inputs)
+    needs_screen = not (options.explain or options.no_video or options.engine == "cycles")
+    missing = missing_for_rendering() if needs_screen else None
     if missing:
         print(f"compare.py: {way_out(missing)}\nOr go without videos: --no-video", file=sys.stderr)
         return 2
     try:
+        if options.explain:
+            asked = wanted(options, command)
+            print(
+                *explain_comparison(options.output, options.inputs, options.axes, asked, force=options.force), sep="\n"
+            )
+            return 0
         if not options.no_video:
             require_subject(options.object)
-        version, command = program_version(), as_typed("compare.py", arguments, options.inputs)
+        version = program_version()
         with (
             Progress() as progress,
             Workspace(options.output) as workspace,
@@ -235,7 +250,7 @@ def main(arguments: list[str]) -> int:
             return _Run(options, workspace, executor, progress, command, version).run()
     except ImportError as error:
         print(f"compare.py: {error}\n{way_out(str(error))}", file=sys.stderr)
-    except (SubjectError, FolderInUse, ManifestError, ExecutorError) as error:
+    except (SubjectError, FolderInUse, ManifestError, ExecutorError, OutputError) as error:
         print(f"compare.py: {error}", file=sys.stderr)
     except OSError as error:
         print(f"compare.py: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
@@ -295,31 +310,41 @@ class _Run:
         started = time.perf_counter()
         options = self.options
         reading = reading_tasks(options.inputs, options.axes)
-        read = self._do(list({task.name: task for task in reading}.values()), "Reading")
+        first = plan_of(list({task.name: task for task in reading}.values()), self.version)
+        require_same_inputs(first, self.workspace, force=options.force)
+        require_free(first, self.workspace, (METRICS, KEYS_NEEDED, REPORT), force=options.force)
+        read = self._do(first, "Reading")
         if read.interrupted:
             return 130
         there = [task for task in reading if read.states[task.name].there]
         if read.problem or not there:
             return 2
-        found = look_into(self.workspace.output, there, options.choices)
+        try:
+            found = look_into(self.workspace.output, there, options.choices)
+        except Exception:  # What was read before may be damaged in any way: it is read again.
+            self.workspace.withdraw_damaged(first.order) or self.workspace.withdraw(first.order)
+            read = self._do(first, "Reading")
+            found = look_into(self.workspace.output, there, options.choices)
         for note in found.notes:
             self.progress.note(note)
         if not found.studies:
             higher = "--budget" if options.budget else "--rates"
             self.progress.note(f"compare.py: every clip is too short for two keys at these rates; give higher {higher}")
             return 2
+        tasks = comparison_tasks(found.studies, there, wanted(self.options, self.command))
+        plan = plan_of(tasks, self.version)
+        require_free(plan, self.workspace, force=options.force)
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        tasks = comparison_tasks(found.studies, there, wanted(self.options, self.command))
-        outcome = self._do(tasks, "Comparing")
+        outcome = self._do(plan, "Comparing")
         outcome.states |= read.states
-        self._say(outcome, tasks, time.perf_counter() - started)
+        self._say(outcome, time.perf_counter() - started)
         return 130 if outcome.interrupted else 2 if outcome.problem else int(State.FAILED in outcome.states.values())
 
-    def _do(self, tasks: list[Task], title: str) -> Outcome:
+    def _do(self, plan: Plan, title: str) -> Outcome:
         outcome = run(
-            plan_of(tasks, self.version),
+            plan,
             self.workspace,
             self.executor,
             force=self.options.force,
@@ -334,7 +359,7 @@ class _Run:
             )
         return outcome
 
-    def _say(self, outcome: Outcome, tasks: list[Task], seconds: float) -> None:
+    def _say(self, outcome: Outcome, seconds: float) -> None:
         """What came of it, and last the path of the report."""
         records = map(self.workspace.manifest.get, outcome.of(State.DONE))
         done = [record for record in records if record]

@@ -103,10 +103,12 @@ class Manifest:
         """What the records call a version, to what it is of: see `Plan.versions`."""
         self.failures: dict[str, dict[str, str]] = {}
         """Of the last run: task to what was said, and the details."""
+        self._changed = False
         self.is_whole = self._take(path)
         """Whether manifest.json is there, with every line that was written to it."""
         for record in sorted(records.glob("*.json")) if only is None else map(self._place, only):
             self._take(record)
+        self._changed = self._changed or not self.is_whole
 
     def __contains__(self, name: str) -> bool:
         return name in self._lines
@@ -126,6 +128,7 @@ class Manifest:
         line = json.dumps(record.as_json())
         _write(self._place(name), [(name, line)])
         self._lines[name] = line
+        self._changed = True
 
     def withdraw(self, name: str) -> None:
         """Take down that a task is not done, and that what lies under the names of its outputs is the program's."""
@@ -135,13 +138,14 @@ class Manifest:
     def forget(self, name: str) -> None:
         """Know no more of a task."""
         self._lines.pop(name, None)
+        self._changed = True
         self._place(name).unlink(missing_ok=True)
 
     def write(self) -> None:
-        """Write manifest.json with all records in it."""
+        """Write manifest.json with all records in it, if there is anything new to be said."""
         records = list(self._records.glob("*.json")) if self._records.is_dir() else []
-        if not self._lines and not self._path.exists():
-            return
+        if not (self._changed or records or self.failures) or not (self._lines or self.is_whole):
+            return  # So a file of that name that is no manifest stays as it is, where nothing is to be said.
         _write(self._path, sorted(self._lines.items()), versions=self.versions, failures=self.failures)
         for record in records:
             record.unlink(missing_ok=True)
@@ -162,6 +166,7 @@ class Manifest:
             if schema != SCHEMA or header.get("tasks") != {}:
                 return False
             self.versions |= _versions(header.get("versions"))
+            self._changed = self._changed or bool(header.get("failures"))
             is_whole = False
             for line in iter(lambda: stream.readline(LONGEST_LINE), ""):
                 is_whole = line == END

@@ -300,7 +300,9 @@ class _Run:
             self.outcome.states[failed.name] = State.FAILED
             raise _Hopeless(said)
         task = self.plan.tasks[failed.name]
-        if self.mends and (damaged := self._withdraw_damaged(task.after)):
+        read = [before for before in task.after if self.outcome.states[before].there]
+        if self.mends and (damaged := self.workspace.withdraw_damaged(read)):
+            self.damaged = True
             self.progress.note(f"{task.title}: {damaged} is damaged; it is made again")
         else:
             self.progress.note(self.describe(said))
@@ -309,21 +311,6 @@ class _Run:
         if record is None or record.key != self.status.key(failed.name):
             self.workspace.discard(task.outputs)
         self._settle(failed.name, State.FAILED)
-
-    def _withdraw_damaged(self, names: Iterable[str]) -> str:
-        """Of tasks that were done, let those be done again whose outputs are not what was made, though they have its
-        size and time. Returns the first such output; nothing where there is none."""
-        found = ""
-        for name in names:
-            record = self.workspace.manifest.get(name)
-            if record and self.outcome.states[name].there:
-                paths = {path: self.workspace.output / path for path in record.outputs}
-                damaged = [os.fspath(at) for path, at in paths.items() if not record.outputs[path].is_content_of(at)]
-                if damaged:
-                    self.workspace.manifest.withdraw(name)
-                    self.damaged = True
-                    found = found or damaged[0]
-        return found
 
     def _settle(self, name: str, state: State) -> None:
         """A task has come to its end: those after it may begin."""

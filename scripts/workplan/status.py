@@ -102,7 +102,7 @@ class Status:
     def made_of(self, name: str) -> dict[str, Any]:
         """What the key of a task is the digest of, in short."""
         task = self._plan.tasks[name]
-        content: dict[str, Any] = {"version": self._plan.version_of(task.function)}
+        content: dict[str, Any] = {"function": task.function, "version": self._plan.version_of(task.function)}
         content["arguments"] = dict(_in_short(task.arguments))
         if task.inputs:
             content["inputs"] = {path: self._inputs[path][1] for path in task.inputs}

@@ -122,6 +122,24 @@ class Workspace:
                 self.discard(record.outputs)
             self.manifest.forget(name)
 
+    def withdraw_damaged(self, names: Iterable[str]) -> Path | None:
+        """Let tasks be done again whose outputs are not what was made, though they have its size and time.
+
+        Returns
+        -------
+        Path or None
+            The first such output; None where there is none.
+        """
+        first = None
+        for name in names:
+            record = self.manifest.get(name)
+            states = record.outputs.items() if record else ()
+            damaged = [place for path, state in states if not state.is_content_of(place := self.output / path)]
+            if damaged:
+                self.manifest.withdraw(name)
+                first = first or damaged[0]
+        return first
+
     def discard(self, outputs: Iterable[str]) -> None:
         """Delete outputs that nobody wants any more, and the folders that are empty then."""
         for path in outputs:

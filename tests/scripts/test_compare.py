@@ -208,8 +208,9 @@ def test_budgets_are_the_rates_where_neither_a_tolerance_nor_a_budget_is_given(s
     assert float(adaptive["rms_shell_m"]) < float(evenly["rms_shell_m"])
 
 
-def test_the_keys_needed_in_an_earlier_run_do_not_pass_for_those_of_this(short_clip, tmp_path):
-    (tmp_path / "keys_needed.csv").write_text("earlier")
+def test_the_keys_needed_in_an_earlier_run_do_not_pass_for_those_of_this(adaptive, short_clip, tmp_path):
+    shutil.copytree(adaptive, tmp_path, dirs_exist_ok=True)
+    assert (tmp_path / "keys_needed.csv").exists()
     assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "10") == 0
     assert not (tmp_path / "keys_needed.csv").exists()
 
@@ -506,7 +507,7 @@ def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, caps
 
     asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
     with monkeypatch.context() as patch:
-        patch.setattr("scripts.comparison.steps.write_metrics", full)
+        patch.setattr("scripts.comparison.study.metrics.write_metrics", full)
         assert run(*asked) == 2
     said = capsys.readouterr()
     assert "No space left on device; nothing that is done is lost" in said.err
