@@ -6,17 +6,17 @@ run of ten thousand tasks does not write ten thousand manifests. Reading takes b
 
 A manifest may be damaged, or a stranger's, so nothing that it says is believed before it has been looked at: of the
 lines that hold a record each stands for itself, and one that makes no sense is a task that is not done. Records stay
-text until somebody asks for them, which is a fifth of the memory.
+where they are until somebody asks for one: in memory is only in which line of which file it is.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from scripts.files import replacing
 
@@ -27,9 +27,11 @@ SCHEMA = 1
 LONGEST_LINE = 1 << 26
 """Characters; what is longer is no record."""
 
+APART = -1
+
 DECODER = json.JSONDecoder()
 
-END = "}}\n"
+END = b"}}\n"
 """The last line."""
 
 UNREADABLE = (ValueError, TypeError, KeyError, AttributeError, RecursionError)
@@ -97,8 +99,10 @@ class Manifest:
 
     def __init__(self, path: Path, records: Path, only: Iterable[str] | None = None) -> None:
         self._path, self._records = path, records
-        self._lines: dict[str, str] = {}
-        """Task to its record, as JSON."""
+        self._lines: dict[str, int] = {}
+        """Task to where its line begins in manifest.json, `APART` where it is in a file of its own."""
+        self._stream: BinaryIO | None = None
+        """The manifest, as long as records are read from it."""
         self.versions: dict[str, Mapping[str, str]] = {}
         """What the records call a version, to what it is of: see `Plan.versions`."""
         self.failures: dict[str, dict[str, str]] = {}
@@ -118,16 +122,17 @@ class Manifest:
 
     def get(self, name: str) -> Record | None:
         """The record of a task; None where there is none that makes sense."""
+        if name not in self._lines:
+            return None
         try:
-            return Record.from_json(json.loads(self._lines[name]))
-        except UNREADABLE:
+            return Record.from_json(json.loads(self._text_of(name)))
+        except (*UNREADABLE, OSError):
             return None
 
     def add(self, name: str, record: Record) -> None:
         """Take down that a task is done, for good."""
-        line = json.dumps(record.as_json())
-        _write(self._place(name), [(name, line)])
-        self._lines[name] = line
+        _write(self._place(name), [(name, json.dumps(record.as_json()))])
+        self._lines[name] = APART
         self._changed = True
 
     def withdraw(self, name: str) -> None:
@@ -146,9 +151,31 @@ class Manifest:
         records = list(self._records.glob("*.json")) if self._records.is_dir() else []
         if not (self._changed or records or self.failures) or not (self._lines or self.is_whole):
             return  # So a file of that name that is no manifest stays as it is, where nothing is to be said.
-        _write(self._path, sorted(self._lines.items()), versions=self.versions, failures=self.failures)
+        known = ((name, self._text_of(name)) for name in sorted(self._lines))
+        _write(self._path, known, versions=self.versions, failures=self.failures, when_written=self.close)
         for record in records:
             record.unlink(missing_ok=True)
+        self._take(self._path)
+
+    def close(self) -> None:
+        """Let go of manifest.json."""
+        if self._stream:
+            self._stream.close()
+            self._stream = None
+
+    def _text_of(self, name: str) -> str:
+        """The record of a task as JSON. Raises OSError where its file has gone."""
+        offset = self._lines[name]
+        if offset == APART:
+            with self._place(name).open("rb") as stream:
+                stream.readline(LONGEST_LINE)
+                found = _record(stream.readline(LONGEST_LINE))
+        else:
+            if self._stream is None:
+                self._stream = self._path.open("rb")
+            self._stream.seek(offset)
+            found = _record(self._stream.readline(LONGEST_LINE))
+        return found[1] if found else ""
 
     def _place(self, name: str) -> Path:
         """Where the record of a task is: its name is any line of text, and no name for a file."""
@@ -158,7 +185,7 @@ class Manifest:
         """Take what a file says, and return whether it is all that was written to it."""
         if not is_regular(path):
             return False
-        with path.open(encoding="utf-8", errors="replace") as stream:
+        with path.open("rb") as stream:
             header = _header(stream.readline(LONGEST_LINE))
             schema = header.get("schema")
             if isinstance(schema, int) and schema > SCHEMA:
@@ -167,17 +194,18 @@ class Manifest:
                 return False
             self.versions |= _versions(header.get("versions"))
             self._changed = self._changed or bool(header.get("failures"))
-            is_whole = False
-            for line in iter(lambda: stream.readline(LONGEST_LINE), ""):
+            is_whole, offset = False, stream.tell()
+            for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
                 is_whole = line == END
                 if not is_whole and (found := _record(line)):
-                    self._lines[found[0]] = found[1]
+                    self._lines[found[0]] = offset if path == self._path else APART
+                offset += len(line)
         return is_whole
 
 
-def _header(line: str) -> Mapping[str, Any]:
+def _header(line: bytes) -> Mapping[str, Any]:
     """The first line of a manifest, without the records: nothing where it is none."""
-    for ending in ("", "}}"):
+    for ending in (b"", b"}}"):
         try:
             header = json.loads(line + ending)
             return header if isinstance(header, dict) else {}
@@ -190,21 +218,28 @@ def _versions(content: object) -> dict[str, Mapping[str, str]]:
     return {name: of for name, of in content.items() if isinstance(of, dict)} if isinstance(content, dict) else {}
 
 
-def _record(line: str) -> tuple[str, str] | None:
+def _record(line: bytes) -> tuple[str, str] | None:
     """A task and its record, which is yet to be read; None where the line holds neither."""
     try:
+        line = line.decode("utf-8")
         name, end = DECODER.raw_decode(line)
     except UNREADABLE:
         return None
     return (name, line[end:].lstrip(": ").rstrip(",\n")) if isinstance(name, str) else None
 
 
-def _write(path: Path, records: Iterable[tuple[str, str]], **header: Mapping[str, Any]) -> None:
+def _write(
+    path: Path,
+    records: Iterable[tuple[str, str]],
+    when_written: Callable[[], None] = lambda: None,
+    **header: Mapping[str, Any],
+) -> None:
     """Write records, a line for each: of ten thousand there is never more than one in memory as text."""
     if path.is_symlink():
         path.unlink()  # Whoever put it there, what it leads to is not ours.
     with replacing(path) as stream:
         stream.write(json.dumps({"schema": SCHEMA, **header})[:-1] + ', "tasks": {')
         for number, (name, line) in enumerate(records):
-            stream.write(f"{',' if number else ''}\n{json.dumps(name)}: {line}")
-        stream.write(f"\n{END}")
+            stream.write(f"{',' if number else ''}\n{json.dumps(name)}: {line or 'null'}")
+        stream.write(f"\n{END.decode()}")
+        when_written()  # Windows replaces no file that is open.

@@ -19,6 +19,7 @@ from typing import Any
 from scripts.progress import Progress, Stage
 
 from .executors import Executor
+from .manifest import Record
 from .performing import FULL_OR_FORBIDDEN, Failed, Lost, Made, Message, Noted, Order, Told, perform
 from .plan import Plan
 from .status import Status
@@ -270,14 +271,14 @@ class _Run:
     def _put_in_place(self, made: Made, order: Order) -> None:
         key = self.status.key(made.name, order.finished)
         try:
-            self.workspace.put_in_place(order, key, made, self.status.made_of(made.name))
+            record = self.workspace.put_in_place(order, key, made, self.status.made_of(made.name))
         except OSError as error:
             shutil.rmtree(order.scratch, ignore_errors=True)
             where = f"{error.filename2 or error.filename or self.workspace.output}: "
             hopeless = error.errno in FULL_OR_FORBIDDEN
             self._failed(Failed(made.name, f"{where}{error.strerror or error}", hopeless=hopeless))
             return
-        self._settle(made.name, State.DONE)
+        self._settle(made.name, State.DONE, record)
 
     def _lost(self, lost: Lost) -> None:
         order = self.at_work.pop(lost.name)
@@ -312,12 +313,12 @@ class _Run:
             self.workspace.discard(task.outputs)
         self._settle(failed.name, State.FAILED)
 
-    def _settle(self, name: str, state: State) -> None:
+    def _settle(self, name: str, state: State, record: Record | None = None) -> None:
         """A task has come to its end: those after it may begin."""
         self.outcome.states[name] = state
         task = self.plan.tasks[name]
         if state.there:
-            record = self.workspace.manifest.get(name)
+            record = record or self.workspace.manifest.get(name)
             if record and record.facts:
                 self.outcome.facts[name] = record.facts
             self.workspace.manifest.failures.pop(name, None)

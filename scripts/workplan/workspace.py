@@ -81,6 +81,7 @@ class Workspace:
                 self._clear_scratch()
                 self.manifest.write()
         finally:
+            self.manifest.close()
             self._lock.__exit__()
             self._remove_if_empty()
 
