@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from scripts.workplan import Executor, Outcome, Plan, ProcessExecutor, SerialExecutor, State, Task, Workspace, run
@@ -24,11 +25,16 @@ def joining(name: str, *parts: str, **fields: object) -> Task:
 
 
 def run_in(
-    output: Path, *tasks: Task, executor: Executor | None = None, version: str = "1", **options: object
+    output: Path,
+    *tasks: Task,
+    executor: Executor | None = None,
+    version: str = "1",
+    versions: Mapping[str, Mapping[str, str]] | None = None,
+    **options: object,
 ) -> Outcome:
     """Run a plan in a folder."""
     with Workspace(output) as workspace, executor or SerialExecutor() as opened:
-        return run(Plan(tasks, version), workspace, opened, **options)
+        return run(Plan(tasks, version, versions=versions), workspace, opened, **options)
 
 
 def states(outcome: Outcome) -> dict[str, str]:
