@@ -151,7 +151,7 @@ class Manifest:
         records = list(self._records.glob("*.json")) if self._records.is_dir() else []
         if not (self._changed or records or self.failures) or not (self._lines or self.is_whole):
             return  # So a file of that name that is no manifest stays as it is, where nothing is to be said.
-        known = ((name, self._text_of(name)) for name in sorted(self._lines))
+        known = ((name, self._text_of(name)) for name in sorted(self._lines) if self.get(name))
         _write(self._path, known, versions=self.versions, failures=self.failures, when_written=self.close)
         for record in records:
             record.unlink(missing_ok=True)
@@ -198,7 +198,10 @@ class Manifest:
             for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
                 is_whole = line == END
                 if not is_whole and (found := _record(line)):
-                    self._lines[found[0]] = offset if path == self._path else APART
+                    if path == self._path:
+                        self._lines[found[0]] = offset
+                    elif path == self._place(found[0]):
+                        self._lines[found[0]] = APART
                 offset += len(line)
         return is_whole
 
