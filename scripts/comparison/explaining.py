@@ -30,13 +30,11 @@ def explain_comparison(output: Path, sources: list[str], axes: str, wanted: Want
         tasks = {task.name: task for task in [*reading, *compared]}
         plan = plan_of(list(tasks.values()), program_version())
         survey = Status(plan, workspace.manifest, workspace.output, force=force).survey()
-    unread = len({task.name for task in reading} - {task.name for task in known})
+    wanted_names, known_names = ({task.name for task in some} for some in (reading, known))
     to_do = sum(bool(standing.reasons) for standing in survey.values())
     lines = explain(survey, plan)
-    if unread:
-        lines.append(
-            f"{unread} of the recordings {'is' if unread == 1 else 'are'} yet to be read; then there is more to do"
-        )
+    if unread := len(wanted_names - known_names):
+        lines.append(f"Yet to be read: {unread} of {len(wanted_names)} recordings; more follows from what they hold.")
     return [*lines, f"To do: {to_do} of {len(survey)} tasks."]
 
 

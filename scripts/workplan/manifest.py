@@ -126,7 +126,7 @@ class Manifest:
             return None
         try:
             return Record.from_json(json.loads(self._text_of(name)))
-        except (*UNREADABLE, OSError):
+        except UNREADABLE:
             return None
 
     def add(self, name: str, record: Record) -> None:
@@ -151,7 +151,7 @@ class Manifest:
         records = list(self._records.glob("*.json")) if self._records.is_dir() else []
         if not (self._changed or records or self.failures) or not (self._lines or self.is_whole):
             return  # So a file of that name that is no manifest stays as it is, where nothing is to be said.
-        known = ((name, self._text_of(name)) for name in sorted(self._lines) if self.get(name))
+        known = ((name, text) for name in sorted(self._lines) if (text := self._text_of(name)).endswith("}"))
         _write(self._path, known, versions=self.versions, failures=self.failures, when_written=self.close)
         for record in records:
             record.unlink(missing_ok=True)
@@ -164,17 +164,19 @@ class Manifest:
             self._stream = None
 
     def _text_of(self, name: str) -> str:
-        """The record of a task as JSON. Raises OSError where its file has gone."""
+        """The record of a task as JSON; empty where it has gone."""
         offset = self._lines[name]
-        if offset == APART:
-            with self._place(name).open("rb") as stream:
-                stream.readline(LONGEST_LINE)
-                found = _record(stream.readline(LONGEST_LINE))
-        else:
-            if self._stream is None:
-                self._stream = self._path.open("rb")
-            self._stream.seek(offset)
-            found = _record(self._stream.readline(LONGEST_LINE))
+        try:
+            if offset == APART:
+                with self._place(name).open("rb") as stream:
+                    stream.readline(LONGEST_LINE)
+                    found = _record(stream.readline(LONGEST_LINE))
+            else:
+                self._stream = self._stream or self._path.open("rb")
+                self._stream.seek(offset)
+                found = _record(self._stream.readline(LONGEST_LINE))
+        except OSError:
+            return ""
         return found[1] if found else ""
 
     def _place(self, name: str) -> Path:
@@ -243,6 +245,6 @@ def _write(
     with replacing(path) as stream:
         stream.write(json.dumps({"schema": SCHEMA, **header})[:-1] + ', "tasks": {')
         for number, (name, line) in enumerate(records):
-            stream.write(f"{',' if number else ''}\n{json.dumps(name)}: {line or 'null'}")
+            stream.write(f"{',' if number else ''}\n{json.dumps(name)}: {line}")
         stream.write(f"\n{END.decode()}")
         when_written()  # Windows replaces no file that is open.

@@ -32,7 +32,7 @@ def require_free(plan: Plan, workspace: Workspace, outputs: Collection[str] = ()
     ----------
     plan : Plan
     workspace : Workspace
-        Opened. What was done since then is undone where this fails, as if it had failed before.
+        Opened. Where this fails in a folder that is new to the program, what was done since then is undone.
     outputs : collection of str
         More paths in the output folder that will be written.
     force : bool
@@ -51,7 +51,8 @@ def require_free(plan: Plan, workspace: Workspace, outputs: Collection[str] = ()
             written, them = ("was", "it") if len(strangers) == 1 else ("were", "them")
             raise OutputError(f"{some}{more} {written} not written by this program; {WAYS_OUT.format(them)}")
     except OutputError:
-        workspace.withdraw(tuple(workspace.done_here))
+        if not workspace.was_ours:
+            workspace.withdraw(tuple(workspace.done_here))
         raise
 
 

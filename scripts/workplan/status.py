@@ -187,15 +187,22 @@ def explain(survey: Mapping[str, Standing], plan: Plan) -> list[str]:
         if standing.reasons:
             alike = tuple(r if r.what in (INPUT, OPTIONS, PROGRAM) else r.what for r in standing.reasons)
             groups.setdefault((plan.tasks[name].function, *dict.fromkeys(alike)), []).append(name)
-    return [f"{_listed(names)}: {_why(names, survey)}" for names in groups.values()]
+    return [f"{_listed(_labels(names, plan))}: {_why(names, survey, plan)}" for names in groups.values()]
 
 
-def _why(names: Iterable[str], survey: Mapping[str, Standing]) -> str:
+def _why(names: Iterable[str], survey: Mapping[str, Standing], plan: Plan) -> str:
     """The reasons that some tasks have in common."""
     of: dict[str, dict[str, None]] = {}
     for reason in (reason for name in names for reason in survey[name].reasons):
-        of.setdefault(reason.what, {}).update({reason.of: None} if reason.of else {})
-    return "; ".join(f"{what} ({_listed(list(which))})" if which else what for what, which in of.items())
+        which = _labels([reason.of], plan) if reason.what == DEPENDS and reason.of else [reason.of]
+        of.setdefault(reason.what, {}).update(dict.fromkeys(filter(None, which)))
+    return "; ".join(f"{what} ({_listed(which)})" if which else what for what, which in of.items())
+
+
+def _labels(names: Iterable[str], plan: Plan) -> dict[str, None]:
+    """What people know tasks by: what is done, and of what."""
+    tasks = (plan.tasks[name] for name in names)
+    return dict.fromkeys(f"{task.function.rpartition(':')[2].replace('_', ' ')} {task.title}" for task in tasks)
 
 
 def _in_short(arguments: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -25,7 +25,7 @@ def two(text: str = "1", **fields: object) -> list[Task]:
 
 
 def test_what_was_never_done_has_no_output_yet_and_nothing_is_done_by_asking(tmp_path: Path) -> None:
-    assert explained(tmp_path / "out", *two()) == ["a: no output yet", "b: no output yet"]
+    assert explained(tmp_path / "out", *two()) == ["write a: no output yet", "join b: no output yet"]
     assert not (tmp_path / "out").exists()
 
 
@@ -37,8 +37,8 @@ def test_where_all_is_done_there_is_nothing_to_explain(tmp_path: Path) -> None:
 def test_a_changed_option_is_named_with_what_it_was(tmp_path: Path) -> None:
     run_in(tmp_path, *two("1"))
     assert explained(tmp_path, *two("2")) == [
-        'a: options changed (text: "1" -> "2")',
-        "b: what it reads is made anew (a)",
+        'write a: options changed (text: "1" -> "2")',
+        "join b: what it reads is made anew (write a)",
     ]
 
 
@@ -48,21 +48,21 @@ def test_a_changed_input_is_named(tmp_path: Path) -> None:
     source.write_text("1")
     run_in(tmp_path / "out", copied)
     source.write_text("2")
-    assert explained(tmp_path / "out", copied) == [f"a: input changed ({source})"]
+    assert explained(tmp_path / "out", copied) == [f"copy a: input changed ({source})"]
 
 
 def test_an_output_that_is_gone_or_changed_is_named(tmp_path: Path) -> None:
     run_in(tmp_path, *two())
     (tmp_path / "a.txt").write_text("other")
     (tmp_path / "b.txt").unlink()
-    assert explained(tmp_path, *two()) == ["a: output changed since (a.txt)", "b: output missing (b.txt)"]
+    assert explained(tmp_path, *two()) == ["write a: output changed since (a.txt)", "join b: output missing (b.txt)"]
 
 
 def test_a_changed_program_is_named_by_its_files(tmp_path: Path) -> None:
     run_in(tmp_path, *two(), versions={f"{STEPS}:write": {"writing.py": "1", "paper.py": "1"}})
     assert explained(tmp_path, *two(), versions={f"{STEPS}:write": {"writing.py": "2", "paper.py": "1"}}) == [
-        "a: the program changed (writing.py)",
-        "b: what it reads is made anew (a)",
+        "write a: the program changed (writing.py)",
+        "join b: what it reads is made anew (write a)",
     ]
 
 
@@ -76,12 +76,12 @@ def test_a_step_of_which_nothing_changed_is_not_done_again(tmp_path: Path) -> No
 
 def test_force_is_the_reason_where_there_is_no_other(tmp_path: Path) -> None:
     run_in(tmp_path, *two())
-    assert explained(tmp_path, *two(), force=True) == ["a: --force", "b: --force"]
+    assert explained(tmp_path, *two(), force=True) == ["write a: --force", "join b: --force"]
 
 
 def test_tasks_that_are_done_for_one_reason_are_in_one_line(tmp_path: Path) -> None:
     tasks = [task(f"{n}", text="1") for n in range(5)]
-    assert explained(tmp_path / "out", *tasks) == ["0, 1, 2 and 2 more: no output yet"]
+    assert explained(tmp_path / "out", *tasks) == ["write 0, write 1, write 2 and 2 more: no output yet"]
 
 
 @pytest.fixture
@@ -114,7 +114,7 @@ def test_a_report_after_a_failure_is_what_can_be_made_for_all_who_ask(
 
 def test_a_report_is_explained_by_what_may_come_to_be_there(failed: tuple[Path, list[Task]]) -> None:
     output, tasks = failed
-    assert explained(output, *tasks)[1:] == ["report: what it reads is made anew (a)"]
+    assert explained(output, *tasks)[1:] == ["join report: what it reads is made anew (copy a)"]
 
 
 def test_the_command_explains_too(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
@@ -122,7 +122,7 @@ def test_the_command_explains_too(tmp_path: Path, capsys: pytest.CaptureFixture)
     os.remove(tmp_path / "a.txt")
     capsys.readouterr()
     assert main(["list", "--explain", str(tmp_path)]) == 0
-    assert capsys.readouterr().out.splitlines() == ["a: output missing (a.txt)"]
+    assert capsys.readouterr().out.splitlines() == ["write a: output missing (a.txt)"]
 
 
 def test_temporary_outputs_that_are_gone_are_no_reason_where_nobody_wants_them(tmp_path: Path) -> None:
@@ -130,4 +130,7 @@ def test_temporary_outputs_that_are_gone_are_no_reason_where_nobody_wants_them(t
     assert states(run_in(tmp_path, *tasks)) == done("part", "whole")
     assert explained(tmp_path, *tasks) == []
     os.remove(tmp_path / "whole.txt")
-    assert explained(tmp_path, *tasks) == ["part: output missing (part.txt)", "whole: output missing (whole.txt)"]
+    assert explained(tmp_path, *tasks) == [
+        "write part: output missing (part.txt)",
+        "join whole: output missing (whole.txt)",
+    ]
