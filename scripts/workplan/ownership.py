@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
 from .hashing import FileState, is_regular
+from .manifest import Manifest
 from .plan import Plan
 from .workspace import Workspace
 
@@ -93,11 +94,20 @@ def require_same_inputs(plan: Plan, workspace: Workspace, *, force: bool = False
 
 
 def _require_no_inputs_inside(plan: Plan, workspace: Workspace) -> None:
-    """Raises OutputError for inputs among the files that the work plan keeps for itself."""
-    own = Path(os.path.realpath(workspace.own))
+    """Raises OutputError for inputs that the program has written itself, or that lie among what it keeps there."""
+    own, output = Path(os.path.realpath(workspace.own)), Path(os.path.realpath(workspace.output))
     for path in _inputs(plan):
-        if own in Path(os.path.realpath(path)).parents:
+        place = Path(os.path.realpath(path))
+        if own in place.parents:
             raise OutputError(f"{path}: this input lies in {workspace.own}, where the program works; move it elsewhere")
+        if output in place.parents and place.relative_to(output).as_posix() in _listed(workspace.manifest):
+            raise OutputError(f"{path}: this input was written by a run into this folder; choose another with --output")
+
+
+def _listed(manifest: Manifest) -> set[str]:
+    """All outputs that the program has written."""
+    records = (manifest.get(name) for name in manifest)
+    return {path for record in records if record for path in record.outputs}
 
 
 def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iterator[str]:
@@ -134,8 +144,7 @@ def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iter
         if path == "manifest.json" and manifest.is_whole:
             continue
         if listed is None:
-            records = (manifest.get(name) for name in manifest)
-            listed = {output for record in records if record for output in record.outputs}
+            listed = _listed(manifest)
         if path not in listed:
             yield path
 

@@ -82,12 +82,12 @@ def test_an_input_that_lies_where_the_keys_of_its_clip_go_is_refused(
 @pytest.mark.skipif(os.name == "nt", reason="links need permission on Windows")
 def test_an_input_that_leads_to_an_output_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
     (folder / "linked.csv").symlink_to(folder / "out" / "metrics.csv")
-    assert "linked.csv: this input lies where" in refused(capsys, "toss.csv", "linked.csv", "--output", "out")
+    assert "linked.csv: this input was written by" in refused(capsys, "toss.csv", "linked.csv", "--output", "out")
 
 
 def test_an_output_of_an_earlier_run_is_no_input_of_the_next(folder: Path, capsys: pytest.CaptureFixture) -> None:
     said = refused(capsys, "toss.csv", "out/toss/5/lerp_slerp.csv", "--output", "out")
-    assert "out/toss/5/lerp_slerp.csv: this input lies where" in said.replace(os.sep, "/")
+    assert "out/toss/5/lerp_slerp.csv: this input was written by a run into this folder" in said.replace(os.sep, "/")
 
 
 def test_an_input_where_the_program_keeps_its_own_files_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
