@@ -65,7 +65,7 @@ inputs:
 
 examples:
   python scripts/compare.py
-  python scripts/compare.py hand_left.csv hand_right.csv --axes unity
+  python scripts/compare.py hand_left.csv hand_right.csv --axes unity --output renders/hands
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
   python scripts/compare.py shot.blend:Camera --no-video
@@ -93,6 +93,11 @@ It writes OUTPUT/report.html (all of it in one file; of more than 24 clips each 
 folders), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv, and for every clip and choice of keys a folder
 (OUTPUT/CLIP/10, /budget-10, /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4
 and comparison.blend. The last line it prints is the path of the report.
+
+one folder, one comparison:
+  With the same recordings, more of them or fewer, a second run into a folder goes on. A folder that holds another
+  comparison is refused, and so are files that this program has not written where outputs go: choose another --output,
+  or replace them with --force. Inputs are never replaced. --explain says what a run would do and why, and does nothing.
 
 many clips:
   The work is done in small tasks, by as many processes as --jobs says. What is done is kept: stopped by Ctrl-C, a full
