@@ -9,12 +9,15 @@ from scripts.workplan import Executor, Outcome, Plan, ProcessExecutor, SerialExe
 
 STEPS = "tests.scripts.workplan.steps"
 
+FIELDS = ("inputs", "partial", "temporary", "title", "amount", "unit")
+"""Of a task, those that tests set."""
+
 EXECUTORS = {"serial": SerialExecutor, "processes": lambda: ProcessExecutor(2)}
 
 
 def task(name: str, function: str = "write", after: tuple[str, ...] = (), **fields: object) -> Task:
     """A task that makes the file of its name; what is no field of a task is an argument of its function."""
-    of_task = {key: fields.pop(key) for key in ("inputs", "partial", "temporary", "title") if key in fields}
+    of_task = {key: fields.pop(key) for key in FIELDS if key in fields}
     arguments = {"path": f"{name}.txt", **fields}
     return Task(name, f"{STEPS}:{function}", arguments, outputs=(f"{name}.txt",), after=after, **of_task)
 

@@ -151,3 +151,11 @@ def identify(job: Job, *, path: str) -> None:
 def parse(job: Job, *, path: str, part: str) -> None:
     """Write the values that another task has written as JSON."""
     job.writes(path).write_text(",".join(map(str, json.loads(job.reads(part).read_text()).values())))
+
+
+@step
+def count(job: Job, *, path: str, to: int) -> None:
+    """Say how far it is, one by one."""
+    for number in range(to):
+        job.progress(number + 1, to)
+    job.writes(path).write_text("counted")
