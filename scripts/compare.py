@@ -367,10 +367,10 @@ class _Run:
 
     def _say(self, outcome: Outcome, seconds: float) -> None:
         """What came of it, and last the path of the report."""
-        records = map(self.workspace.manifest.get, outcome.of(State.DONE))
-        done = [record for record in records if record]
-        work = sum(record.seconds for record in done)
-        rendering = sum(record.facts.get("rendering", 0.0) for record in done)
+        work = rendering = 0.0
+        for record in map(self.workspace.manifest.get, outcome.of(State.DONE)):
+            if record:
+                work, rendering = work + record.seconds, rendering + record.facts.get("rendering", 0.0)
         share = f", {rendering:.1f} s ({rendering / work:.0%}) of them Blender's rendering" if rendering else ""
         lines = [f"{seconds:.1f} s in all; {work:.1f} s of work{share}.", f"Tasks: {outcome}."]
         report = self.workspace.output / REPORT

@@ -91,8 +91,8 @@ def parse(arguments: list[str]) -> tuple[argparse.Namespace, argparse.Namespace]
     )
     own, rest = parser.parse_known_args(arguments)
     options = compare.parse(rest)
-    if options.scheduler or options.force:
-        parser.error("--scheduler and --force are for a run of compare.py itself; leave them out")
+    if options.scheduler or options.force or options.explain:
+        parser.error("--scheduler, --force and --explain are for a run of compare.py itself; leave them out")
     return own, options
 
 

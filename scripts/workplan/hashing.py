@@ -35,15 +35,15 @@ class FileState:
         """Every field, for `FileState(**fields)`."""
         return {"size": self.size, "mtime_ns": self.mtime_ns, "sha256": self.sha256}
 
-    def still(self, path: Path) -> bool:
+    def still(self, path: Path | str) -> bool:
         """Whether the file is there as it was. It is read again only where its time of change is another."""
         try:
-            now = path.stat()
+            now = os.stat(path)
             if now.st_size != self.size or not stat.S_ISREG(now.st_mode):
                 return False
         except (OSError, ValueError):
             return False
-        return now.st_mtime_ns == self.mtime_ns or self.is_content_of(path)
+        return now.st_mtime_ns == self.mtime_ns or self.is_content_of(Path(path))
 
     def is_content_of(self, path: Path) -> bool:
         """Whether the content of the file is what it was, which reads all of it."""

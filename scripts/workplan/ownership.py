@@ -119,9 +119,10 @@ def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iter
     inputs = {identity: path for path in _inputs(plan) for identity in _identities(path)}
     all_ours = workspace.was_ours and not manifest.is_whole
     listed: set[str] | None = None
+    asked, record = "", None
     makers = [(path, task.name) for task in plan.tasks.values() for path in task.outputs]
     for path, maker in [("manifest.json", ""), *((path, "") for path in outputs), *makers]:
-        place = workspace.output / path
+        place = f"{workspace.output}{os.sep}{path}"
         try:
             found = os.lstat(place)
         except FileNotFoundError:
@@ -138,7 +139,8 @@ def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iter
         if found is None or stat.S_ISDIR(found.st_mode):
             kind = "a folder where a file" if found else "a file where a folder"
             raise OutputError(f"{place}: there is {kind} goes; move it, or choose another folder with --output")
-        record = manifest.get(maker)
+        if maker != asked:
+            asked, record = maker, manifest.get(maker)
         if all_ours or (record and path in record.outputs) or (maker in manifest and record is None):
             continue
         if path == "manifest.json" and manifest.is_whole:

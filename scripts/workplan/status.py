@@ -173,11 +173,9 @@ class Status:
     def _damages(self, task: Task, record: Record) -> Iterator[Reason]:
         """The outputs that are not as they were made."""
         for path in task.outputs:
-            state = record.outputs.get(path)
-            if not os.path.lexists(self._output / path):
-                yield Reason(MISSING, path)
-            elif state is None or not state.still(self._output / path):
-                yield Reason(DAMAGED, path)
+            state, place = record.outputs.get(path), f"{self._output}{os.sep}{path}"
+            if state is None or not state.still(place):
+                yield Reason(DAMAGED if os.path.lexists(place) else MISSING, path)
 
 
 def explain(survey: Mapping[str, Standing], plan: Plan) -> list[str]:
