@@ -1,7 +1,7 @@
 """Set up everything that Rigid Motion needs in a folder of its own, then run a part of it. Needs Python and pip only.
 
     python scripts/bootstrap.py compare                     the main job, on the recordings in assets/
-    python scripts/bootstrap.py compare hand.csv --axes unity
+    python scripts/bootstrap.py compare hand.csv --axes unity --output renders/hand
     python scripts/bootstrap.py paper                       the paper's figures and its table, reproduced
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender

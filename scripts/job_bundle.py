@@ -25,7 +25,7 @@ if str(ROOT) not in sys.path:
 from scripts import compare
 from scripts.command_line import as_typed, own_arguments
 from scripts.comparison import steps
-from scripts.comparison.planning import comparison_tasks, look_into, reading_tasks
+from scripts.comparison.planning import comparison_tasks, look_into, plan_of, reading_tasks
 from scripts.comparison.stage.settings import MODELS, SubjectError, place_of_subject
 from scripts.comparison.version import program_version
 from scripts.files import write_text
@@ -91,8 +91,8 @@ def parse(arguments: list[str]) -> tuple[argparse.Namespace, argparse.Namespace]
     )
     own, rest = parser.parse_known_args(arguments)
     options = compare.parse(rest)
-    if options.scheduler or options.force:
-        parser.error("--scheduler and --force are for a run of compare.py itself; leave them out")
+    if options.scheduler or options.force or options.explain:
+        parser.error("--scheduler, --force and --explain are for a run of compare.py itself; leave them out")
     return own, options
 
 
@@ -171,7 +171,7 @@ def make_plan(options: argparse.Namespace, command: str) -> tuple[Plan | None, i
     ):
         unique = {task.name: task for task in reading}.values()
         read = run(
-            Plan(unique, version),
+            plan_of(unique, version),
             workspace,
             executor,
             progress=progress,
@@ -188,7 +188,7 @@ def make_plan(options: argparse.Namespace, command: str) -> tuple[Plan | None, i
         print("job_bundle.py: no clip is left to compare; see above", file=sys.stderr)
         return None, len(read.failures)
     tasks = comparison_tasks(found.studies, there, compare.wanted(options, command))
-    return Plan(tasks, version), len(read.failures)
+    return plan_of(tasks, version), len(read.failures)
 
 
 # -- the bundle -------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from . import twists
 from .modes import MODES, interpolate
 from .poses import Poses
 from .quaternions import align_signs, conjugate, multiply, normalise, rotate
+from .reduction import check_radius, check_recording
 
 STEP = 1e-5
 """Of differences that stand for derivatives: in radians, and as a part of the radius."""
@@ -51,7 +52,8 @@ def fit_keys(
     Raises
     ------
     ValueError
-        For an unknown mode, a radius that is not above zero, and what `interpolate` cannot take.
+        For an unknown mode, a radius that is not above zero, keys that are not rising samples or fewer than two, and
+        samples that are not finite, out of order or of no size.
 
     Notes
     -----
@@ -60,14 +62,28 @@ def fit_keys(
     """
     if mode not in MODES:
         raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
-    if not radius > 0.0:
+    check_radius(radius)
+    if radius == 0.0:
         raise ValueError(f"a radius of {radius} is not above zero: turns would not count")
+    times, keys = np.asarray(times, dtype=np.float64), np.asarray(keys)
+    check_recording(times, poses)
+    _check_keys(keys, len(times))
     fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)
     apart = MODES[mode].behind + MODES[mode].ahead + 2
     for _ in range(SWEEPS):
         for first in range(min(apart, len(keys))):
             fitting.improve(np.arange(first, len(keys), apart))
     return fitting.fitted
+
+
+def _check_keys(keys: np.ndarray, samples: int) -> None:
+    """A ValueError that says what is wrong with the keys, shape (k,)."""
+    if keys.ndim != 1 or not np.issubdtype(keys.dtype, np.integer):
+        raise ValueError(f"keys of shape {keys.shape} and type {keys.dtype}: give the numbers of samples in a row")
+    if len(keys) < 2:
+        raise ValueError(f"{len(keys)} keys are too few: a motion begins and ends with one")
+    if keys[0] < 0 or keys[-1] >= samples or np.any(np.diff(keys) <= 0):
+        raise ValueError(f"the keys are not rising numbers of samples, from 0 to {samples - 1}")
 
 
 class _Fitting:

@@ -5,6 +5,8 @@ A key is a pose: all channels together. What is promised of them, and checked; `
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import numpy as np
 
 from .key_search import Recording, Search
@@ -38,7 +40,7 @@ def reduce_keys(
         The largest shell error anywhere, in the unit of the positions; with `rms` the root mean square over all
         samples.
     radius : float
-        Of the shell, in the unit of the positions.
+        Of the shell, in the unit of the positions; not below zero.
     budget : int, optional
         The most keys, at least 2, instead of a tolerance: the error is then as small as can be found.
     rms : bool
@@ -56,10 +58,11 @@ def reduce_keys(
     Raises
     ------
     ValueError
-        Where it is not one of tolerance and budget that is given, or either is no sensible number, or a sample is not
-        finite, out of order or of no size.
+        Where it is not one of tolerance and budget that is given, or either or the radius is no sensible number, or a
+        sample is not finite, out of order or of no size.
     """
     check_wishes(mode, tolerance, budget)
+    check_radius(radius)
     times = np.asarray(times, dtype=np.float64)
     check_recording(times, poses)
     if len(times) <= 2:
@@ -77,8 +80,16 @@ def check_wishes(mode: str, tolerance: float | None, budget: int | None) -> None
         raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
     if tolerance is not None and not 1.0 / LIMIT < float(tolerance) < LIMIT:
         raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
+    if budget is not None and (isinstance(budget, bool) or not isinstance(budget, Integral)):
+        raise ValueError(f"a budget of {budget} is no whole number of keys")
     if budget is not None and budget < 2:
         raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")
+
+
+def check_radius(radius: float) -> None:
+    """A ValueError where the shell's radius is no length: without turns it is zero."""
+    if not 0.0 <= radius < LIMIT:
+        raise ValueError(f"a radius of {radius} is not a number from 0 to {LIMIT:g}")
 
 
 def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:

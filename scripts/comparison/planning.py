@@ -20,7 +20,7 @@ import numpy as np
 from scripts.trajectories import ReadingOptions, TrajectoryError
 from scripts.trajectories.options import AS_THE_FILE_SAYS
 from scripts.trajectories.reading import split_source
-from scripts.workplan import Task
+from scripts.workplan import Plan, Task
 
 from . import steps
 from .report.pages import ON_ONE_PAGE, Settings
@@ -30,6 +30,7 @@ from .study.choices import Choice, choice_parts, fewest_keys
 from .study.metrics import table_names
 from .study.reading import folder_names
 from .study.storage import ClipReference, file_names, read_facts, read_times
+from .version import step_versions
 
 MODULE = steps.__name__
 
@@ -106,6 +107,11 @@ class Study:
 
 
 # -- reading ----------------------------------------------------------------------------------------------------------
+
+
+def plan_of(tasks: Sequence[Task], version: str) -> Plan:
+    """The plan of some tasks, of which each is done again where what its step uses has changed."""
+    return Plan(tasks, version, versions=step_versions(task.function for task in tasks))
 
 
 def reading_tasks(sources: Iterable[str], axes: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Task]:
@@ -293,6 +299,8 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
                 title=title,
                 weight=seconds_a_frame * (last - first + 1),
                 temporary=True,
+                amount=last - first + 1,
+                unit="frame",
             )
         yield Task(
             name=steps.filming(clip, choice),

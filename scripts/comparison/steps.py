@@ -1,30 +1,26 @@
 """The steps of a comparison: what the tasks of its plan (`planning`) do, each from files to files.
 
 What passes between tasks lies in `PARTS` of the output folder: recordings (`storage`), results (`results`), charts.
+Every step imports what it alone needs, so that it is done again where that changes, and not where another step's does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scripts.files import write_text
-from scripts.trajectories import ReadingOptions, TrajectoryError
 from scripts.workplan import Job, TaskError, step
 
-from .report.clip_section import Films
-from .report.error_charts import errors_over_time
-from .report.pages import Settings, write_clip_page, write_overview, write_report
-from .study import needed
 from .study.choices import Choice, choice_from
-from .study.metrics import Metrics, write_metrics, write_reconstruction
-from .study.modes import single_modes
-from .study.reading import read_source
-from .study.reconstructions import reconstruct
-from .study.results import ClipResults, Result, read_result, write_result
 from .study.storage import ClipReference, file_names, read_clip, read_keys, write_keys, write_recording
-from .version import program_version
+
+if TYPE_CHECKING:
+    from .report.clip_section import Films
+    from .study.metrics import Metrics
+    from .study.needed import KeysNeeded
+    from .study.results import ClipResults
 
 PARTS = ".parts"
 
@@ -103,6 +99,8 @@ def page_of(clip: str) -> str:
 @step
 def identify(job: Job, *, path: str) -> None:
     """Write which version of the program this is."""
+    from .version import program_version
+
     write_text(job.writes(path), program_version())
 
 
@@ -112,6 +110,10 @@ def identify(job: Job, *, path: str) -> None:
 @step
 def read(job: Job, *, source: str, axes: str, options: Mapping[str, Any], recording: str) -> None:
     """Read a source, and repair its clips."""
+    from scripts.trajectories import ReadingOptions, TrajectoryError
+
+    from .study.reading import read_source
+
     try:
         clips, note = read_source(source, axes, ReadingOptions(**options))
     except TrajectoryError as error:
@@ -123,6 +125,11 @@ def read(job: Job, *, source: str, axes: str, options: Mapping[str, Any], record
 @step
 def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: Sequence[str], radius: float) -> None:
     """Choose keys of a clip, let the modes fill them in, and measure what was lost."""
+    from .report.error_charts import errors_over_time
+    from .study.metrics import write_reconstruction
+    from .study.reconstructions import reconstruct
+    from .study.results import Result, write_result
+
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = reconstruct(whole, chosen, modes, radius)
     if made is None:
@@ -137,6 +144,9 @@ def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: 
 @step
 def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radius: float, fit: bool) -> None:
     """Find how many keys every mode needs on a clip."""
+    from .study import needed
+    from .study.modes import single_modes
+
     whole = read_clip(job.output, ClipReference(**clip))
     found = needed.keys_needed(whole, single_modes(modes), radius, fit=fit, advance=_counted(job, needed.RATES))
     write_text(job.writes(needed_of(whole.name)), needed.to_json(found))
@@ -145,6 +155,8 @@ def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radiu
 @step
 def tabulate(job: Job, *, studies: Sequence[Any]) -> None:
     """Write the tables of all clips."""
+    from .study.metrics import write_metrics
+
     advance = _counted(job, studies)
 
     def rows() -> Iterator[Metrics]:
@@ -159,8 +171,10 @@ def tabulate(job: Job, *, studies: Sequence[Any]) -> None:
 @step
 def tabulate_keys(job: Job, *, studies: Sequence[Any]) -> None:
     """Write the table of the keys that all clips need."""
+    from .study.needed import write_keys_needed
+
     found = [clip.needed for clip in Clips(job, studies) if clip.needed]
-    needed.write_keys_needed(job.writes(KEYS_NEEDED), found)
+    write_keys_needed(job.writes(KEYS_NEEDED), found)
 
 
 # -- films ------------------------------------------------------------------------------------------------------------
@@ -192,7 +206,7 @@ def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int)
     blend = job.reads(blend_of(clip, chosen))
     path = job.writes(piece_of(clip, chosen, first))
     try:
-        seconds = render_piece(blend, first, last, path, lambda done, of: job.progress(done, of, f"{done}/{of}"))
+        seconds = render_piece(blend, first, last, path, job.progress)
     except RuntimeError as error:
         raise TaskError(f"{clip} {chosen.phrase}: no video: {error}") from None
     return {"rendering": seconds}
@@ -232,6 +246,8 @@ class Clips:
         self._studies = [(clip, [choice_from(*choice) for choice in choices]) for clip, choices in studies]
 
     def __iter__(self) -> Iterator[ClipResults]:
+        from .study.results import ClipResults, read_result
+
         for clip, choices in self._studies:
             read = [
                 read_result(*map(self._job.reads, result_of(clip, choice)))
@@ -259,7 +275,9 @@ class Clips:
         names = [clip for clip, _ in self._studies]
         return {clip: page_of(clip) if paging(clip) in self._job.finished else None for clip in names}
 
-    def _needed(self, clip: str) -> needed.KeysNeeded | None:
+    def _needed(self, clip: str) -> KeysNeeded | None:
+        from .study import needed
+
         if counting(clip) not in self._job.finished:
             return None
         return needed.from_json(self._job.reads(needed_of(clip)).read_text(encoding="utf-8"))
@@ -270,6 +288,8 @@ def report(
     job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], filmed: Sequence[Any], coming: bool
 ) -> None:
     """Write the report of a few clips on one page."""
+    from .report.pages import Settings, write_report
+
     clips = Clips(job, studies)
     films = clips.films(filmed, coming=coming)
     path = job.writes(REPORT)
@@ -283,6 +303,8 @@ def clip_page(
     job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any], filmed: Sequence[Any], coming: bool
 ) -> None:
     """Write the page of a clip, the only one of these studies."""
+    from .report.pages import Settings, write_clip_page
+
     clips = Clips(job, studies)
     (clip,) = clips
     path = page_of(clip.facts.name)
@@ -299,6 +321,8 @@ def clip_page(
 @step
 def overview(job: Job, *, studies: Sequence[Any], settings: Mapping[str, Any]) -> None:
     """Write the page of many clips."""
+    from .report.pages import Settings, write_overview
+
     clips = Clips(job, studies)
     write_overview(
         job.writes(REPORT),

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
 from scripts.workplan import code_version
+from scripts.workplan.sources import KEPT, SourceReader
 
 SOURCES = (
     *("blender_manifest.toml", "addon/motion", "addon/animation"),
@@ -17,9 +20,29 @@ SOURCES = (
 """Of this program: see `workplan.code_version`."""
 
 
+READER = SourceReader(KEPT)
+
+
 def program_version() -> str:
-    """The same wherever the same results come out. Raises ImportError where there is no Blender."""
+    """What all who work at one plan must have. Raises ImportError where there is no Blender."""
     return f"Blender {blender_version()}, NumPy {np.__version__}, program {code_version(*SOURCES)[:12]}"
+
+
+def step_versions(functions: Iterable[str]) -> dict[str, dict[str, str]]:
+    """What each of some steps uses, and its version: files of this program, and Blender and NumPy where it loads them.
+
+    Steps are named as tasks name them. Raises ImportError where there is no Blender.
+    """
+    found = {function: _step_version(function) for function in dict.fromkeys(functions)}
+    READER.keep()
+    return found
+
+
+@cache
+def _step_version(function: str) -> dict[str, str]:
+    packages = READER.sources_of(function).packages
+    used = {"NumPy": np.__version__} | ({"Blender": blender_version()} if "bpy" in packages else {})
+    return used | READER.versions_of(function)
 
 
 def blender_version() -> str:

@@ -22,7 +22,8 @@ from .lock import FolderInUse
 from .manifest import ManifestError
 from .performing import Failed, Message, Noted, Order, Told, perform
 from .plan import Plan, PlanError
-from .running import Keys, order_for
+from .running import order_for
+from .status import Status, explain
 from .workspace import Workspace
 
 
@@ -40,6 +41,7 @@ def main(arguments: list[str]) -> int:
         command.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
         command.add_argument("--plan", type=Path, metavar="FILE", help="the plan (that in the output folder)")
         command.add_argument("--inputs", type=Path, metavar="FOLDER", help="where its relative inputs are (as planned)")
+    listing.add_argument("--explain", action="store_true", help="say instead what is to do, and why")
     running.add_argument("task", metavar="TASK", help="its name, as list prints it")
     running.add_argument(
         "--openjd",
@@ -62,30 +64,31 @@ def main(arguments: list[str]) -> int:
             with Workspace(output, shared=True, only=_concerned(plan, options.task)) as workspace:
                 return _run(plan, workspace, options.task, openjd=options.openjd)
         with Workspace(output, shared=options.command == "list") as workspace:
-            return _list(plan, workspace) if options.command == "list" else _finish(plan, workspace)
+            return (
+                _list(plan, workspace, why=options.explain) if options.command == "list" else _finish(plan, workspace)
+            )
     except (PlanError, ManifestError, FolderInUse) as error:
         return _cannot(error)
     except OSError as error:
         return _cannot(f"{error.filename or output}: {error.strerror or error}")
+    except ValueError as error:  # A path that no file can have.
+        return _cannot(f"{plan_path}: {error}; run the program that plans once more")
 
 
 def _run(plan: Plan, workspace: Workspace, name: str, *, openjd: bool) -> int:
     """Do one task, in this process."""
-    task, keys, there = plan.tasks[name], Keys(plan), []
-    for before in _all_before(plan, name):
-        if _is_there(before, keys, plan, workspace):
-            there.append(before)
-    finished = [before for before in task.after if before in there]
-    key = keys.with_those(name, finished if task.partial else task.after)
-    record = workspace.manifest.tasks.get(name)
-    if (record and record.holds(key, workspace.output)) or _is_spent(name, keys, plan, workspace):
+    task, status = plan.tasks[name], Status(plan, workspace.manifest, workspace.output)
+    standing = status.survey(_concerned(plan, name))
+    if standing[name].there:
         print(f"{task.title}: up to date", flush=True)
         return 0
-    missing = [before for before in task.after if before not in there]
+    finished = [before for before in task.after if standing[before].there]
+    missing = [before for before in task.after if before not in finished]
     if missing and not (task.partial and finished):
         code = _cannot(f"{name}: first do {', '.join(map(repr, missing))}")
         return 0 if openjd else code
-    order = order_for(task, keys.seen(name), finished, workspace)
+    record, key = workspace.manifest.get(name), status.key(name)
+    order = order_for(task, status.seen(name), finished, workspace)
     done = perform(order, _tell_openjd if openjd else _tell)
     if isinstance(done, Failed):
         print(f"{task.title}: {done.message}\n{done.details}".rstrip(), file=sys.stderr, flush=True)
@@ -95,29 +98,31 @@ def _run(plan: Plan, workspace: Workspace, name: str, *, openjd: bool) -> int:
             # What is there under its name was made of something else.
             workspace.discard(task.outputs)
         return 0 if openjd and not (done.details or done.hopeless) else 1
-    workspace.put_in_place(order, key, done)
+    workspace.put_in_place(order, key, done, status.made_of(name))
     print(f"{task.title}: done in {done.seconds:.1f} s", flush=True)
     return 0
 
 
-def _list(plan: Plan, workspace: Workspace) -> int:
-    for name, done in _states(plan, workspace).items():
-        print(f"{'done' if done else 'to do':6}{name}")
+def _list(plan: Plan, workspace: Workspace, *, why: bool) -> int:
+    survey = Status(plan, workspace.manifest, workspace.output).survey()
+    for line in explain(survey, plan) if why else ():
+        print(line)
+    for name, standing in survey.items() if not why else ():
+        print(f"{'done' if standing.there else 'to do':6}{name}")
     return 0
 
 
 def _finish(plan: Plan, workspace: Workspace) -> int:
     """Delete what was only made for other tasks, and name the tasks that are not done."""
-    states = _states(plan, workspace)
+    survey = Status(plan, workspace.manifest, workspace.output).survey()
     for name, task in plan.tasks.items():
-        if task.temporary and all(states[reader] for reader in plan.readers[name]):
+        if task.temporary and all(survey[reader].there for reader in plan.readers[name]):
             workspace.discard(task.outputs)
-    for name in plan.order:
-        if not states[name]:
-            print(f"not done: {name}", file=sys.stderr)
-    done = sum(states.values())
-    print(f"Tasks: {done} done, {len(states) - done} not done.", flush=True)
-    return 0 if done == len(states) else 1
+    missing = [name for name, standing in survey.items() if not standing.there]
+    for name in missing:
+        print(f"not done: {name}", file=sys.stderr)
+    print(f"Tasks: {len(survey) - len(missing)} done, {len(missing)} not done.", flush=True)
+    return 1 if missing else 0
 
 
 def _check(plan: Plan, function: str) -> int:
@@ -130,19 +135,6 @@ def _check(plan: Plan, function: str) -> int:
     if version != plan.version:
         return _cannot(f"this is {version}, and the plan was made by {plan.version}; bring both to the same version")
     return 0
-
-
-def _states(plan: Plan, workspace: Workspace) -> dict[str, bool]:
-    """Whether there is nothing to do any more for each task."""
-    keys = Keys(plan)
-    there = {name: _is_there(name, keys, plan, workspace) for name in plan.order}
-    return {name: there[name] or _is_spent(name, keys, plan, workspace) for name in plan.order}
-
-
-def _is_spent(name: str, keys: Keys, plan: Plan, workspace: Workspace) -> bool:
-    """Whether a task is temporary, and those that its outputs were for are done."""
-    readers = plan.readers[name]
-    return plan.tasks[name].temporary and all(_is_there(reader, keys, plan, workspace) for reader in readers)
 
 
 def _concerned(plan: Plan, name: str) -> set[str]:
@@ -159,13 +151,6 @@ def _all_before(plan: Plan, name: str) -> list[str]:
             found.add(before)
             waiting += plan.tasks[before].after
     return [before for before in plan.order if before in found]
-
-
-def _is_there(name: str, keys: Keys, plan: Plan, workspace: Workspace) -> bool:
-    """To be asked in the order of the plan: a partial task counts with those before it that are there."""
-    records = workspace.manifest.tasks
-    there = [before for before in plan.tasks[name].after if not plan.tasks[name].partial or before in records]
-    return name in records and records[name].holds(keys.with_those(name, there), workspace.output)
 
 
 def _tell(message: Message) -> None:

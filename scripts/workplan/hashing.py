@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
+import os
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,23 +25,40 @@ class FileState:
 
     @classmethod
     def of(cls, path: Path) -> FileState:
-        """Read a file. Raises OSError where there is none."""
+        """Read a file. Raises OSError where there is none, or what is there never ends: a pipe, a device."""
         before = path.stat()
+        if not stat.S_ISREG(before.st_mode):
+            raise OSError(errno.EINVAL, "this is no file", os.fspath(path))
         return cls(before.st_size, before.st_mtime_ns, file_digest(path))
 
     def as_json(self) -> dict[str, int | str]:
         """Every field, for `FileState(**fields)`."""
         return {"size": self.size, "mtime_ns": self.mtime_ns, "sha256": self.sha256}
 
-    def still(self, path: Path) -> bool:
+    def still(self, path: Path | str) -> bool:
         """Whether the file is there as it was. It is read again only where its time of change is another."""
         try:
-            now = path.stat()
-            if now.st_size != self.size:
+            now = os.stat(path)
+            if now.st_size != self.size or not stat.S_ISREG(now.st_mode):
                 return False
-            return now.st_mtime_ns == self.mtime_ns or file_digest(path) == self.sha256
+        except (OSError, ValueError):
+            return False
+        return now.st_mtime_ns == self.mtime_ns or self.is_content_of(Path(path))
+
+    def is_content_of(self, path: Path) -> bool:
+        """Whether the content of the file is what it was, which reads all of it."""
+        try:
+            return is_regular(path) and file_digest(path) == self.sha256
         except OSError:
             return False
+
+
+def is_regular(path: Path) -> bool:
+    """Whether a path is that of a file with an end: no pipe, no device, no folder. Any text may be asked about."""
+    try:
+        return stat.S_ISREG(path.stat().st_mode)
+    except (OSError, ValueError):
+        return False
 
 
 def file_digest(path: Path) -> str:
@@ -58,7 +78,7 @@ def task_key(task: Task, inputs: Mapping[str, str | None], before: Mapping[str, 
     before : mapping
         The tasks that it reads from, those that are done, to their keys.
     version : str
-        Of the program.
+        Of what the function uses.
     """
     content = {
         "function": task.function,
@@ -68,7 +88,17 @@ def task_key(task: Task, inputs: Mapping[str, str | None], before: Mapping[str, 
         "before": before,
         "version": version,
     }
-    return hashlib.sha256(_canonical(content).encode("ascii")).hexdigest()
+    return digest_of(_canonical(content))
+
+
+def digest_of(text: str) -> str:
+    """Of text."""
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def version_from(parts: Mapping[str, str]) -> str:
+    """The version of what has these parts, each with a version of its own."""
+    return digest_of(_canonical(dict(parts)))
 
 
 def code_version(*paths: str) -> str:

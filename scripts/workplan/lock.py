@@ -46,15 +46,15 @@ class FolderLock:
     """
 
     def __init__(self, path: Path, folder: Path, *, shared: bool = False) -> None:
-        self._path, self._folder, self._shared = path, folder, shared
+        self.path, self._folder, self._shared = path, folder, shared
         self._file: int | None = None
 
     def __enter__(self) -> Self:
         while self._file is None:
             # Who had the folder before may be taking it away.
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.parent.mkdir(parents=True, exist_ok=True)
             try:
-                opened = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+                opened = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             except FileNotFoundError:
                 continue
             try:
@@ -66,7 +66,7 @@ class FolderLock:
                     f"{self._folder}: another run is at work in this folder{holder}; wait for it, or choose another"
                 ) from None
             # Who had it before may have taken the file away with it; then another one lies there now, or none.
-            if _same_file(opened, self._path):
+            if _same_file(opened, self.path):
                 self._file = opened
             else:
                 os.close(opened)
@@ -79,11 +79,11 @@ class FolderLock:
             return
         last = not self._shared or self._is_alone(self._file)
         if last and sys.platform != "win32":
-            self._path.unlink(missing_ok=True)
+            self.path.unlink(missing_ok=True)
         os.close(self._file)
         if last and sys.platform == "win32":
             with suppress(PermissionError):  # Somebody else has it open.
-                self._path.unlink(missing_ok=True)
+                self.path.unlink(missing_ok=True)
         self._file = None
 
     @staticmethod
@@ -101,9 +101,9 @@ class FolderLock:
 
     def _holder(self) -> str:
         try:
-            holder = json.loads(self._path.read_text(encoding="utf-8"))
+            holder = json.loads(self.path.read_text(encoding="utf-8"))
             return f" (process {holder['process']} on {holder['host']}, since {holder['since']})"
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return ""
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .hashing import FileState
+from .hashing import FileState, is_regular
 from .tasks import Job, TaskError, find_step, places_of
 
 FULL_OR_FORBIDDEN = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS})
@@ -138,6 +138,7 @@ def perform(order: Order, tell: Callable[[Told | Noted], object]) -> Made | Fail
     started = time.perf_counter()
     done: Made | Failed | None = None
     try:
+        _check_files(order)
         scratch.mkdir(parents=True, exist_ok=True)
         facts = find_step(order.function)(job, **order.arguments)
         _check_inputs(order)
@@ -164,9 +165,16 @@ def seen(path: Path) -> tuple[int, int] | None:
     """Size and time of change of an input, None where it is missing."""
     try:
         status = path.stat()
-    except OSError:
+    except (OSError, ValueError):
         return None
     return status.st_size, status.st_mtime_ns
+
+
+def _check_files(order: Order) -> None:
+    """Nothing is read that never ends, or can be read only once."""
+    for path in order.inputs:
+        if seen(Path(path)) and not is_regular(Path(path)):
+            raise TaskError(f"{path}: this is no file, but a folder, pipe or device; give a file")
 
 
 def _check_inputs(order: Order) -> None:

@@ -12,8 +12,9 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import accumulate
 from pathlib import Path
 
-from scripts.files import write_text
+from scripts.files import replacing
 
+from .hashing import is_regular, version_from
 from .tasks import FUNCTION, Task
 
 SCHEMA = 1
@@ -34,7 +35,10 @@ class Plan:
     tasks : iterable of Task
         In the order in which they are wanted; tasks that others read are done before these.
     version : str
-        Of the program: where it changes, everything is done again (see `code_version`).
+        Of the program: whoever does a task must have the same. Where it changes, everything is done again (see
+        `code_version`), but for the steps of which more is known:
+    versions : mapping, optional
+        A step, as tasks name it, to what it uses, and the version of each: where these change, it is done again.
     folder : Path, optional
         Where relative inputs count from; the current one unless given.
 
@@ -45,9 +49,17 @@ class Plan:
         that do not exist, or for one another.
     """
 
-    def __init__(self, tasks: Iterable[Task], version: str, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        tasks: Iterable[Task],
+        version: str,
+        folder: Path | None = None,
+        *,
+        versions: Mapping[str, Mapping[str, str]] | None = None,
+    ) -> None:
         listed = list(tasks)
-        self.version = version
+        self.version, self.versions = version, dict(versions or {})
+        self._version_of = {function: version_from(parts) for function, parts in self.versions.items()}
         self.folder = Path.cwd() if folder is None else folder
         self.tasks: Mapping[str, Task] = {task.name: task for task in listed}
         _check_names(listed, self.tasks)
@@ -56,11 +68,28 @@ class Plan:
         self.readers: Mapping[str, tuple[str, ...]] = _readers(self.tasks)
         """Task to the tasks that read its outputs."""
 
+        self.late: frozenset[str] = _late(self.tasks, self.order)
+        """Partial tasks and those after them: whether there is anything to do shows when the others are through."""
+
+    def version_of(self, function: str) -> str:
+        """The version of a step."""
+        return self._version_of.get(function, self.version)
+
+    def parts_of(self, function: str) -> Mapping[str, str]:
+        """What a step uses, and the version of each; nothing where that is not known."""
+        return self.versions.get(function, {})
+
     def write(self, path: Path) -> None:
-        """Write the plan as JSON."""
-        tasks = [self.tasks[name].as_json() for name in self.order]
-        content = {"schema": SCHEMA, "version": self.version, "folder": os.fspath(self.folder), "tasks": tasks}
-        write_text(path, json.dumps(content, indent=1) + "\n")
+        """Write the plan as JSON, a line for each task."""
+        header = {"schema": SCHEMA, "version": self.version, "versions": self.versions}
+        header["folder"] = os.fspath(self.folder)
+        if path.is_symlink():
+            path.unlink()  # Whoever put it there, what it leads to is not ours.
+        with replacing(path) as stream:
+            stream.write(json.dumps(header)[:-1] + ', "tasks": [')
+            for number, name in enumerate(self.order):
+                stream.write(f"{',' if number else ''}\n{json.dumps(self.tasks[name].as_json())}")
+            stream.write("\n]}\n")
 
     @classmethod
     def read(cls, path: Path, folder: Path | None = None) -> Plan:
@@ -79,15 +108,18 @@ class Plan:
         OSError
             Where it cannot be read.
         """
+        if path.exists() and not is_regular(path):
+            raise PlanError(f"{path}: this is no file; take it away, and run the program that plans once more")
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
             if content["schema"] != SCHEMA:
                 raise PlanError(f"{path}: a plan of schema {content['schema']}; this program knows {SCHEMA}")
             tasks = (Task(**fields) for fields in content["tasks"])
-            return cls(tasks, content["version"], folder or Path(content["folder"]))
+            versions = content.get("versions")
+            return cls(tasks, content["version"], folder or Path(content["folder"]), versions=versions)
         except PlanError:
             raise
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise PlanError(f"{path}: this is not a plan ({error}); run the program that plans once more") from None
 
 
@@ -99,6 +131,8 @@ def _check_names(listed: list[Task], tasks: Mapping[str, Task]) -> None:
             raise PlanError(f"task {task.name!r}: there are two of that name")
         if not FUNCTION.fullmatch(task.function):
             raise PlanError(f"task {task.name!r}: {task.function!r} is no function; write package.module:function")
+        if not (isinstance(task.arguments, dict) and isinstance(task.weight, int | float) and task.weight >= 0.0):
+            raise PlanError(f"task {task.name!r}: arguments have names, and a weight is a number from 0")
         if not task.outputs:
             raise PlanError(f"task {task.name!r}: it makes nothing; name at least one output")
         for before in task.after:
@@ -157,3 +191,11 @@ def _readers(tasks: Mapping[str, Task]) -> dict[str, tuple[str, ...]]:
         for before in dict.fromkeys(task.after):
             readers[before].append(name)
     return {name: tuple(some) for name, some in readers.items()}
+
+
+def _late(tasks: Mapping[str, Task], order: Iterable[str]) -> frozenset[str]:
+    late: set[str] = set()
+    for name in order:
+        if tasks[name].partial or not late.isdisjoint(tasks[name].after):
+            late.add(name)
+    return frozenset(late)

@@ -19,9 +19,10 @@ from typing import Any
 from scripts.progress import Progress, Stage
 
 from .executors import Executor
-from .hashing import FileState, task_key
-from .performing import FULL_OR_FORBIDDEN, Failed, Lost, Made, Message, Noted, Order, Told, perform, seen
+from .manifest import Record
+from .performing import FULL_OR_FORBIDDEN, Failed, Lost, Made, Message, Noted, Order, Told, perform
 from .plan import Plan
+from .status import Status
 from .tasks import Task
 from .workspace import Workspace
 
@@ -134,47 +135,13 @@ def run(
                 describe=describe,
             )
     plan.write(workspace.plan_path)
-    return _Run(plan, workspace, executor, force, retries, progress, describe).run(title)
-
-
-class Keys:
-    """The keys of a plan's tasks, and what their inputs are."""
-
-    def __init__(self, plan: Plan) -> None:
-        self._plan = plan
-        self._inputs: dict[str, tuple[tuple[int, int] | None, str | None]] = {}
-        self._keys: dict[str, str] = {}
-
-    def of(self, name: str) -> str:
-        """The key of a task that is not partial, nor after one that is."""
-        return self.with_those(name, self._plan.tasks[name].after)
-
-    def with_those(self, name: str, there: Iterable[str]) -> str:
-        """The key of a task, of whose predecessors these are there."""
-        if name not in self._keys:
-            task = self._plan.tasks[name]
-            inputs = {path: self._digest(path) for path in task.inputs}
-            before = {one: self._keys[one] if one in self._keys else self.of(one) for one in there}
-            self._keys[name] = task_key(task, inputs, before, self._plan.version)
-        return self._keys[name]
-
-    def known(self, name: str) -> str:
-        """The key of a task that was asked for before."""
-        return self._keys[name]
-
-    def seen(self, name: str) -> dict[str, tuple[int, int] | None]:
-        """The absolute paths of a task's inputs, and what was seen of them when the key was made."""
-        return {os.fspath(self._plan.folder / path): self._inputs[path][0] for path in self._plan.tasks[name].inputs}
-
-    def _digest(self, path: str) -> str | None:
-        if path not in self._inputs:
-            place = self._plan.folder / path
-            try:
-                state = FileState.of(place)
-                self._inputs[path] = (state.size, state.mtime_ns), state.sha256
-            except OSError:
-                self._inputs[path] = seen(place), None
-        return self._inputs[path][1]
+    workspace.manifest.versions |= {plan.version_of(function): parts for function, parts in plan.versions.items()}
+    for mends in (True, False):
+        attempt = _Run(plan, workspace, executor, force, retries, progress, describe, mends)
+        outcome = attempt.run(title)
+        if not attempt.damaged or outcome.interrupted or outcome.problem:
+            break
+    return outcome
 
 
 def order_for(
@@ -213,14 +180,16 @@ class _Run:
         retries: int,
         progress: Progress,
         describe: Callable[[str], str],
+        mends: bool,
     ) -> None:
         self.plan, self.workspace, self.executor = plan, workspace, executor
         self.force, self.retries = force, retries
         self.progress, self.describe = progress, describe
         self.outcome = Outcome()
-        self.keys = Keys(plan)
-        self.late = self._find_late()
-        self.wanted = self.late | self._find_wanted()
+        self.status = Status(plan, workspace.manifest, workspace.output, force=force, done_here=workspace.done_here)
+        self.wanted = plan.late | {name for name, standing in self.status.survey().items() if standing.reasons}
+        self.mends, self.damaged = mends, False
+        """Whether what turns out to be damaged will be made again, and whether anything did."""
         self.places = {name: place for place, name in enumerate(plan.order)}
         self.open_before = {name: len(set(task.after)) for name, task in plan.tasks.items()}
         self.ready = [place for name, place in self.places.items() if not self.open_before[name]]
@@ -228,33 +197,11 @@ class _Run:
         self.shares: dict[str, float] = {}
         self.losses: Counter[str] = Counter()
         self.weight_done = 0.0
+        self.totals = _amounts(dict.fromkeys(self.wanted, 1.0), plan)
+        """How many there will be of what is counted."""
+        self.made: Counter[str] = Counter()
+        self.shown: dict[str, int] = {}
         self.stage: Stage
-
-    # -- what there is to do ------------------------------------------------------------------------------------------
-
-    def _find_late(self) -> set[str]:
-        """Partial tasks and those after them: whether there is anything to do shows when the others are through."""
-        late: set[str] = set()
-        for name in self.plan.order:
-            task = self.plan.tasks[name]
-            if task.partial or late.intersection(task.after):
-                late.add(name)
-        return late
-
-    def _find_wanted(self) -> set[str]:
-        """The other tasks that there is something to do for."""
-        wanted: set[str] = set()
-        for name in reversed(self.plan.order):
-            task, readers = self.plan.tasks[name], self.plan.readers[name]
-            needed = not task.temporary or wanted.intersection(readers) or self.late.intersection(readers)
-            if name not in self.late and needed and not self._is_there(name, self.keys.of(name)):
-                wanted.add(name)
-        return wanted
-
-    def _is_there(self, name: str, key: str) -> bool:
-        record = self.workspace.manifest.tasks.get(name)
-        outdated = self.force and name not in self.workspace.done_here
-        return record is not None and not outdated and record.holds(key, self.workspace.output)
 
     # -- doing it -----------------------------------------------------------------------------------------------------
 
@@ -289,14 +236,13 @@ class _Run:
         if len(there) < len(task.after) and not (task.partial and there):
             self._settle(name, State.SKIPPED)
             return
-        key = self.keys.with_those(name, there)
-        if name not in self.wanted or (name in self.late and self._is_there(name, key)):
+        if name not in self.wanted or (name in self.plan.late and not self.status.reasons(name, there)):
             self._settle(name, State.DONE if name in self.workspace.done_here else State.UP_TO_DATE)
             return
         self._submit(task, there)
 
     def _submit(self, task: Task, there: Iterable[str]) -> None:
-        order = order_for(task, self.keys.seen(task.name), there, self.workspace)
+        order = order_for(task, self.status.seen(task.name), there, self.workspace)
         self.at_work[task.name] = order
         self.shares[task.name] = 0.0
         self._show(task.title)
@@ -309,7 +255,8 @@ class _Run:
         title = self.plan.tasks[name].title
         if isinstance(message, Told):
             self.shares[name] = message.share
-            self._show(f"{title}: {message.doing}" if message.doing else title)
+            doing = message.doing or self._count(self.plan.tasks[name].unit)
+            self._show(f"{title}: {doing}" if doing else title)
         elif isinstance(message, Noted):
             self.progress.note(message.text)
         elif isinstance(message, Lost):
@@ -322,16 +269,16 @@ class _Run:
                 self._failed(message)
 
     def _put_in_place(self, made: Made, order: Order) -> None:
-        key = self.keys.with_those(made.name, order.finished)
+        key = self.status.key(made.name, order.finished)
         try:
-            self.workspace.put_in_place(order, key, made)
+            record = self.workspace.put_in_place(order, key, made, self.status.made_of(made.name))
         except OSError as error:
             shutil.rmtree(order.scratch, ignore_errors=True)
             where = f"{error.filename2 or error.filename or self.workspace.output}: "
             hopeless = error.errno in FULL_OR_FORBIDDEN
             self._failed(Failed(made.name, f"{where}{error.strerror or error}", hopeless=hopeless))
             return
-        self._settle(made.name, State.DONE)
+        self._settle(made.name, State.DONE, record)
 
     def _lost(self, lost: Lost) -> None:
         order = self.at_work.pop(lost.name)
@@ -353,24 +300,33 @@ class _Run:
         if failed.hopeless:
             self.outcome.states[failed.name] = State.FAILED
             raise _Hopeless(said)
-        self.progress.note(self.describe(said))
+        task = self.plan.tasks[failed.name]
+        read = [before for before in task.after if self.outcome.states[before].there]
+        if self.mends and (damaged := self.workspace.withdraw_damaged(read)):
+            self.damaged = True
+            self.progress.note(f"{task.title}: {damaged} is damaged; it is made again")
+        else:
+            self.progress.note(self.describe(said))
         # What is there under its name was made of something else.
-        record = self.workspace.manifest.tasks.get(failed.name)
-        if record is None or record.key != self.keys.known(failed.name):
-            self.workspace.discard(self.plan.tasks[failed.name].outputs)
+        record = self.workspace.manifest.get(failed.name)
+        if record is None or record.key != self.status.key(failed.name):
+            self.workspace.discard(task.outputs)
         self._settle(failed.name, State.FAILED)
 
-    def _settle(self, name: str, state: State) -> None:
+    def _settle(self, name: str, state: State, record: Record | None = None) -> None:
         """A task has come to its end: those after it may begin."""
         self.outcome.states[name] = state
         task = self.plan.tasks[name]
         if state.there:
-            record = self.workspace.manifest.tasks.get(name)
-            self.outcome.facts[name] = record.facts if record else {}
+            record = record or self.workspace.manifest.get(name)
+            if record and record.facts:
+                self.outcome.facts[name] = record.facts
+            self.workspace.manifest.failures.pop(name, None)
             self._discard_before(task)
         self.shares.pop(name, None)
         if name in self.wanted:
             self.weight_done += task.weight
+            self.made[task.unit] += task.amount
         for reader in self.plan.readers[name]:
             self.open_before[reader] -= 1
             if not self.open_before[reader]:
@@ -382,6 +338,14 @@ class _Run:
             states = (self.outcome.states.get(reader) for reader in self.plan.readers[before])
             if self.plan.tasks[before].temporary and all(state and state.there for state in states):
                 self.workspace.discard(self.plan.tasks[before].outputs)
+
+    def _count(self, unit: str) -> str:
+        """How many there are by now of what is counted: "frame 170 of 2400". It never goes back."""
+        if not unit:
+            return ""
+        by_now = self.made[unit] + round(_amounts(self.shares, self.plan)[unit])
+        self.shown[unit] = max(by_now, self.shown.get(unit, 0))
+        return f"{unit} {self.shown[unit]} of {self.totals[unit]:.0f}"
 
     def _show(self, doing: str | None = None) -> None:
         begun = sum(self.plan.tasks[name].weight * share for name, share in self.shares.items())
@@ -421,3 +385,11 @@ class _Run:
         for order in self.at_work.values():
             shutil.rmtree(order.scratch, ignore_errors=True)
         self.at_work.clear()
+
+
+def _amounts(shares: Mapping[str, float], plan: Plan) -> Counter[str]:
+    """Of what is counted, how many there are where of each task a share is done."""
+    amounts: Counter[str] = Counter()
+    for name, share in shares.items():
+        amounts[plan.tasks[name].unit] += plan.tasks[name].amount * share
+    return amounts

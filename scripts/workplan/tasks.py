@@ -11,6 +11,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +20,9 @@ ROOT = Path(__file__).resolve().parents[2]
 FUNCTION = re.compile(r"[a-z_]\w*(?:\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII)
 """package.module:function"""
 
+SHORT = 64
+"""Characters of an argument that is kept once for all tasks that have the same."""
+
 Step = TypeVar("Step", bound=Callable[..., Mapping[str, Any] | None])
 
 
@@ -26,7 +30,20 @@ class TaskError(Exception):
     """Why a task cannot be done, in one line for the user: a recording that is damaged, a picture that is missing."""
 
 
-@dataclass(frozen=True)
+def _plain(value: Any) -> Any:
+    """What comes back of a value from JSON. Short ones are shared by all that have the same: nobody changes them."""
+    text = json.dumps(value, allow_nan=False)
+    if isinstance(value, list | tuple) and len(text) > SHORT:
+        return [_plain(one) for one in value]
+    return _loaded(text)
+
+
+@lru_cache(maxsize=256)
+def _loaded(text: str) -> Any:
+    return json.loads(text)
+
+
+@dataclass(frozen=True, slots=True)
 class Task:
     """A piece of work.
 
@@ -68,16 +85,23 @@ class Task:
     temporary: bool = False
     """Nobody but the tasks after it wants its outputs: they are deleted when those tasks are done."""
 
+    amount: int = 0
+    """How many it makes of what is counted over all tasks."""
+
+    unit: str = ""
+    """What that is: "frame"."""
+
     def __post_init__(self) -> None:
-        # What came back from JSON is what a worker, or the next run, will be given.
-        object.__setattr__(self, "arguments", json.loads(json.dumps(self.arguments, allow_nan=False)))
+        # What came back from JSON is what a worker, or the next run, will be given; what is the same is shared.
+        plain = {name: _plain(value) for name, value in dict(self.arguments).items()}
+        object.__setattr__(self, "arguments", plain)
         for name in ("inputs", "outputs", "after"):
             object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
         object.__setattr__(self, "title", self.title or self.name)
 
     def as_json(self) -> dict[str, Any]:
         """Every field, for `Task(**fields)`."""
-        return dict(vars(self))
+        return {name: getattr(self, name) for name in self.__slots__}
 
 
 def step(function: Step) -> Step:

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import stat
 import uuid
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from .lock import FolderLock
 from .manifest import Manifest, Record
@@ -50,12 +52,15 @@ class Workspace:
         """The tasks that were done since it was opened."""
         self.manifest: Manifest
         self._shared, self._only = shared, only
+        self.was_ours = self.own.is_dir()
+        """Whether this program has worked in the folder before."""
         # Making and removing folders takes longer than all else on some file systems: these are empty, and used again.
         self._used: list[Path] = []
         self._lock = FolderLock(self.own / "lock", output, shared=shared)
         self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
 
     def __enter__(self) -> Self:
+        self._mend()
         self._lock.__enter__()
         try:
             self.manifest = Manifest(self.output / "manifest.json", self.own / "records", self._only)
@@ -76,6 +81,7 @@ class Workspace:
                 self._clear_scratch()
                 self.manifest.write()
         finally:
+            self.manifest.close()
             self._lock.__exit__()
             self._remove_if_empty()
 
@@ -83,7 +89,7 @@ class Workspace:
         """A folder for the outputs of a task at work, where they will be: empty, or yet to be made."""
         return self._used.pop() if self._used else self.own / "scratch" / uuid.uuid4().hex[:12]
 
-    def put_in_place(self, order: Order, key: str, made: Made) -> Record:
+    def put_in_place(self, order: Order, key: str, made: Made, made_of: Mapping[str, Any] | None = None) -> Record:
         """Move the outputs that an order asked for to where they belong, and take down that its task is done.
 
         Raises
@@ -92,20 +98,48 @@ class Workspace:
             Where that cannot be. What was moved is not counted as done.
         """
         there, beside = os.fspath(self.output), order.scratch
+        outputs = {path: made.outputs[path] for path in order.outputs}
+        # Killed from here on, what was moved is known to be the program's own.
+        self.manifest.add(order.name, Record("", outputs))
         for path, place in places_of(order.outputs).items():
             try:
                 os.replace(f"{beside}/{place}", f"{there}/{path}")
-            except FileNotFoundError:
-                (self.output / path).parent.mkdir(parents=True, exist_ok=True)
+            except OSError:
+                self._make_room(path)
                 os.replace(f"{beside}/{place}", f"{there}/{path}")
         if os.listdir(beside):
             shutil.rmtree(beside, ignore_errors=True)
         else:
             self._used.append(Path(beside))
-        record = Record(key, {path: made.outputs[path] for path in order.outputs}, made.seconds, made.facts)
+        record = Record(key, outputs, made.seconds, made.facts, made_of or {})
         self.manifest.add(order.name, record)
         self.done_here.add(order.name)
         return record
+
+    def withdraw(self, names: Iterable[str]) -> None:
+        """Undo tasks: their outputs are deleted, and nothing is known of them any more."""
+        for name in names:
+            if record := self.manifest.get(name):
+                self.discard(record.outputs)
+            self.manifest.forget(name)
+
+    def withdraw_damaged(self, names: Iterable[str]) -> Path | None:
+        """Let tasks be done again whose outputs are not what was made, though they have its size and time.
+
+        Returns
+        -------
+        Path or None
+            The first such output; None where there is none.
+        """
+        first = None
+        for name in names:
+            record = self.manifest.get(name)
+            states = record.outputs.items() if record else ()
+            damaged = [place for path, state in states if not state.is_content_of(place := self.output / path)]
+            if damaged:
+                self.manifest.withdraw(name)
+                first = first or damaged[0]
+        return first
 
     def discard(self, outputs: Iterable[str]) -> None:
         """Delete outputs that nobody wants any more, and the folders that are empty then."""
@@ -115,6 +149,33 @@ class Workspace:
             for folder in place.parents:
                 if folder == self.output or not _removed(folder):
                     break
+
+    def _make_room(self, path: str) -> None:
+        """Make the folders for an output, and clear away what is no folder, or no file, where one must be.
+
+        Only below names that begin with a dot, which are the program's own: anything else is left for the error that
+        comes of it.
+        """
+        place = self.output / path
+        for folder in [*reversed(place.parents)][len(self.output.parents) + 1 :]:
+            if path.startswith(".") and os.path.lexists(folder) and not folder.is_dir():
+                folder.unlink()
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if place.is_dir() and not place.is_symlink():
+            shutil.rmtree(place) if path.startswith(".") else place.rmdir()
+
+    def _mend(self) -> None:
+        """Clear away what damage has put where the program keeps its own files and folders."""
+        for folder in (self.own, self.own / "records", self.own / "scratch"):
+            if os.path.lexists(folder) and not folder.is_dir():
+                folder.unlink()
+        for file in (self._lock.path, self.plan_path):
+            with suppress(FileNotFoundError):
+                kind = file.lstat().st_mode
+                if stat.S_ISDIR(kind):
+                    shutil.rmtree(file)
+                elif not stat.S_ISREG(kind):
+                    file.unlink()
 
     def _clear_scratch(self) -> None:
         shutil.rmtree(self.own / "scratch", ignore_errors=True)

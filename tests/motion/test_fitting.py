@@ -106,9 +106,27 @@ def test_a_body_at_rest_stays_at_rest():
 
 
 @pytest.mark.parametrize(
-    ("mode", "radius", "said"), [("no_mode", 0.1, "no mode 'no_mode'"), ("dq_sclerp", 0.0, "radius of 0.0")]
+    ("options", "said"),
+    [
+        ({"mode": "no_mode"}, "no mode 'no_mode'"),
+        ({"radius": 0.0}, "radius of 0.0"),
+        ({"radius": float("nan")}, "radius of nan"),
+        ({"radius": float("inf")}, "radius of inf"),
+        ({"keys": []}, "give the numbers of samples"),
+        ({"keys": [3]}, "1 keys are too few"),
+        ({"keys": [0.0, 19.0]}, "give the numbers of samples"),
+        ({"keys": [0, 20]}, "from 0 to 19"),
+        ({"keys": [-1, 19]}, "from 0 to 19"),
+        ({"keys": [0, 7, 7, 19]}, "not rising"),
+    ],
 )
-def test_what_cannot_be_fitted_is_refused(mode, radius, said):
-    times, poses = wandering(20, 0)
+def test_what_cannot_be_fitted_is_refused(options, said):
     with pytest.raises(ValueError, match=said):
-        fit_keys(times, poses, np.array((0, 19)), mode, radius)
+        fit_keys(*wandering(20, 0), **{"keys": [0, 19], **options})
+
+
+def test_a_recording_with_a_bad_sample_is_not_fitted():
+    times, poses = wandering(20, 0)
+    poses.positions[7] = np.nan
+    with pytest.raises(ValueError, match="sample 7 is not finite"):
+        fit_keys(times, poses, np.array((0, 19)))

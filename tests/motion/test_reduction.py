@@ -166,6 +166,9 @@ GOOD = wandering(20, 1)
         ({"tolerance": 0.0}, "not a positive number"),
         ({"tolerance": float("nan")}, "not a positive number"),
         ({"budget": 1}, "too small"),
+        ({"budget": 2.5}, "a budget of 2.5 is no whole number"),
+        ({"budget": True}, "no whole number"),
+        *(({"tolerance": 0.1, "radius": radius}, "a radius of") for radius in (-0.1, float("nan"), float("inf"))),
         ({"tolerance": 0.1, "mode": "bezier"}, "no mode 'bezier'"),
     ],
 )

@@ -6,6 +6,7 @@ import csv
 import errno
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -19,7 +20,7 @@ import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
 from scipy.spatial.transform import Rotation
 
-from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, shell_error
+from addon.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
 from scripts import compare
 from scripts.comparison.stage import film
 from scripts.comparison.study.reading import folder_names
@@ -208,8 +209,9 @@ def test_budgets_are_the_rates_where_neither_a_tolerance_nor_a_budget_is_given(s
     assert float(adaptive["rms_shell_m"]) < float(evenly["rms_shell_m"])
 
 
-def test_the_keys_needed_in_an_earlier_run_do_not_pass_for_those_of_this(short_clip, tmp_path):
-    (tmp_path / "keys_needed.csv").write_text("earlier")
+def test_the_keys_needed_in_an_earlier_run_do_not_pass_for_those_of_this(adaptive, short_clip, tmp_path):
+    shutil.copytree(adaptive, tmp_path, dirs_exist_ok=True)
+    assert (tmp_path / "keys_needed.csv").exists()
     assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "10") == 0
     assert not (tmp_path / "keys_needed.csv").exists()
 
@@ -358,6 +360,8 @@ def test_what_a_recording_does_not_say_may_be_said_and_what_is_hard_to_believe_i
         (["--resolution", "big"], "1280x720"),
         (["--fps", "0"], "1 to 240"),
         (["--axes", "maya"], "unity"),
+        (["--output", ""], "'' is no folder"),
+        (["--output", "a\0b"], "is no folder"),
         (["--jobs", "-1"], "no number of processes"),
         (["--jobs", "many"], "no number of processes"),
         (["--tolerance", "5mm"], "--tolerance is for keys that are chosen by the motion: add --decimate adaptive"),
@@ -421,11 +425,43 @@ def test_clips_too_short_for_every_budget_are_told_the_option_to_raise(short_cli
     assert "give higher --budget" in capsys.readouterr().err
 
 
-def test_help_has_examples(capsys):
+@pytest.mark.parametrize(
+    ("arguments", "folders"),
+    [
+        (["--rates", "5,7.5,5.0,05"], ["5", "7.5"]),
+        (["--decimate", "adaptive", "--budget", "10.0,10"], ["budget-10.0"]),
+        (["--decimate", "adaptive", "--tolerance", "5mm,0.5cm,0.005m,0.005"], ["tolerance-5mm", "tolerance-0.005"]),
+    ],
+)
+def test_the_same_amount_written_in_two_ways_is_one_choice(arguments, folders):
+    assert [choice.name for choice in compare.parse(arguments).choices] == folders
+
+
+def test_the_help_names_every_mode_there_is(capsys):
     assert exit_code("--help") == 0
-    said = capsys.readouterr().out
-    assert "blender --background --python scripts/compare.py --" in said
-    assert "--decimate adaptive --tolerance 5mm" in said
+    said = " ".join(capsys.readouterr().out.split("--output")[1].split())
+    assert [mode for mode in (*MODES, "all", "best_of") if mode not in said] == []
+
+
+EXAMPLE = re.compile(
+    r"^ +(?:blender --background --python scripts/compare\.py --"
+    r"|python scripts/(?:compare\.py|bootstrap\.py compare))(?P<arguments>.*)$",
+    re.MULTILINE,
+)
+"""A line of a page, or of the help, that calls the program."""
+
+
+@pytest.mark.parametrize("page", ["--help", "README.md", "docs/comparing.md", "docs/farm.md"])
+def test_the_printed_examples_work_as_printed(page, capsys):
+    if page == "--help":
+        assert exit_code("--help") == 0
+    else:
+        print((ROOT / page).read_text(encoding="utf-8"))
+    examples = EXAMPLE.findall(capsys.readouterr().out)
+    assert examples
+    for example in examples:
+        options = compare.parse(shlex.split(example, comments=True))
+        assert options.choices
 
 
 def rendering(output: Path) -> bool:
@@ -535,7 +571,7 @@ def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, caps
 
     asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
     with monkeypatch.context() as patch:
-        patch.setattr("scripts.comparison.steps.write_metrics", full)
+        patch.setattr("scripts.comparison.study.metrics.write_metrics", full)
         assert run(*asked) == 2
     said = capsys.readouterr()
     assert "No space left on device; nothing that is done is lost" in said.err

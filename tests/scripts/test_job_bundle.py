@@ -155,5 +155,5 @@ def test_a_task_of_no_known_kind_is_not_forgotten() -> None:
 def test_options_that_are_for_a_run_are_refused(clip: Path, tmp_path: Path) -> None:
     written = bundle("takes/toss.csv", "--force", cwd=tmp_path)
     assert written.returncode == 2
-    assert "--scheduler and --force are for a run of compare.py itself" in written.stderr
+    assert "--scheduler, --force and --explain are for a run of compare.py itself" in written.stderr
     assert not os.path.exists(tmp_path / "bundle")

@@ -11,6 +11,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
@@ -19,7 +20,10 @@ from addon.motion import decimate, reduce_keys
 
 from .clips import Clip
 
-METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
+"""Units of a tolerance, and how many millimetres they have."""
+
+METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
 """Units of a tolerance, and their lengths."""
 
 NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
@@ -93,6 +97,11 @@ class Choice(ABC):
     def size(self) -> float:
         """What choices of one kind are sorted by."""
         return float(self.written)
+
+    @property
+    def wanted(self) -> tuple[Fraction, str]:
+        """The amount exactly, and what it is counted in: the same for "5" and "5.0", for "5mm" and "0.5cm"."""
+        return Fraction(self.written), self.unit
 
 
 class Uniform(Choice):
@@ -178,6 +187,11 @@ class Tolerance(Choice):
         number, unit = self._parts()
         return float(number) * METRES.get(unit, 1.0)
 
+    @property
+    def wanted(self) -> tuple[Fraction, str]:
+        number, unit = self._parts()
+        return Fraction(number) * MILLIMETRES.get(unit, 1), "mm" if unit else ""
+
     def _parts(self) -> tuple[str, str]:
         """The number and the unit, which may be empty."""
         found = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
@@ -203,6 +217,14 @@ def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:
     for choice in choices:
         kinds.setdefault(type(choice), []).append(choice)
     return [(max if kind is Tolerance else min)(some, key=lambda choice: choice.size) for kind, some in kinds.items()]
+
+
+def distinct(choices: Iterable[Choice]) -> list[Choice]:
+    """Choices of one kind without those that want the same as one before them, however it is written."""
+    first: dict[tuple[Fraction, str], Choice] = {}
+    for choice in choices:
+        first.setdefault(choice.wanted, choice)
+    return list(first.values())
 
 
 def choice_parts(choice: Choice) -> tuple[str, str]:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from scripts.workplan import Executor, Outcome, Plan, ProcessExecutor, SerialExecutor, State, Task, Workspace, run
 
 STEPS = "tests.scripts.workplan.steps"
 
+FIELDS = ("inputs", "partial", "temporary", "title", "amount", "unit")
+"""Of a task, those that tests set."""
+
 EXECUTORS = {"serial": SerialExecutor, "processes": lambda: ProcessExecutor(2)}
 
 
 def task(name: str, function: str = "write", after: tuple[str, ...] = (), **fields: object) -> Task:
     """A task that makes the file of its name; what is no field of a task is an argument of its function."""
-    of_task = {key: fields.pop(key) for key in ("inputs", "partial", "temporary", "title") if key in fields}
+    of_task = {key: fields.pop(key) for key in FIELDS if key in fields}
     arguments = {"path": f"{name}.txt", **fields}
     return Task(name, f"{STEPS}:{function}", arguments, outputs=(f"{name}.txt",), after=after, **of_task)
 
@@ -24,11 +28,16 @@ def joining(name: str, *parts: str, **fields: object) -> Task:
 
 
 def run_in(
-    output: Path, *tasks: Task, executor: Executor | None = None, version: str = "1", **options: object
+    output: Path,
+    *tasks: Task,
+    executor: Executor | None = None,
+    version: str = "1",
+    versions: Mapping[str, Mapping[str, str]] | None = None,
+    **options: object,
 ) -> Outcome:
     """Run a plan in a folder."""
     with Workspace(output) as workspace, executor or SerialExecutor() as opened:
-        return run(Plan(tasks, version), workspace, opened, **options)
+        return run(Plan(tasks, version, versions=versions), workspace, opened, **options)
 
 
 def states(outcome: Outcome) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import signal
 import time
@@ -144,3 +145,17 @@ def _note(log: str, text: str) -> None:
 def identify(job: Job, *, path: str) -> None:
     """Say which version this is."""
     job.writes(path).write_text("1")
+
+
+@step
+def parse(job: Job, *, path: str, part: str) -> None:
+    """Write the values that another task has written as JSON."""
+    job.writes(path).write_text(",".join(map(str, json.loads(job.reads(part).read_text()).values())))
+
+
+@step
+def count(job: Job, *, path: str, to: int) -> None:
+    """Say how far it is, one by one."""
+    for number in range(to):
+        job.progress(number + 1, to)
+    job.writes(path).write_text("counted")

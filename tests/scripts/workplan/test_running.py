@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import signal
 import threading
 import time
@@ -400,14 +401,17 @@ def test_ctrl_c_stops_soon_with_partial_tasks_done_and_the_next_run_goes_on(outp
     assert states(again)["a"] == State.UP_TO_DATE.value
 
 
+class Clock:
+    """Time flies: every line of progress is shown."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        self.now += 10.0
+        return self.now
+
+
 def test_progress_says_what_is_done_and_how_long_it_will_take(output: Path) -> None:
-    class Clock:
-        now = 0.0
-
-        def __call__(self) -> float:
-            self.now += 10.0
-            return self.now
-
     stream = io.StringIO()
     with Progress(stream, clock=Clock(), environ={}) as progress:
         run_in(output, task("a"), task("b", "chatter", title="The second"), progress=progress, title="Making")
@@ -416,6 +420,21 @@ def test_progress_says_what_is_done_and_how_long_it_will_take(output: Path) -> N
     assert any(line.startswith(" 75%") and line.endswith("Making, The second: half way") for line in lines)
     assert "b.txt is nearly there" in lines
     assert lines[-1].startswith("100%  done in")
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_what_is_counted_is_counted_over_all_tasks_and_never_goes_back(output: Path, executor: str) -> None:
+    stream = io.StringIO()
+    films = [task(f"{n}", "count", to=n, amount=n, unit="frame") for n in (4, 2, 3)]
+    run_in(output, films[1])
+    with Progress(stream, clock=Clock(), environ={}) as progress:
+        run_in(output, *films, task("a"), executor=EXECUTORS[executor](), progress=progress)
+    counts = re.findall(r"frame (\d+) of (\d+)$", stream.getvalue(), re.MULTILINE)
+    assert {total for _, total in counts} == {"7"}  # Two are there already.
+    numbers = [int(number) for number, _ in counts]
+    assert numbers == sorted(numbers)
+    if executor == "serial":
+        assert [*dict.fromkeys(numbers)] == [1, 2, 3, 4, 5, 6, 7]
 
 
 def test_an_outcome_counts_in_words() -> None:

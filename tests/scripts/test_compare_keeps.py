@@ -1,0 +1,236 @@
+"""compare.py replaces nothing but what it has written: no input, no file of another program, no other comparison."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from scripts import compare
+from tests.scripts.comparing import write_toss
+
+OPTIONS = ("--no-video", "--rates", "5", "--modes", "lerp_slerp", "--jobs", "0")
+
+
+def run(*arguments: object) -> int:
+    return compare.main([*map(str, arguments), *OPTIONS])
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """All files, but for the plan, which is written by every run that begins."""
+    found = (path for path in folder.rglob("*") if path.is_file() and path.name != "plan.json")
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a recording, and a comparison of it in `out`."""
+    folder = tmp_path_factory.mktemp("made")
+    write_toss(folder / "toss.csv")
+    with contextlib.chdir(folder):
+        assert run("toss.csv", "--output", "out") == 0
+    return folder
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of that."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
+    """What is said by a run that writes nothing."""
+    before = files(Path.cwd())
+    capsys.readouterr()
+    assert run(*arguments) == 2
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("compare.py: ")]
+    assert len(said) == 1
+    assert files(Path.cwd()) == before
+    return said[0]
+
+
+# -- inputs -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("place", ["metrics.csv", "keys_needed.csv", "report.html", "manifest.json"])
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_an_input_that_lies_where_an_output_goes_is_refused(
+    tmp_path: Path, place: str, force: tuple[str, ...], capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_toss(tmp_path / place)
+    assert f"{place}: this input lies where" in refused(capsys, place, "--output", ".", *force)
+    assert os.listdir(tmp_path) == [place]
+
+
+def test_an_input_that_lies_where_the_keys_of_its_clip_go_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "keys").mkdir()
+    write_toss(tmp_path / "keys" / "5" / "keys.csv")
+    assert "this input lies where" in refused(capsys, "keys/5/keys.csv", "--output", ".")
+    assert files(tmp_path).keys() == {os.path.join("keys", "5", "keys.csv")}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need permission on Windows")
+def test_an_input_that_leads_to_an_output_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    (folder / "linked.csv").symlink_to(folder / "out" / "metrics.csv")
+    assert "linked.csv: this input was written by" in refused(capsys, "toss.csv", "linked.csv", "--output", "out")
+
+
+def test_an_output_of_an_earlier_run_is_no_input_of_the_next(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    said = refused(capsys, "toss.csv", "out/toss/5/lerp_slerp.csv", "--output", "out")
+    assert "out/toss/5/lerp_slerp.csv: this input was written by a run into this folder" in said.replace(os.sep, "/")
+
+
+def test_an_input_where_the_program_keeps_its_own_files_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    write_toss(folder / "out" / ".workplan" / "mine.csv")
+    assert "where the program works" in refused(capsys, "out/.workplan/mine.csv", "--output", "out", "--force")
+
+
+# -- files of strangers -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("place", ["report.html", "metrics.csv", "keys_needed.csv", "manifest.json", "toss/5/keys.csv"])
+def test_a_file_of_another_program_is_named_and_replaced_with_force_only(
+    tmp_path: Path, place: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_toss(tmp_path / "toss.csv")
+    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / place).write_text("mine")
+    said = refused(capsys, "toss.csv", "--output", ".")
+    assert f"{tmp_path / place} was not written by this program" in said
+    assert "--output" in said
+    assert "--force" in said
+    assert run("toss.csv", "--output", ".", "--force") == 0
+    assert not (tmp_path / place).exists() or (tmp_path / place).read_text() != "mine"
+    assert run("toss.csv", "--output", ".") == 0
+
+
+def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    shutil.rmtree(folder / "out" / ".workplan")
+    shutil.rmtree(folder / "out" / ".parts")
+    (folder / "out" / "manifest.json").unlink()
+    said = refused(capsys, "toss.csv", "--output", "out")
+    assert f"{folder / 'out' / 'metrics.csv'}, {folder / 'out' / 'report.html'} were not written" in said
+
+
+def test_a_folder_where_a_file_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    (folder / "out" / "report.html").unlink()
+    (folder / "out" / "report.html").mkdir()
+    (folder / "out" / "report.html" / "mine.txt").write_text("mine")
+    assert "a folder where a file goes" in refused(capsys, "toss.csv", "--output", "out", "--force")
+
+
+def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    shutil.rmtree(folder / "out" / "toss")
+    (folder / "out" / "toss").write_text("mine")
+    assert "a file where a folder goes" in refused(capsys, "toss.csv", "--output", "out")
+
+
+# -- another comparison -----------------------------------------------------------------------------------------------
+
+
+def test_another_comparison_in_the_folder_is_named_with_the_ways_out(
+    folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    write_toss(folder / "hand.csv", samples=70)
+    said = refused(capsys, "hand.csv", "--output", "out")
+    assert "out holds another comparison, of toss.csv; choose another folder, such as --output hand" in said
+    assert run("hand.csv", "--output", "out", "--force") == 0
+    assert "hand" in (folder / "out" / "metrics.csv").read_text()
+    assert "of hand.csv; choose another folder" in refused(capsys, "toss.csv", "--output", "out")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("toss.csv", "--rates", "10"),
+        ("toss.csv", "--axes", "unity"),
+        ("toss.csv", "hand.csv"),
+        ("hand.csv", "toss.csv"),
+        ("moved.csv",),
+        ("./toss.csv",),
+    ],
+)
+def test_the_same_recordings_and_more_of_them_go_on(folder: Path, arguments: tuple[str, ...]) -> None:
+    write_toss(folder / "hand.csv", samples=70)
+    shutil.copy(folder / "toss.csv", folder / "moved.csv")
+    assert run(*arguments, "--output", "out") == 0
+
+
+def test_a_recording_that_was_edited_is_the_same_comparison(folder: Path) -> None:
+    write_toss(folder / "toss.csv", samples=80)
+    assert run("toss.csv", "--output", "out") == 0
+
+
+# -- damage -----------------------------------------------------------------------------------------------------------
+
+
+def garbage(path: Path) -> None:
+    """Other bytes, of which size and time say nothing."""
+    status = path.stat()
+    path.write_bytes(b"[" * status.st_size)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def folder_instead(path: Path) -> None:
+    path.unlink()
+    (path / "inner").mkdir(parents=True)
+
+
+@pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
+@pytest.mark.parametrize("part", ["recordings/*.json", "recordings/*.npz", "clips/toss/5.json", "clips/toss/5.npz"])
+def test_a_damaged_part_is_made_again(
+    folder: Path, part: str, damage: Callable[[Path], None], capsys: pytest.CaptureFixture
+) -> None:
+    report = (folder / "out" / "metrics.csv").read_bytes()
+    (path,) = (folder / "out" / ".parts").glob(part)
+    damage(path)
+    (folder / "out" / "metrics.csv").unlink()
+    assert run("toss.csv", "--output", "out") == 0
+    assert "Traceback" not in capsys.readouterr().err
+    assert (folder / "out" / "metrics.csv").read_bytes() == report
+
+
+@pytest.mark.parametrize("damage", [garbage, emptied])
+def test_a_damaged_manifest_lets_the_work_be_done_again(folder: Path, damage: Callable[[Path], None]) -> None:
+    damage(folder / "out" / "manifest.json")
+    assert run("toss.csv", "--output", "out") == 0
+
+
+# -- what would be done -----------------------------------------------------------------------------------------------
+
+
+def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsys: pytest.CaptureFixture) -> None:
+    before = files(folder)
+    assert run("toss.csv", "--output", "out", "--explain") == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[-1].startswith("To do: 1 of ")  # The report, which says by what command it was made.
+    assert said[0].startswith("report report.html: options changed (settings.command")
+    assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2") == 0
+    assert "measure toss at 5 keys/s: options changed (radius: 0.1 -> 0.2)" in capsys.readouterr().out.splitlines()
+    assert files(folder) == before
+
+
+def test_of_recordings_that_were_never_read_it_is_explained_that_they_will_be(
+    folder: Path, capsys: pytest.CaptureFixture
+) -> None:
+    write_toss(folder / "hand.csv", samples=70)
+    assert run("hand.csv", "--output", "new", "--explain") == 0
+    said = capsys.readouterr().out
+    assert "no output yet" in said
+    assert "Yet to be read: 1 of 1 recordings" in said
+    assert not (folder / "new").exists()
