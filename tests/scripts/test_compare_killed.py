@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(
 MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "3"))
 """How many times a run is killed, half of them the program and half of them one of its workers."""
 
-OPTIONS = ("--rates", "5,10", "--resolution", "160x90", "--fps", "12", "--jobs", "2")
+OPTIONS = ("--rates", "5,10", "--films", "all", "--resolution", "160x90", "--fps", "12", "--jobs", "2")
 
 
 def start(output: Path, clip: Path) -> subprocess.Popen:
