@@ -144,6 +144,7 @@ class _Run:
             self.workspace.withdraw_damaged(first.order) or self.workspace.withdraw(first.order)
             read = self._do(first, "Reading")
             found = look_into(self.workspace.output, there, options.choices)
+        del first, reading  # Of ten thousand clips all of this is a third of the memory.
         for note in found.notes:
             self.progress.note(note)
         if not found.studies:
@@ -158,7 +159,7 @@ class _Run:
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        if self._has_films_to_make(plan):
+        if asked.stage and self._has_films_to_make(plan):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             numbers = self._do(
                 plan_of(comparison_tasks(found.studies, there, asked, numbers=True), self.version), "Measuring"
@@ -167,7 +168,7 @@ class _Run:
                 return 130 if numbers.interrupted else 2
             report = self.workspace.output / REPORT
             self.progress.note(f"All numbers are there, and films come as they are made: {report}")
-        del first, reading, there, found  # Of ten thousand clips that is a third of the memory.
+        del there, found
         outcome = self._do(plan, "Filming" if asked.stage else "Comparing")
         outcome.states |= read.states
         self._say(outcome, time.perf_counter() - started)
