@@ -154,21 +154,23 @@ class _Run:
         asked = wanted(options, self.command)
         for note in filter(None, (study.left_out(asked.stage) for study in found.studies if asked.stage)):
             self.progress.note(note)
-        plan = plan_of(comparison_tasks(found.studies, there, asked), self.version)
+        tasks = comparison_tasks(found.studies, there, asked)
+        numbers = comparison_tasks(found.studies, there, asked, numbers=True) if asked.stage else []
+        del there, found
+        plan = plan_of(tasks, self.version)
+        del tasks
         require_free(plan, self.workspace, force=options.force)
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        if asked.stage and self._has_films_to_make(plan):
+        if numbers and self._has_films_to_make(plan):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
-            numbers = self._do(
-                plan_of(comparison_tasks(found.studies, there, asked, numbers=True), self.version), "Measuring"
-            )
-            if numbers.interrupted or numbers.problem:
-                return 130 if numbers.interrupted else 2
+            measured = self._do(plan_of(numbers, self.version), "Measuring")
+            if measured.interrupted or measured.problem:
+                return 130 if measured.interrupted else 2
             report = self.workspace.output / REPORT
             self.progress.note(f"All numbers are there, and films come as they are made: {report}")
-        del there, found
+        del numbers
         outcome = self._do(plan, "Filming" if asked.stage else "Comparing")
         outcome.states |= read.states
         self._say(outcome, time.perf_counter() - started)

@@ -175,7 +175,7 @@ def _suspects(listed: list[Task]) -> set[int]:
     """
     files = np.fromiter((hash(output) for _, output in _folded_outputs(listed)), np.int64)
     files.sort()
-    folders = np.fromiter({hash(one) for _, path in _folded_outputs(listed) for one in _folders_of(path)}, np.int64)
+    folders = np.fromiter((hash(folder) for task in listed for folder in _folders_of_task(task)), np.int64)
     twice = files[1:][files[1:] == files[:-1]]
     both = folders[np.searchsorted(files, folders) < np.searchsorted(files, folders, side="right")]
     return {*twice.tolist(), *both.tolist()}
@@ -184,6 +184,10 @@ def _suspects(listed: list[Task]) -> set[int]:
 def _folded_outputs(listed: list[Task]) -> Iterator[tuple[Task, str]]:
     """Every output with its task. Windows and macOS take "Hand" and "hand" for one name."""
     return ((task, output.casefold()) for task in listed for output in task.outputs)
+
+
+def _folders_of_task(task: Task) -> set[str]:
+    return {folder for output in task.outputs for folder in _folders_of(output.casefold())}
 
 
 def _folders_of(path: str) -> Iterator[str]:
