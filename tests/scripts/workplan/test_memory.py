@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from addon.motion import MODES
-from scripts.comparison.planning import Study, Wanted, comparison_tasks, plan_of, reading_tasks
+from scripts.comparison.planning import Study, Wanted, comparison_tasks, reading_tasks
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.study.choices import Uniform
 from scripts.comparison.study.storage import ClipReference
 from scripts.progress import Progress
-from scripts.workplan import SerialExecutor, Workspace
+from scripts.workplan import Plan, SerialExecutor, Workspace
 from scripts.workplan.running import RETRIES, _Run
 
 CLIPS = 200
@@ -51,7 +51,7 @@ def begun(clips: int, workspace: Workspace) -> _Run:
         )
         for number, task in enumerate(read)
     ]
-    plan = plan_of(comparison_tasks(studies, read, WANTED), "1")
+    plan = Plan(comparison_tasks(studies, read, WANTED), "1")
     return _Run(plan, workspace, SerialExecutor(), False, RETRIES, Progress(), str, True)
 
 
