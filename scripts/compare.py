@@ -144,6 +144,7 @@ class _Run:
             self.workspace.withdraw_damaged(first.order) or self.workspace.withdraw(first.order)
             read = self._do(first, "Reading")
             found = look_into(self.workspace.output, there, options.choices)
+        del first, reading  # Of ten thousand clips all of this is a third of the memory.
         for note in found.notes:
             self.progress.note(note)
         if not found.studies:
@@ -153,21 +154,23 @@ class _Run:
         asked = wanted(options, self.command)
         for note in filter(None, (study.left_out(asked.stage) for study in found.studies if asked.stage)):
             self.progress.note(note)
-        plan = plan_of(comparison_tasks(found.studies, there, asked), self.version)
+        tasks = comparison_tasks(found.studies, there, asked)
+        numbers = comparison_tasks(found.studies, there, asked, numbers=True) if asked.stage else []
+        del there, found
+        plan = plan_of(tasks, self.version)
+        del tasks
         require_free(plan, self.workspace, force=options.force)
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        if self._has_films_to_make(plan):
+        if numbers and self._has_films_to_make(plan):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
-            numbers = self._do(
-                plan_of(comparison_tasks(found.studies, there, asked, numbers=True), self.version), "Measuring"
-            )
-            if numbers.interrupted or numbers.problem:
-                return 130 if numbers.interrupted else 2
+            measured = self._do(plan_of(numbers, self.version), "Measuring")
+            if measured.interrupted or measured.problem:
+                return 130 if measured.interrupted else 2
             report = self.workspace.output / REPORT
             self.progress.note(f"All numbers are there, and films come as they are made: {report}")
-        del first, reading, there, found  # Of ten thousand clips that is a third of the memory.
+        del numbers
         outcome = self._do(plan, "Filming" if asked.stage else "Comparing")
         outcome.states |= read.states
         self._say(outcome, time.perf_counter() - started)

@@ -71,7 +71,7 @@ class Wanted:
     """And how many where they may be fitted."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Study:
     """A clip, with the choices of keys that it is long enough for."""
 
@@ -213,7 +213,7 @@ def comparison_tasks(
         tasks += [*counts, _table(steps.KEYS_NEEDED, "tabulate_keys", studies, [*measures, *counts])]
     if wanted.stage and not numbers:
         tasks += [task for study in studies for task in _films(study, wanted, wanted.stage)]
-    return [*tasks, *_reports(studies, {task.name for task in tasks}, wanted, coming=numbers)]
+    return [*tasks, *_reports(studies, {task.name: task.name for task in tasks}, wanted, coming=numbers)]
 
 
 def _measures(study: Study, reader: str, wanted: Wanted) -> Iterator[Task]:
@@ -313,8 +313,11 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
         )
 
 
-def _reports(studies: Sequence[Study], names: set[str], wanted: Wanted, *, coming: bool) -> list[Task]:
-    """The report: of a few clips on one page, of more on a page each. `names` are of the tasks that there are."""
+def _reports(studies: Sequence[Study], names: Mapping[str, str], wanted: Wanted, *, coming: bool) -> list[Task]:
+    """The report: of a few clips on one page, of more on a page each.
+
+    `names` are of the tasks that there are, each to itself: so the same text is not kept twice.
+    """
     settings = {name: value for name, value in vars(wanted.settings).items() if name != "date"}
     shared = {"settings": settings, "coming": coming}
     filmed = {
@@ -360,10 +363,10 @@ def _report(path: str, function: str, arguments: Mapping[str, Any], before: Sequ
     )
 
 
-def _shown_of(study: Study, names: set[str]) -> list[str]:
+def _shown_of(study: Study, names: Mapping[str, str]) -> list[str]:
     """The tasks whose results a report shows of a clip."""
     clip = study.clip.name
     of_choices = [
         name for choice in study.choices for name in (steps.measuring(clip, choice), steps.filming(clip, choice))
     ]
-    return [name for name in (*of_choices, steps.counting(clip)) if name in names]
+    return [names[name] for name in (*of_choices, steps.counting(clip)) if name in names]

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +67,7 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def task_key(task: Task, inputs: Mapping[str, str | None], before: Mapping[str, str], version: str) -> str:
+def task_key(task: Task, inputs: Mapping[str, str | None], before: Iterable[tuple[str, str]], version: str) -> str:
     """The digest of all that a task's outputs depend on.
 
     Parameters
@@ -75,20 +75,23 @@ def task_key(task: Task, inputs: Mapping[str, str | None], before: Mapping[str, 
     task : Task
     inputs : mapping
         Path to the digest of its content, None where the file is missing.
-    before : mapping
-        The tasks that it reads from, those that are done, to their keys.
+    before : iterable of (str, str)
+        The tasks that it reads from, those that are done, with their keys; sorted.
     version : str
         Of what the function uses.
     """
-    content = {
+    rest = {
         "function": task.function,
-        "arguments": task.arguments,
         "inputs": [inputs[path] for path in task.inputs],
-        "outputs": task.outputs,
-        "before": before,
+        "outputs": [*task.outputs],
         "version": version,
     }
-    return digest_of(_canonical(content))
+    # The digest of it all as canonical JSON, without ever having as text what may be the keys of ten thousand tasks.
+    digest = hashlib.sha256(f'{{"arguments":{_canonical(task.arguments)},"before":{{'.encode())
+    for number, (name, key) in enumerate(before):
+        digest.update(f'{"," if number else ""}{json.dumps(name)}:"{key}"'.encode())
+    digest.update(f"}},{_canonical(rest)[1:]}".encode())
+    return digest.hexdigest()
 
 
 def digest_of(text: str) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -110,7 +111,7 @@ class Manifest:
         self._changed = False
         self.is_whole = self._take(path)
         """Whether manifest.json is there, with every line that was written to it."""
-        for record in sorted(records.glob("*.json")) if only is None else map(self._place, only):
+        for record in map(records.joinpath, self._apart()) if only is None else map(self._place, only):
             self._take(record)
         self._changed = self._changed or not self.is_whole
 
@@ -148,13 +149,13 @@ class Manifest:
 
     def write(self) -> None:
         """Write manifest.json with all records in it, if there is anything new to be said."""
-        records = list(self._records.glob("*.json")) if self._records.is_dir() else []
+        records = self._apart()
         if not (self._changed or records or self.failures) or not (self._lines or self.is_whole):
             return  # So a file of that name that is no manifest stays as it is, where nothing is to be said.
         known = ((name, text) for name in sorted(self._lines) if (text := self._text_of(name)).endswith("}"))
         _write(self._path, known, versions=self.versions, failures=self.failures, when_written=self.close)
         for record in records:
-            record.unlink(missing_ok=True)
+            (self._records / record).unlink(missing_ok=True)
         self._take(self._path)
 
     def close(self) -> None:
@@ -178,6 +179,11 @@ class Manifest:
         except OSError:
             return ""
         return found[1] if found else ""
+
+    def _apart(self) -> list[str]:
+        """The names of the files of records that are not in manifest.json."""
+        names = os.listdir(self._records) if self._records.is_dir() else ()
+        return sorted(name for name in names if name.endswith(".json"))
 
     def _place(self, name: str) -> Path:
         """Where the record of a task is: its name is any line of text, and no name for a file."""

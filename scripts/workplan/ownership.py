@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Collection, Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 
 from .hashing import FileState, is_regular
@@ -35,7 +36,7 @@ def require_free(plan: Plan, workspace: Workspace, outputs: Collection[str] = ()
     workspace : Workspace
         Opened. Where this fails in a folder that is new to the program, what was done since then is undone.
     outputs : collection of str
-        More paths in the output folder that will be written.
+        More paths in the output folder that will be written, each by a task of its name.
     force : bool
         A stranger's files may be replaced, and what was made of other inputs. Inputs and folders never are.
 
@@ -45,7 +46,7 @@ def require_free(plan: Plan, workspace: Workspace, outputs: Collection[str] = ()
     """
     try:
         _require_no_inputs_inside(plan, workspace)
-        strangers = [*_strangers(plan, workspace, outputs)]
+        strangers = _strangers(plan, workspace, outputs)
         if strangers and not force:
             some = ", ".join(os.fspath(workspace.output / path) for path in strangers[:SHOWN])
             more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
@@ -100,17 +101,17 @@ def _require_no_inputs_inside(plan: Plan, workspace: Workspace) -> None:
         place = Path(os.path.realpath(path))
         if own in place.parents:
             raise OutputError(f"{path}: this input lies in {workspace.own}, where the program works; move it elsewhere")
-        if output in place.parents and place.relative_to(output).as_posix() in _listed(workspace.manifest):
+        if output in place.parents and _written([place.relative_to(output).as_posix()], workspace.manifest):
             raise OutputError(f"{path}: this input was written by a run into this folder; choose another with --output")
 
 
-def _listed(manifest: Manifest) -> set[str]:
-    """All outputs that the program has written."""
-    records = (manifest.get(name) for name in manifest)
-    return {path for record in records if record for path in record.outputs}
+def _written(paths: Collection[str], manifest: Manifest) -> set[str]:
+    """Those of some paths that the program has written."""
+    records = (manifest.get(name) for name in manifest) if paths else ()
+    return {path for record in records if record for path in record.outputs.keys() & paths}
 
 
-def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iterator[str]:
+def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> list[str]:
     """The outputs in whose place there is a file that this program has not written.
 
     Raises OutputError where there is an input, or a folder.
@@ -118,10 +119,10 @@ def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iter
     manifest = workspace.manifest
     inputs = {identity: path for path in _inputs(plan) for identity in _identities(path)}
     all_ours = workspace.was_ours and not manifest.is_whole
-    listed: set[str] | None = None
+    unknown: dict[str, None] = {}
     asked, record = "", None
-    makers = [(path, task.name) for task in plan.tasks.values() for path in task.outputs]
-    for path, maker in [("manifest.json", ""), *((path, "") for path in outputs), *makers]:
+    makers = ((path, task.name) for task in plan.tasks.values() for path in task.outputs)
+    for path, maker in chain([("manifest.json", "")], ((path, path) for path in outputs), makers):
         place = f"{workspace.output}{os.sep}{path}"
         try:
             found = os.lstat(place)
@@ -145,10 +146,9 @@ def _strangers(plan: Plan, workspace: Workspace, outputs: Iterable[str]) -> Iter
             continue
         if path == "manifest.json" and manifest.is_whole:
             continue
-        if listed is None:
-            listed = _listed(manifest)
-        if path not in listed:
-            yield path
+        unknown[path] = None
+    written = _written(unknown.keys(), manifest)
+    return [path for path in unknown if path not in written]
 
 
 def _inputs(plan: Plan) -> dict[str, None]:

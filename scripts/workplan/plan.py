@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping
-from graphlib import CycleError, TopologicalSorter
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import accumulate
 from pathlib import Path
+
+import numpy as np
 
 from scripts.files import replacing
 
@@ -58,15 +59,19 @@ class Plan:
         versions: Mapping[str, Mapping[str, str]] | None = None,
     ) -> None:
         listed = list(tasks)
+        by_name = {task.name: task for task in listed}
+        _check_names(listed, by_name)
+        _check_outputs(listed)
         self.version, self.versions = version, dict(versions or {})
         self._version_of = {function: version_from(parts) for function, parts in self.versions.items()}
         self.folder = Path.cwd() if folder is None else folder
-        self.tasks: Mapping[str, Task] = {task.name: task for task in listed}
-        _check_names(listed, self.tasks)
-        _check_outputs(listed)
-        self.order: tuple[str, ...] = _ordered(self.tasks)
-        self.readers: Mapping[str, tuple[str, ...]] = _readers(self.tasks)
-        """Task to the tasks that read its outputs."""
+        self.tasks: Mapping[str, Task] = by_name
+        self.order: tuple[str, ...] = _ordered(by_name)
+        self.place: Mapping[str, int] = {name: place for place, name in enumerate(self.order)}
+        """Task to where it is in the order."""
+
+        self.readers: Mapping[str, tuple[str, ...]] = _Readers(self.tasks, self.order, self.place)
+        """Task to the tasks that read its outputs, in their order."""
 
         self.late: frozenset[str] = _late(self.tasks, self.order)
         """Partial tasks and those after them: whether there is anything to do shows when the others are through."""
@@ -143,19 +148,50 @@ def _check_names(listed: list[Task], tasks: Mapping[str, Task]) -> None:
 
 
 def _check_outputs(listed: list[Task]) -> None:
-    # Windows and macOS take "Hand" and "hand" for one name.
-    makers: dict[str, str] = {}
     for task in listed:
         for output in task.outputs:
             _check_path(task, output)
-            folded = output.casefold()
-            if folded in makers:
-                raise PlanError(f"task {task.name!r}: {output!r} is made by {makers[folded]!r} already")
-            makers[folded] = task.name
-    for output, maker in makers.items():
-        for folder in accumulate(output.split("/")[:-1], "{}/{}".format):
+    suspects = _suspects(listed)
+    if not suspects:
+        return
+    makers: dict[str, str] = {}
+    for task, output in _folded_outputs(listed):
+        if hash(output) in suspects:
+            if output in makers:
+                raise PlanError(f"task {task.name!r}: {output!r} is made by {makers[output]!r} already")
+            makers[output] = task.name
+    for task, output in _folded_outputs(listed):
+        for folder in _folders_of(output):
             if folder in makers:
-                raise PlanError(f"task {maker!r}: {output!r} lies in {folder!r}, which is a file of {makers[folder]!r}")
+                raise PlanError(
+                    f"task {task.name!r}: {output!r} lies in {folder!r}, which is a file of {makers[folder]!r}"
+                )
+
+
+def _suspects(listed: list[Task]) -> set[int]:
+    """The hashes that outputs have in common with one another, or with the folders that they lie in.
+
+    Of ten thousand clips there are half a million outputs: as text they would take more memory than all else.
+    """
+    files = np.fromiter((hash(output) for _, output in _folded_outputs(listed)), np.int64)
+    files.sort()
+    folders = np.fromiter((hash(folder) for task in listed for folder in _folders_of_task(task)), np.int64)
+    twice = files[1:][files[1:] == files[:-1]]
+    both = folders[np.searchsorted(files, folders) < np.searchsorted(files, folders, side="right")]
+    return {*twice.tolist(), *both.tolist()}
+
+
+def _folded_outputs(listed: list[Task]) -> Iterator[tuple[Task, str]]:
+    """Every output with its task. Windows and macOS take "Hand" and "hand" for one name."""
+    return ((task, output.casefold()) for task in listed for output in task.outputs)
+
+
+def _folders_of_task(task: Task) -> set[str]:
+    return {folder for output in task.outputs for folder in _folders_of(output.casefold())}
+
+
+def _folders_of(path: str) -> Iterator[str]:
+    return accumulate(path.split("/")[:-1], "{}/{}".format)
 
 
 def _check_path(task: Task, output: str) -> None:
@@ -169,28 +205,46 @@ def _check_path(task: Task, output: str) -> None:
 
 def _ordered(tasks: Mapping[str, Task]) -> tuple[str, ...]:
     """Every task behind those it reads from, and otherwise as they were listed."""
-    try:
-        TopologicalSorter({name: task.after for name, task in tasks.items()}).prepare()
-    except CycleError as error:
-        raise PlanError(f"tasks wait for one another: {', '.join(map(repr, error.args[1]))}") from None
     order: dict[str, None] = {}
+    begun: dict[str, None] = {}
+    """Those that wait for the ones behind them."""
     for name in tasks:
         waiting = [name]
         while waiting:
-            open_ones = [before for before in tasks[waiting[-1]].after if before not in order]
-            if open_ones:
-                waiting.extend(reversed(open_ones))
-            else:
+            latest = waiting[-1]
+            open_ones = [before for before in tasks[latest].after if before not in order]
+            if not open_ones:
                 order[waiting.pop()] = None
+                begun.pop(latest, None)
+            elif latest in begun:
+                circle = [*begun][[*begun].index(latest) :]
+                raise PlanError(f"tasks wait for one another: {', '.join(map(repr, [*circle, latest]))}")
+            else:
+                begun[latest] = None
+                waiting.extend(reversed(open_ones))
     return tuple(order)
 
 
-def _readers(tasks: Mapping[str, Task]) -> dict[str, tuple[str, ...]]:
-    readers: dict[str, list[str]] = {name: [] for name in tasks}
-    for name, task in tasks.items():
-        for before in dict.fromkeys(task.after):
-            readers[before].append(name)
-    return {name: tuple(some) for name, some in readers.items()}
+class _Readers(Mapping[str, tuple[str, ...]]):
+    """Task to the tasks that read its outputs: as numbers, the places of those of the first task, of the second, ..."""
+
+    def __init__(self, tasks: Mapping[str, Task], order: tuple[str, ...], place: Mapping[str, int]) -> None:
+        read = np.fromiter((place[before] for name in order for before in tasks[name].after), np.int32)
+        reader = np.repeat(np.arange(len(order), dtype=np.int32), [len(tasks[name].after) for name in order])
+        self._order, self._place = order, place
+        self._readers = reader[np.argsort(read, kind="stable")]
+        self._begins = np.searchsorted(np.sort(read), np.arange(len(order) + 1))
+
+    def __getitem__(self, name: str) -> tuple[str, ...]:
+        place = self._place[name]
+        readers = self._readers[self._begins[place] : self._begins[place + 1]]
+        return tuple(map(self._order.__getitem__, readers.tolist()))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._order)
+
+    def __len__(self) -> int:
+        return len(self._order)
 
 
 def _late(tasks: Mapping[str, Task], order: Iterable[str]) -> frozenset[str]:

@@ -14,12 +14,10 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from scripts.progress import Progress, Stage
 
 from .executors import Executor
-from .manifest import Record
 from .performing import FULL_OR_FORBIDDEN, Failed, Lost, Made, Message, Noted, Order, Told, perform
 from .plan import Plan
 from .status import Status
@@ -62,9 +60,6 @@ class Outcome:
 
     failures: dict[str, str] = field(default_factory=dict)
     """Task to what was wrong, in one line."""
-
-    facts: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    """Task to what its function returned, for tasks whose outputs are there, whenever they were done."""
 
     interrupted: bool = False
     """By Ctrl-C."""
@@ -153,7 +148,7 @@ def order_for(
         function=task.function,
         arguments=task.arguments,
         inputs=inputs,
-        outputs=task.outputs,
+        outputs=tuple(task.outputs),
         output=os.fspath(workspace.output),
         scratch=os.fspath(workspace.scratch()),
         finished=tuple(finished),
@@ -190,9 +185,9 @@ class _Run:
         self.wanted = plan.late | {name for name, standing in self.status.survey().items() if standing.reasons}
         self.mends, self.damaged = mends, False
         """Whether what turns out to be damaged will be made again, and whether anything did."""
-        self.places = {name: place for place, name in enumerate(plan.order)}
-        self.open_before = {name: len(set(task.after)) for name, task in plan.tasks.items()}
-        self.ready = [place for name, place in self.places.items() if not self.open_before[name]]
+        self.open_before = [len(plan.tasks[name].after) for name in plan.order]
+        """Of every task, by its place: how many before it are not settled yet."""
+        self.ready = [place for place, number in enumerate(self.open_before) if not number]
         self.at_work: dict[str, Order] = {}
         self.shares: dict[str, float] = {}
         self.losses: Counter[str] = Counter()
@@ -271,14 +266,14 @@ class _Run:
     def _put_in_place(self, made: Made, order: Order) -> None:
         key = self.status.key(made.name, order.finished)
         try:
-            record = self.workspace.put_in_place(order, key, made, self.status.made_of(made.name))
+            self.workspace.put_in_place(order, key, made, self.status.made_of(made.name))
         except OSError as error:
             shutil.rmtree(order.scratch, ignore_errors=True)
             where = f"{error.filename2 or error.filename or self.workspace.output}: "
             hopeless = error.errno in FULL_OR_FORBIDDEN
             self._failed(Failed(made.name, f"{where}{error.strerror or error}", hopeless=hopeless))
             return
-        self._settle(made.name, State.DONE, record)
+        self._settle(made.name, State.DONE)
 
     def _lost(self, lost: Lost) -> None:
         order = self.at_work.pop(lost.name)
@@ -313,24 +308,21 @@ class _Run:
             self.workspace.discard(task.outputs)
         self._settle(failed.name, State.FAILED)
 
-    def _settle(self, name: str, state: State, record: Record | None = None) -> None:
+    def _settle(self, name: str, state: State) -> None:
         """A task has come to its end: those after it may begin."""
         self.outcome.states[name] = state
         task = self.plan.tasks[name]
         if state.there:
-            record = record or self.workspace.manifest.get(name)
-            if record and record.facts:
-                self.outcome.facts[name] = record.facts
             self.workspace.manifest.failures.pop(name, None)
             self._discard_before(task)
         self.shares.pop(name, None)
         if name in self.wanted:
             self.weight_done += task.weight
             self.made[task.unit] += task.amount
-        for reader in self.plan.readers[name]:
-            self.open_before[reader] -= 1
-            if not self.open_before[reader]:
-                heapq.heappush(self.ready, self.places[reader])
+        for place in map(self.plan.place.__getitem__, self.plan.readers[name]):
+            self.open_before[place] -= 1
+            if not self.open_before[place]:
+                heapq.heappush(self.ready, place)
 
     def _discard_before(self, task: Task) -> None:
         """Delete what was made for this task, and for others that are done as well."""

@@ -45,6 +45,8 @@ INPUT, OPTIONS, PROGRAM = "input changed", "options changed", "the program chang
 DEPENDS = "what it reads is made anew"
 FORCED = "--force"
 
+NEVER_DONE = (Reason(NO_OUTPUT),)
+
 
 @dataclass(frozen=True, slots=True)
 class Standing:
@@ -79,7 +81,7 @@ class Status:
         self._plan, self._manifest, self._output = plan, manifest, output
         self._force, self._done_here = force, done_here
         self._inputs: dict[str, tuple[tuple[int, int] | None, str | None]] = {}
-        self._keys: dict[str, str] = {}
+        self._keys: dict[str, bytes] = {}
 
     # -- keys ---------------------------------------------------------------------------------------------------------
 
@@ -91,9 +93,9 @@ class Status:
         if there is not None or name not in self._keys:
             task = self._plan.tasks[name]
             inputs = {path: self._digest(path) for path in task.inputs}
-            before = {one: self.key(one) for one in (task.after if there is None else there)}
-            self._keys[name] = task_key(task, inputs, before, self._plan.version_of(task.function))
-        return self._keys[name]
+            before = ((one, self.key(one)) for one in sorted(task.after if there is None else there))
+            self._keys[name] = bytes.fromhex(task_key(task, inputs, before, self._plan.version_of(task.function)))
+        return self._keys[name].hex()
 
     def seen(self, name: str) -> dict[str, tuple[int, int] | None]:
         """The absolute paths of a task's inputs, and what was seen of them when the key was made."""
@@ -124,7 +126,7 @@ class Status:
         """Why there is something to do for a task; empty where it is done. `there` as of `key`."""
         key, record, task = self.key(name, there), self._manifest.get(name), self._plan.tasks[name]
         if record is None:
-            return (Reason(NO_OUTPUT),)
+            return NEVER_DONE
         if not record.key:
             return (Reason(UNFINISHED),)
         if record.key != key:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import importlib
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FUNCTION = re.compile(r"[a-z_]\w*(?:\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII)
 """package.module:function"""
 
-SHORT = 64
+SHORT = 256
 """Characters of an argument that is kept once for all tasks that have the same."""
 
 Step = TypeVar("Step", bound=Callable[..., Mapping[str, Any] | None])
@@ -40,7 +41,56 @@ def _plain(value: Any) -> Any:
 
 @lru_cache(maxsize=256)
 def _loaded(text: str) -> Any:
-    return json.loads(text)
+    value = json.loads(text)
+    return [_plain(one) for one in value] if isinstance(value, list) else value
+
+
+class Paths(Sequence[str]):
+    """Paths, joined when they are asked for.
+
+    Many tasks make files of the same names below folders of their own. Such names are kept once for all of them.
+
+    Parameters
+    ----------
+    paths : iterable of str
+    """
+
+    __slots__ = ("_pieces", "_stem")
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        listed = tuple(paths)
+        self._stem = _stem_of(listed)
+        self._pieces = _once(tuple(tuple(path.split(self._stem)) if self._stem else (path,) for path in listed))
+
+    def __len__(self) -> int:
+        return len(self._pieces)
+
+    def __getitem__(self, index: int | slice) -> str | tuple[str, ...]:
+        return tuple(self)[index]
+
+    def __iter__(self) -> Iterator[str]:
+        return map(self._stem.join, self._pieces)
+
+    def __eq__(self, other: object) -> bool:
+        return tuple(self) == tuple(other) if isinstance(other, Paths | tuple) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+
+def _stem_of(paths: Sequence[str]) -> str:
+    """What all paths hold of the first: all before its extension, or its folder; empty where they hold neither."""
+    stems = (path.rpartition(end)[0] for path in paths[:1] for end in "./")
+    return next((stem for stem in stems if stem and all(stem in path for path in paths)), "")
+
+
+@lru_cache(maxsize=256)
+def _once(pieces: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
+    """The first that was the same."""
+    return pieces
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +116,11 @@ class Task:
     """Files from outside that it reads. When their content changes, the task is done again. Relative ones count from
     the folder in which the program was started."""
 
-    outputs: tuple[str, ...] = ()
+    outputs: Sequence[str] = ()
     """All files that it makes: paths with "/" below the output folder, at least one."""
 
     after: tuple[str, ...] = ()
-    """The tasks whose outputs it reads."""
+    """The tasks whose outputs it reads, each named once."""
 
     title: str = ""
     """What people read of it; the name unless given."""
@@ -95,13 +145,15 @@ class Task:
         # What came back from JSON is what a worker, or the next run, will be given; what is the same is shared.
         plain = {name: _plain(value) for name, value in dict(self.arguments).items()}
         object.__setattr__(self, "arguments", plain)
-        for name in ("inputs", "outputs", "after"):
-            object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
+        object.__setattr__(self, "function", sys.intern(self.function))
+        object.__setattr__(self, "inputs", tuple(map(str, self.inputs)))
+        object.__setattr__(self, "outputs", Paths(map(str, self.outputs)))
+        object.__setattr__(self, "after", tuple(dict.fromkeys(map(str, self.after))))
         object.__setattr__(self, "title", self.title or self.name)
 
     def as_json(self) -> dict[str, Any]:
         """Every field, for `Task(**fields)`."""
-        return {name: getattr(self, name) for name in self.__slots__}
+        return {name: getattr(self, name) for name in self.__slots__} | {"outputs": [*self.outputs]}
 
 
 def step(function: Step) -> Step:

@@ -89,7 +89,7 @@ class Workspace:
         """A folder for the outputs of a task at work, where they will be: empty, or yet to be made."""
         return self._used.pop() if self._used else self.own / "scratch" / uuid.uuid4().hex[:12]
 
-    def put_in_place(self, order: Order, key: str, made: Made, made_of: Mapping[str, Any] | None = None) -> Record:
+    def put_in_place(self, order: Order, key: str, made: Made, made_of: Mapping[str, Any] | None = None) -> None:
         """Move the outputs that an order asked for to where they belong, and take down that its task is done.
 
         Raises
@@ -111,10 +111,8 @@ class Workspace:
             shutil.rmtree(beside, ignore_errors=True)
         else:
             self._used.append(Path(beside))
-        record = Record(key, outputs, made.seconds, made.facts, made_of or {})
-        self.manifest.add(order.name, record)
+        self.manifest.add(order.name, Record(key, outputs, made.seconds, made.facts, made_of or {}))
         self.done_here.add(order.name)
-        return record
 
     def withdraw(self, names: Iterable[str]) -> None:
         """Undo tasks: their outputs are deleted, and nothing is known of them any more."""

@@ -40,7 +40,8 @@ def test_tasks_are_done_and_their_outputs_are_in_place(output: Path, executor: s
     outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
     assert states(outcome) == done("a", "b", "c")
     assert contents(output) == {"a.txt": "1", "b.txt": "2", "c.txt": "12"}
-    assert outcome.facts["a"] == {"characters": 1}
+    with Workspace(output, shared=True) as workspace:
+        assert workspace.manifest.get("a").facts == {"characters": 1}
     assert str(outcome) == "3 done"
 
 
