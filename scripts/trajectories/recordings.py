@@ -56,6 +56,9 @@ class Recording:
     """For a file of several bodies of which none was named: what was taken, what is left, how to name it. And what
     there is to say of those that were taken."""
 
+    body: str = ""
+    """The body that was asked for by name; empty where the first was, or all."""
+
 
 class TrajectoryError(ValueError):
     """Why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
@@ -116,7 +119,8 @@ class Selection:
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
                 f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
             )
-        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)))
+        named = "" if self.wanted in (None, ALL) else self.wanted
+        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)), named)
 
 
 def unique(names: Sequence[str]) -> list[str]:
