@@ -39,6 +39,9 @@ class Trajectory:
     warnings: tuple[str, ...] = ()
     """What is hard to believe of this recording, a sentence each with the way out."""
 
+    dated: bool = False
+    """Whether its times were dates or clock times, whose unit nobody can mistake."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:

@@ -70,13 +70,15 @@ class Table:
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
         """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         wanted = {name: self.columns[name] for name in columns}
-        return parse_rows(self.path, self._rows(), self.separator, wanted, self.width, dtype)
+        needed = max(self.columns.values()) + 1
+        return parse_rows(self.path, self._rows(), self.separator, wanted, self.width, dtype, needed=needed)
 
-    def texts(self, column: int) -> Iterator[str]:
-        """The cells of the column at this index, without quotes, row by row; empty where a row is too short."""
-        for _, line in self._rows():
-            cells = line.replace('"', "").split(self.separator)
-            yield cells[column].strip() if column < len(cells) else ""
+    def cells(self, column: str) -> Iterator[tuple[int, str]]:
+        """The cells of a column, without quotes, with their lines; empty where a row is too short."""
+        index = self.columns[column]
+        for number, line in self._rows():
+            cells = line.replace('"', "").split(self.separator, index + 1)
+            yield number, cells[index].strip() if index < len(cells) else ""
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         stripped = ((number, line.strip(" ")) for number, line in lines_of(self.path, after=self.header))
@@ -167,6 +169,15 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
         raise TrajectoryError(path, f"this line is no header ({error})", "name a file of columns", number) from None
 
 
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
 @dataclass(frozen=True)
 class HeaderLine:
     """A line that may name the columns."""
@@ -254,6 +265,8 @@ def parse_rows(
     columns: Mapping[str, int],
     width: int,
     dtype: type = np.float64,
+    *,
+    needed: int = 0,
 ) -> np.ndarray:
     """The numbers of some columns.
 
@@ -270,6 +283,8 @@ def parse_rows(
         How many cells a row may have. Empty ones beyond are no matter; too few matter where a wanted one is missing.
     dtype : type
         Of the result.
+    needed : int
+        How many cells a row has to have; all up to the last wanted one in any case.
 
     Returns
     -------
@@ -287,7 +302,7 @@ def parse_rows(
         if count > MOST_ROWS:
             problem = f"more than {MOST_ROWS} rows"
             raise TrajectoryError(path, problem, "split the recording, or export it at a lower rate", block[-1][0])
-        blocks.append(_parse_block(path, block, separator, columns, width, dtype))
+        blocks.append(_parse_block(path, block, separator, columns, width, dtype, needed))
     return np.concatenate(blocks)
 
 
@@ -298,8 +313,9 @@ def _parse_block(
     columns: Mapping[str, int],
     width: int,
     dtype: type,
+    needed: int,
 ) -> np.ndarray:
-    needed = max(columns.values()) + 1
+    needed = max(needed, *(index + 1 for index in columns.values()))
     empty = re.compile(f"(^|{separator}) *(?={separator}|$)")
     lines = []
     for number, line in rows:
