@@ -24,7 +24,7 @@ from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
 from .sense import require_one_body
-from .tables import HeaderLine, Table, header_lines
+from .tables import HeaderLine, Table, header_lines, lines_above_numbers
 from .times import require_seconds, seconds_of
 
 MOST_LABELS = 0.5
@@ -97,15 +97,31 @@ def _seconds(table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: L
 
 
 def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:
-    """The line that names all that is needed; where none does, TrajectoryError says what the nearest lacks."""
-    nearest: tuple[ColumnProblem, int] | None = None
+    """The line that names all that is needed: one of the first, or the only one further down that numbers follow.
+
+    Where none does, TrajectoryError says what the nearest lacks.
+    """
+    problems: list[tuple[ColumnProblem, int]] = []
     for line in header_lines(path):
         try:
             return line, layout_of(line.cells, options)
         except ColumnProblem as problem:
-            if nearest is None or problem.known > nearest[0].known or not nearest[0].known:
-                nearest = problem, line.number
-    problem, number = nearest
+            problems.append((problem, line.number))
+    found = []
+    for line in lines_above_numbers(path):
+        try:
+            found.append((line, layout_of(line.cells, options)))
+        except ColumnProblem as problem:
+            problems.append((problem, line.number))
+    if len(found) == 1:
+        return found[0]
+    if found:
+        numbers = " and ".join(str(line.number) for line, _ in found[:2])
+        problem = f"lines {numbers} both name columns, with others before them"
+        raise TrajectoryError(path, problem, "make a file of each table, without what is before it", found[0][0].number)
+    problem, number = max(problems, key=lambda known: known[0].known)
+    if not problem.known:
+        problem, number = problems[-1]
     raise TrajectoryError(path, problem.problem, problem.way_out, number)
 
 

@@ -49,6 +49,9 @@ BLOCK = 1 << 14
 MOST_COMMENTS = 100
 """Lines. Behind so many no header is looked for."""
 
+MOST_METADATA = 50
+"""Lines. Among so many a header is looked for that has others before it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -204,7 +207,7 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
         if not text or text.lower().startswith("sep="):
             continue
         header = text.lstrip("# \t")
-        separator = max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
+        separator = _separator_of(header)
         yield HeaderLine(number, separator, cells_of(path, number, header, separator))
         comments += 1
         if not text.startswith("#") or comments > MOST_COMMENTS:
@@ -212,6 +215,34 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
     if not comments:
         raise TrajectoryError(path, "the file is empty", "it needs a line that names its columns, and rows")
     yield HeaderLine(number, None, [])
+
+
+def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
+    """The lines near the beginning that a row of numbers with as many cells follows, and that hold none themselves.
+
+    A row is one of numbers where more than half of the cells that are not empty are some. Blank lines are skipped.
+    """
+    above: HeaderLine | None = None
+    for number, line in islice(lines_of(path), MOST_METADATA):
+        text = line.strip().lstrip("# \t")
+        if not text:
+            continue
+        if above and _are_numbers(cells := cells_of(path, number, text, above.separator), above.separator):
+            if len(cells) == len(above.cells) and not any(map(is_number, above.cells)):
+                yield above
+            above = None
+        else:
+            separator = _separator_of(text)
+            above = HeaderLine(number, separator, cells_of(path, number, text, separator))
+
+
+def _are_numbers(cells: Sequence[str], separator: str | None) -> bool:
+    filled = [cell if separator == "," else cell.replace(",", ".") for cell in cells if cell]
+    return sum(map(is_number, filled)) > len(filled) / 2
+
+
+def _separator_of(header: str) -> str | None:
+    return max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
 
 
 def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[str] = ()) -> Table:
