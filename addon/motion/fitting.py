@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import twists
-from .modes import MODES, interpolate
+from .modes import MODES, interpolate, mode_named
 from .poses import Poses
 from .quaternions import align_signs, conjugate, multiply, normalise, rotate
 from .reduction import check_radius, check_recording
@@ -60,8 +60,7 @@ def fit_keys(
     Gauss and Newton's method, a few keys at a time: those that are so far from one another that no segment depends on
     two, and then their neighbours. Each is moved only if that is better.
     """
-    if mode not in MODES:
-        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    found = mode_named(mode)
     check_radius(radius)
     if radius == 0.0:
         raise ValueError(f"a radius of {radius} is not above zero: turns would not count")
@@ -69,7 +68,7 @@ def fit_keys(
     check_recording(times, poses)
     _check_keys(keys, len(times))
     fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)
-    apart = MODES[mode].behind + MODES[mode].ahead + 2
+    apart = found.behind + found.ahead + 2
     for _ in range(SWEEPS):
         for first in range(min(apart, len(keys))):
             fitting.improve(np.arange(first, len(keys), apart))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,6 +116,18 @@ KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if
 """The modes for keys that are all known from the beginning."""
 
 
+def mode_named(name: str) -> Mode:
+    """The mode of a name in `MODES`. Raises ValueError for another, and says which there are."""
+    if name not in MODES:
+        raise ValueError(no_such_mode(name, MODES))
+    return MODES[name]
+
+
+def no_such_mode(name: str, modes: Iterable[str]) -> str:
+    """What there is to say of a name that is none of these modes."""
+    return f"there is no mode {name!r}; the modes are {', '.join(modes)}"
+
+
 def interpolate(
     key_times: ArrayLike, keys: Poses, times: ArrayLike, mode: str = "dq_sclerp", *, extrapolate: bool = False
 ) -> Poses:
@@ -156,8 +168,7 @@ def interpolate(
     >>> interpolate([0, 1], keys, [0.5], "dq_sclerp").positions.round(6)
     array([[ 0.5     , -0.207107,  0.      ]])
     """
-    if mode not in MODES:
-        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    curves_of_mode = mode_named(mode).curves
     key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
     keys = _checked(key_times, keys)
     if keys.shape[-1] == 1:
@@ -169,12 +180,12 @@ def interpolate(
         return keys[..., :0]
     # Rising times that end in finite numbers are finite throughout, and what is not finite does not rise.
     if np.all(times[..., 1:] >= times[..., :-1]) and np.isfinite(times[..., [0, -1]]).all():
-        return interpolate_along(MODES[mode].curves, key_times, keys, times, extrapolate)
+        return interpolate_along(curves_of_mode, key_times, keys, times, extrapolate)
     if not np.isfinite(times).all():
         raise ValueError("times to interpolate at need to be finite numbers")
     order = np.argsort(times, axis=-1, kind="stable")
     rising = np.take_along_axis(times, order, axis=-1)
-    poses = interpolate_along(MODES[mode].curves, key_times, keys, rising, extrapolate)
+    poses = interpolate_along(curves_of_mode, key_times, keys, rising, extrapolate)
     inverse = np.broadcast_to(np.argsort(order, axis=-1, kind="stable"), poses.shape)
     return Poses(
         np.take_along_axis(poses.positions, inverse[..., None], axis=-2),
@@ -230,12 +241,11 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     ValueError
         As `interpolate` does; so does what is returned.
     """
-    if mode not in MODES:
-        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    curves_of_mode = mode_named(mode).curves
     key_times = np.asarray(key_times, dtype=np.float64)
     keys = _checked(key_times, keys)
     shape = (*keys.shape[:-1], keys.shape[-1] - 1)
-    within = prepare_within(MODES[mode].curves, key_times, keys)
+    within = prepare_within(curves_of_mode, key_times, keys)
 
     def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
         counts, progress = np.asarray(counts), np.asarray(progress, dtype=np.float64)

@@ -10,7 +10,7 @@ from numbers import Integral
 import numpy as np
 
 from .key_search import Recording, Search
-from .modes import MODES
+from .modes import mode_named
 from .poses import LIMIT, SHORTEST, Poses
 from .quaternions import align_signs
 
@@ -76,8 +76,7 @@ def check_wishes(mode: str, tolerance: float | None, budget: int | None) -> None
     """A ValueError that says what is wrong with what is asked for."""
     if (tolerance is None) == (budget is None):
         raise ValueError("key reduction needs either a tolerance or a budget of keys")
-    if mode not in MODES:
-        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
+    mode_named(mode)
     if tolerance is not None and not 1.0 / LIMIT < float(tolerance) < LIMIT:
         raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
     if budget is not None and (isinstance(budget, bool) or not isinstance(budget, Integral)):

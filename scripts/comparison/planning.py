@@ -28,7 +28,7 @@ from .stage.settings import StageSettings, place_of_subject
 from .stage.timeline import Timeline
 from .study.choices import Choice, choice_parts, fewest_keys
 from .study.metrics import table_names
-from .study.reading import folder_names
+from .study.reading import clip_names
 from .study.storage import ClipReference, file_names, read_facts, read_times
 from .version import step_versions
 
@@ -163,7 +163,7 @@ def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> 
     recordings = [task.arguments["recording"] for task in read]
     known = {recording: read_facts(output, recording) for recording in dict.fromkeys(recordings)}
     bodies = [(recording, body) for recording in recordings for body in range(len(known[recording].names))]
-    names = folder_names(known[recording].names[body] for recording, body in bodies)
+    names = clip_names([(known[recording].names[body], known[recording].bodies[body]) for recording, body in bodies])
     notes = [known[recording].note for recording in recordings if known[recording].note]
     studies = []
     for (recording, body), name in zip(bodies, names, strict=True):

@@ -96,7 +96,7 @@ def plan(
         tasks.append(
             _task("catching, a film", "film_catching", outputs, ("catching",), source=asset["throw"], weight=90.0)
         )
-    before = {task.name: task.outputs for task in tasks if task.name not in measuring}
+    before = {task.name: tuple(task.outputs) for task in tasks if task.name not in measuring}
     tasks.append(_task("page", "write", (PAGE,), tuple(before), arguments={"files": before}, partial=True))
     return Plan(tasks, version)
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from addon.motion import MODES, Poses
+from addon.motion import Poses
+from addon.motion.modes import mode_named
 from addon.motion.quaternions import align_signs, normalise
 
 from .admission import CLOCK, admit, is_sound, missing
@@ -127,7 +128,7 @@ def receive(
     display_times : array-like, shape (m,)
         Of the frames, not falling.
     mode : str
-        A key of `MODES`: any, for only how far it looks behind and ahead makes a difference here.
+        A key of `addon.motion.MODES`: any, for only how far it looks behind and ahead makes a difference here.
     play_out : PlayOut
 
     Returns
@@ -141,15 +142,15 @@ def receive(
     ValueError
         For an unknown mode, shapes that do not fit, and times that are no numbers or fall.
     """
-    play_out = play_out or PlayOut()
+    play_out, ahead = play_out or PlayOut(), mode_named(mode).ahead
     arrivals, display_times = np.asarray(arrivals, np.float64), np.asarray(display_times, np.float64)
-    _check(packets, arrivals, display_times, mode)
+    _check(packets, arrivals, display_times)
     # What arrives after the last frame has no say in any.
     end = display_times.max(initial=-np.inf) + CLOCK
     order = np.argsort(arrivals, kind="stable")
     order = order[arrivals[order] <= end]
     packets, arrivals, sound = packets[order], arrivals[order], is_sound(packets[order])
-    lead = (1.0 + MODES[mode].ahead) * packets.interval
+    lead = (1.0 + ahead) * packets.interval
     delay = _delay(packets, arrivals, sound, lead, play_out)
     rows, events = admit(packets, arrivals, sound, delay, lead)
     if not len(rows):
@@ -181,10 +182,8 @@ def receive(
     return Playback(times, Poses(poses.positions, align_signs(poses.quaternions)), delay, ran_out, tuple(events))
 
 
-def _check(packets: Packets, arrivals: np.ndarray, display_times: np.ndarray, mode: str) -> None:
+def _check(packets: Packets, arrivals: np.ndarray, display_times: np.ndarray) -> None:
     """Raise a ValueError that says what is wrong with what `receive` was given."""
-    if mode not in MODES:
-        raise ValueError(f"there is no mode {mode!r}; the modes are {', '.join(MODES)}")
     if arrivals.shape != (len(packets),):
         raise ValueError(f"arrivals of shape {arrivals.shape} do not fit {len(packets)} packets")
     if not (arrivals > -np.inf).all():

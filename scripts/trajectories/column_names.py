@@ -54,10 +54,10 @@ TURNS = ("roll", "pitch", "yaw")
 """Euler angles that do not name their axis."""
 
 _WORDS = {
-    "time": "t ts time times timestamp timestamps stamp clock elapsed realtime",
+    "time": "t ts time times timestamp timestamps stamp clock elapsed realtime datetime",
     "beside time": "since start startup begin beginning launch recording session game app unity unreal system sys host "
     "unix epoch utc posix absolute relative rel abs total sample capture log header field rosbag from of in at the "
-    "real level load unscaled scaled",
+    "real level load unscaled scaled date iso",
     "devices": "device tracker controller body object node joint bone hand side role name id",
     "beside devices": "label serial xr tracked rigid game",
     "without meaning": "m local world global pose transform tf field data value component",
@@ -68,6 +68,9 @@ TIME = frozenset(_WORDS["time"].split())
 
 WITH_TIME = TIME | frozenset(_WORDS["beside time"].split())
 """And those that may stand with them, and change nothing. `delta` and `frame` do."""
+
+DATES = {"date", "datetime", "iso"}
+"""Words that tell of a time that it is a date."""
 
 DEVICES = tuple(_WORDS["devices"].split())
 """Words for whose a row is, what tells most first."""
@@ -92,7 +95,7 @@ class ColumnName:
     """"time", "scale", "device", or one of `KINDS`."""
 
     axis: str = ""
-    """x, y, z, w, or one of `TURNS`; of a device the word for it."""
+    """x, y, z, w, or one of `TURNS`; of a device the word for it; "date" of a time that is called so."""
 
     unit: str = ""
     """One of `UNITS`, or what stood in brackets; empty where nothing is said."""
@@ -139,7 +142,8 @@ def _time(words: list[str], unit: str) -> ColumnName | None:
     timely = not TIME.isdisjoint(others) or (bool(units) and words != ["s"])
     if not timely or not WITH_TIME.issuperset(others):
         return None
-    return ColumnName("time", unit=unit or (units[-1] if units else ""))
+    dated = "" if DATES.isdisjoint(others) else "date"
+    return ColumnName("time", dated, unit or (units[-1] if units else ""))
 
 
 def _device(words: list[str]) -> ColumnName | None:

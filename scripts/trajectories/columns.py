@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
 from .recordings import listed, shown
+from .tables import is_number
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
@@ -39,7 +40,7 @@ class Layout:
 
     time: int
     time_unit: str
-    """One of `TICKS`; empty where nothing says it."""
+    """As the file or the user says it, which need not be one of `TICKS`; empty where nothing does."""
 
     bodies: Mapping[str, Mapping[str, int]]
     """Of each body by name, empty where its columns have none in front: `POSITION`, then `QUATERNION` or `EULER`, and
@@ -79,6 +80,8 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     needed = (*POSITION, *turn)
     times = [index for index, name in enumerate(names) if name and name.kind == "time"]
     times = [explicit["t"]] if "t" in explicit else [index for index in times if index not in explicit.values()]
+    # A date beside a count of seconds says the same again.
+    times = [index for index in times if names[index] is None or names[index].axis != "date"] or times
     whole = {
         key: found
         for key, found in bodies.items()
@@ -92,7 +95,8 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     time = _only("t", times, cells, known)
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
-    return Layout(time, _time_unit(cells, units.get(time, ""), options, known), where, units, _devices(names, explicit))
+    unit = options.time_unit or units.get(time, "")
+    return Layout(time, unit, where, units, _devices(names, explicit))
 
 
 def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict[str, int]:
@@ -150,12 +154,6 @@ def _only(meaning: str, indices: Sequence[int], cells: Sequence[str], known: int
     return indices[0]
 
 
-def _time_unit(cells: Sequence[str], unit: str, options: ReadingOptions, known: int) -> str:
-    if options.time_unit or unit in TICKS or not unit:
-        return options.time_unit or unit
-    raise ColumnProblem(f"{shown(unit)} is no unit of time that is known", f"--time-unit {', '.join(TICKS)}", known)
-
-
 def _devices(names: Sequence[ColumnName | None], explicit: Mapping[str, int]) -> tuple[int, ...]:
     if "device" in explicit:
         return (explicit["device"],)
@@ -198,7 +196,7 @@ def _missing(
     others = ",".join(f"{one}=NAME" for one in missing[:3]) + ",..." * (len(missing) > 3)
     way_out = f"known are {KNOWN}; or --columns {others}"
     if not any(names) and not explicit:
-        if all(map(_is_number, cells)):
+        if all(map(is_number, cells)):
             way_out = f"write a first line of names: {','.join(('t', *needed))}"
         return ColumnProblem(f"no column has a known name (found {columns_found(cells)})", way_out, 0)
     lacking = f" for {shown(nearest.label)}" if nearest.label else ""
@@ -207,18 +205,17 @@ def _missing(
     )
 
 
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
 def columns_found(cells: Sequence[str]) -> str:
     """The columns that a file has, for an error."""
     names = [cell if len(cell) <= 24 else f"{cell[:24]}..." for cell in dict.fromkeys(cells) if cell]
     return listed(names, limit=MOST_FOUND) or "none"
+
+
+def require_time_unit(layout: Layout) -> None:
+    """Raise ColumnProblem where the unit of time is none that is known. Of dates it is no matter: `t [hh:mm:ss]`."""
+    if layout.time_unit and layout.time_unit not in TICKS:
+        problem = f"{shown(layout.time_unit)} is no unit of time that is known"
+        raise ColumnProblem(problem, f"--time-unit {', '.join(TICKS)}", len(layout.units))
 
 
 def metres_of(layout: Layout, columns: Mapping[str, int], options: ReadingOptions) -> list[float]:

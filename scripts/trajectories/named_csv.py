@@ -9,8 +9,8 @@ is `Trajectory.metres_per_unit`. Euler angles need their order from the user.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 
@@ -18,12 +18,13 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of
+from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of, require_time_unit
+from .dates import kind_of_times, seconds_of_dates
 from .euler import quaternions_from_intrinsic_eulers
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, unique
 from .sense import require_one_body
-from .tables import HeaderLine, Table, header_lines
+from .tables import HeaderLine, Table, header_lines, lines_above_numbers
 from .times import require_seconds, seconds_of
 
 MOST_LABELS = 0.5
@@ -59,20 +60,23 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     """The bodies that are wanted. One without a name of its own has the file's."""
     header, layout = _find_header(path, options)
     width, line = len(header.cells), header.number
-    bodies = _bodies(Table(path, header.separator, {}, width, line), layout, "device" in dict(options.columns))
+    bodies = _bodies(path, header, layout, "device" in dict(options.columns))
     taken = set(selection.of([body.name for body in bodies]))
     wanted = [body for body in bodies if body.name in taken]
     columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
     table = Table(path, header.separator, columns, width, line)
-    numbers = dict(zip(columns, table.parse(list(columns)).T, strict=True))
-    for body in wanted:
-        require_seconds(table, numbers["t"][body.rows], layout.time_unit)
-    times = seconds_of(table, numbers["t"], layout.time_unit)
+    kind = kind_of_times(table)
+    if kind and options.time_unit:
+        problem = f"--time-unit {options.time_unit} is for times that are numbers, and these have {kind}"
+        raise TrajectoryError(path, problem, "leave it out", line)
+    parsed = [name for name in columns if name != "t" or kind is None]
+    numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
+    times = seconds_of_dates(table, kind) if kind else _seconds(table, numbers["t"], wanted, layout)
     trajectories = []
     for body in wanted:
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
         try:
-            trajectory = _trajectory(body, times[body.rows], held, layout, options)
+            trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
         except ColumnProblem as problem:
             raise TrajectoryError(path, problem.problem, problem.way_out, line) from None
         way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
@@ -81,24 +85,52 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     return trajectories
 
 
+def _seconds(table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: Layout) -> np.ndarray:
+    """Times that are numbers, shape (n,), as seconds, where that of all bodies can be."""
+    try:
+        require_time_unit(layout)
+    except ColumnProblem as problem:
+        raise TrajectoryError(table.path, problem.problem, problem.way_out, table.header) from None
+    for body in wanted:
+        require_seconds(table, ticks[body.rows], layout.time_unit)
+    return seconds_of(table, ticks, layout.time_unit)
+
+
 def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:
-    """The line that names all that is needed; where none does, TrajectoryError says what the nearest lacks."""
-    nearest: tuple[ColumnProblem, int] | None = None
+    """The line that names all that is needed: one of the first, or the only one further down that numbers follow.
+
+    Where none does, TrajectoryError says what the nearest lacks.
+    """
+    problems: list[tuple[ColumnProblem, int]] = []
     for line in header_lines(path):
         try:
             return line, layout_of(line.cells, options)
         except ColumnProblem as problem:
-            if nearest is None or problem.known > nearest[0].known or not nearest[0].known:
-                nearest = problem, line.number
-    problem, number = nearest
+            problems.append((problem, line.number))
+    found = []
+    for line in lines_above_numbers(path):
+        try:
+            found.append((line, layout_of(line.cells, options)))
+        except ColumnProblem as problem:
+            problems.append((problem, line.number))
+    if len(found) == 1:
+        return found[0]
+    if found:
+        numbers = " and ".join(str(line.number) for line, _ in found[:2])
+        problem = f"lines {numbers} both name columns, with others before them"
+        raise TrajectoryError(path, problem, "make a file of each table, without what is before it", found[0][0].number)
+    problem, number = max(problems, key=lambda known: known[0].known)
+    if not problem.known:
+        problem, number = problems[-1]
     raise TrajectoryError(path, problem.problem, problem.way_out, number)
 
 
-def _bodies(table: Table, layout: Layout, named: bool) -> list[_Body]:
+def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
     """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
-    groups = _devices(table, layout.devices, named)
+    columns = {f"device {index}": index for index in layout.devices}
+    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number), named)
     bodies = [
-        (f"{device} {prefix}".strip() or table.path.stem, prefix, columns, rows)
+        (f"{device} {prefix}".strip() or path.stem, prefix, columns, rows)
         for device, rows in groups.items()
         for prefix, columns in layout.bodies.items()
     ]
@@ -106,13 +138,13 @@ def _bodies(table: Table, layout: Layout, named: bool) -> list[_Body]:
     return [_Body(name, *rest) for name, (_, *rest) in zip(names, bodies, strict=True)]
 
 
-def _devices(table: Table, columns: Sequence[int], named: bool) -> dict[str, np.ndarray | slice]:
+def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
     """The rows of each device: of the first column that tells several apart, or else that tells the one there is."""
     only = ""
-    for column in columns:
+    for column in table.columns:
         codes: dict[str, int] = {}
-        texts = takewhile(lambda _, codes=codes: len(codes) <= MOST_DEVICES, table.texts(column))
-        of_rows = np.fromiter((codes.setdefault(text, len(codes)) for text in texts), np.int64)
+        cells = takewhile(lambda _, codes=codes: len(codes) <= MOST_DEVICES, table.cells(column))
+        of_rows = np.fromiter((codes.setdefault(text, len(codes)) for _, text in cells), np.int64)
         if len(codes) > MOST_DEVICES and named:
             problem = f"more than {MOST_DEVICES} different values in the column of devices"
             raise TrajectoryError(table.path, problem, "name another with --columns device=NAME", table.header)

@@ -113,7 +113,9 @@ def _read(path: Path, selection: Selection, options: ReadingOptions) -> list[Tra
 
 
 def _doubted(trajectory: Trajectory, time_unit: bool) -> Trajectory:
-    return replace(trajectory, warnings=(*trajectory.warnings, *doubts(trajectory, time_unit=time_unit)))
+    return replace(
+        trajectory, warnings=(*trajectory.warnings, *doubts(trajectory, time_unit=time_unit and not trajectory.dated))
+    )
 
 
 def split_source(source: str) -> tuple[Path, str | None]:

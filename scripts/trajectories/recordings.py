@@ -39,6 +39,9 @@ class Trajectory:
     warnings: tuple[str, ...] = ()
     """What is hard to believe of this recording, a sentence each with the way out."""
 
+    dated: bool = False
+    """Whether its times were dates or clock times, whose unit nobody can mistake."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -55,6 +58,9 @@ class Recording:
     note: str = ""
     """For a file of several bodies of which none was named: what was taken, what is left, how to name it. And what
     there is to say of those that were taken."""
+
+    body: str = ""
+    """The body that was asked for by name; empty where the first was, or all."""
 
 
 class TrajectoryError(ValueError):
@@ -116,7 +122,8 @@ class Selection:
                 f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
                 f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
             )
-        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)))
+        named = "" if self.wanted in (None, ALL) else self.wanted
+        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)), named)
 
 
 def unique(names: Sequence[str]) -> list[str]:

@@ -49,6 +49,9 @@ BLOCK = 1 << 14
 MOST_COMMENTS = 100
 """Lines. Behind so many no header is looked for."""
 
+MOST_METADATA = 50
+"""Lines. Among so many a header is looked for that has others before it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Table:
@@ -70,13 +73,15 @@ class Table:
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
         """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         wanted = {name: self.columns[name] for name in columns}
-        return parse_rows(self.path, self._rows(), self.separator, wanted, self.width, dtype)
+        needed = max(self.columns.values()) + 1
+        return parse_rows(self.path, self._rows(), self.separator, wanted, self.width, dtype, needed=needed)
 
-    def texts(self, column: int) -> Iterator[str]:
-        """The cells of the column at this index, without quotes, row by row; empty where a row is too short."""
-        for _, line in self._rows():
-            cells = line.replace('"', "").split(self.separator)
-            yield cells[column].strip() if column < len(cells) else ""
+    def cells(self, column: str) -> Iterator[tuple[int, str]]:
+        """The cells of a column, without quotes, with their lines; empty where a row is too short."""
+        index = self.columns[column]
+        for number, line in self._rows():
+            cells = line.replace('"', "").split(self.separator, index + 1)
+            yield number, cells[index].strip() if index < len(cells) else ""
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         stripped = ((number, line.strip(" ")) for number, line in lines_of(self.path, after=self.header))
@@ -167,6 +172,15 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
         raise TrajectoryError(path, f"this line is no header ({error})", "name a file of columns", number) from None
 
 
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
 @dataclass(frozen=True)
 class HeaderLine:
     """A line that may name the columns."""
@@ -193,7 +207,7 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
         if not text or text.lower().startswith("sep="):
             continue
         header = text.lstrip("# \t")
-        separator = max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
+        separator = _separator_of(header)
         yield HeaderLine(number, separator, cells_of(path, number, header, separator))
         comments += 1
         if not text.startswith("#") or comments > MOST_COMMENTS:
@@ -201,6 +215,34 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
     if not comments:
         raise TrajectoryError(path, "the file is empty", "it needs a line that names its columns, and rows")
     yield HeaderLine(number, None, [])
+
+
+def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
+    """The lines near the beginning that a row of numbers with as many cells follows, and that hold none themselves.
+
+    A row is one of numbers where more than half of the cells that are not empty are some. Blank lines are skipped.
+    """
+    above: HeaderLine | None = None
+    for number, line in islice(lines_of(path), MOST_METADATA):
+        text = line.strip().lstrip("# \t")
+        if not text:
+            continue
+        if above and _are_numbers(cells := cells_of(path, number, text, above.separator), above.separator):
+            if len(cells) == len(above.cells) and not any(map(is_number, above.cells)):
+                yield above
+            above = None
+        else:
+            separator = _separator_of(text)
+            above = HeaderLine(number, separator, cells_of(path, number, text, separator))
+
+
+def _are_numbers(cells: Sequence[str], separator: str | None) -> bool:
+    filled = [cell if separator == "," else cell.replace(",", ".") for cell in cells if cell]
+    return sum(map(is_number, filled)) > len(filled) / 2
+
+
+def _separator_of(header: str) -> str | None:
+    return max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
 
 
 def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[str] = ()) -> Table:
@@ -254,6 +296,8 @@ def parse_rows(
     columns: Mapping[str, int],
     width: int,
     dtype: type = np.float64,
+    *,
+    needed: int = 0,
 ) -> np.ndarray:
     """The numbers of some columns.
 
@@ -270,6 +314,8 @@ def parse_rows(
         How many cells a row may have. Empty ones beyond are no matter; too few matter where a wanted one is missing.
     dtype : type
         Of the result.
+    needed : int
+        How many cells a row has to have; all up to the last wanted one in any case.
 
     Returns
     -------
@@ -287,7 +333,7 @@ def parse_rows(
         if count > MOST_ROWS:
             problem = f"more than {MOST_ROWS} rows"
             raise TrajectoryError(path, problem, "split the recording, or export it at a lower rate", block[-1][0])
-        blocks.append(_parse_block(path, block, separator, columns, width, dtype))
+        blocks.append(_parse_block(path, block, separator, columns, width, dtype, needed))
     return np.concatenate(blocks)
 
 
@@ -298,8 +344,9 @@ def _parse_block(
     columns: Mapping[str, int],
     width: int,
     dtype: type,
+    needed: int,
 ) -> np.ndarray:
-    needed = max(columns.values()) + 1
+    needed = max(needed, *(index + 1 for index in columns.values()))
     empty = re.compile(f"(^|{separator}) *(?={separator}|$)")
     lines = []
     for number, line in rows:

@@ -76,10 +76,10 @@ def seconds_of(table: Table, ticks: np.ndarray, unit: str) -> np.ndarray:
         with suppress(TrajectoryError):
             ticks = table.parse(["t"], np.int64)[:, 0]
     with np.errstate(over="ignore", invalid="ignore"):
-        return (ticks - _earliest(ticks)) / TICKS[unit]
+        return (ticks - earliest(ticks)) / TICKS[unit]
 
 
-def _earliest(ticks: np.ndarray) -> float:
+def earliest(ticks: np.ndarray) -> float:
     """The earliest time, without wild ones."""
     usable = ticks[np.abs(ticks) < LARGEST]
     if not len(usable):

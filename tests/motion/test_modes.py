@@ -1,6 +1,13 @@
 """The table of modes, as files know it."""
 
-from addon.motion import MODES
+import re
+
+import pytest
+
+from addon.motion import MODES, Poses, interpolate, prepare
+from addon.motion.modes import mode_named
+
+KEYS = Poses([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]] * 2)
 
 
 def test_the_numbers_that_files_store_never_change():
@@ -20,3 +27,17 @@ def test_no_two_modes_have_the_same_number_and_none_has_that_of_blenders_own():
     numbers = [mode.number for mode in MODES.values()]
     assert len(set(numbers)) == len(numbers)
     assert 0 not in numbers
+
+
+def test_a_mode_is_found_by_its_name():
+    assert [mode_named(name) for name in MODES] == list(MODES.values())
+
+
+@pytest.mark.parametrize(
+    "use",
+    [mode_named, lambda mode: interpolate([0.0, 1.0], KEYS, [0.5], mode), lambda mode: prepare([0.0, 1.0], KEYS, mode)],
+    ids=["named", "interpolate", "prepare"],
+)
+def test_a_name_of_no_mode_is_answered_with_those_there_are(use):
+    with pytest.raises(ValueError, match=re.escape(f"there is no mode 'bezier'; the modes are {', '.join(MODES)}")):
+        use("bezier")

@@ -184,7 +184,8 @@ def test_bones_of_any_name_stay_in_the_folder_and_do_not_change_the_report(tmp_p
     output = compared(tmp_path / "hostile", in_a_rig, names)
     assert {path.name for path in tmp_path.iterdir()} == {"plain", "hostile"}
     folders = {path.name for path in output.iterdir() if path.is_dir() and not path.name.startswith(".")}
-    assert folders == {"shot", *(f"shot-{number}" for number in range(2, len(names) + 1))}
+    assert folders == set(folder_names(f"shot-../Rig/{name}" for name in names))
+    assert len(folders) == len(names)
     whole, as_plain = (
         Structure((tmp_path / kind / "output" / "report.html").read_text(encoding="utf-8"))
         for kind in ("hostile", "plain")

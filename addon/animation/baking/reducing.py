@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 
 from ...motion import KEYFRAME_MODES
+from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.slots import places_of, slots_of, transforms_in
 from ..actions.sources import MODE_NAMES, distinct
@@ -102,7 +103,7 @@ def reduce_keys_of(
         take that. Nothing is changed then.
     """
     if mode not in KEYFRAME_MODES:
-        raise Refused(f"there is no mode {mode!r}; the modes are {', '.join(KEYFRAME_MODES)}")
+        raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
         raise Refused(f"the tolerance has to be a number above zero, not {tolerance:g}")
 

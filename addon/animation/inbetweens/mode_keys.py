@@ -14,6 +14,7 @@ from functools import partial
 import bpy
 import numpy as np
 
+from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.mode_property import await_mode, is_keyed
 from ..actions.reading import keyed_in, read
@@ -171,7 +172,7 @@ def set_mode(
                 set_whole(place, mode)
 
     if mode not in MODE_NUMBERS:
-        raise Refused(f"there is no mode {mode!r}; the modes are {', '.join(MODE_NUMBERS)}")
+        raise Refused(no_such_mode(mode, MODE_NUMBERS))
     whole = None if frames is not None else partial(replace, mode=MODE_NUMBERS[mode])
     act_on(targets, plan, act, refused, whole)
 

@@ -38,6 +38,9 @@ class Clip:
     metres_per_unit: float = 1.0
     """The length of the recording's unit. Errors, and what Blender shows, are in metres."""
 
+    body: str = ""
+    """The body that the user asked for by name. It becomes part of the clip's where another clip has the same."""
+
     def in_metres(self, poses: Poses) -> Poses:
         """Poses of this clip with positions in metres."""
         if self.metres_per_unit == 1.0:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from addon.motion import repair
@@ -56,7 +57,7 @@ def read_clips(
     """
     read = [read_source(source, axes, options) for source in sources]
     clips = [clip for some, _ in read for clip in some]
-    names = folder_names(clip.name for clip in clips)
+    names = clip_names([(clip.name, clip.body) for clip in clips])
     return [replace(clip, name=name) for clip, name in zip(clips, names, strict=True)], [
         note for _, note in read if note
     ]
@@ -74,7 +75,7 @@ def read_source(source: str, axes: str, options: ReadingOptions = AS_THE_FILE_SA
     for trajectory in recording.trajectories:
         name = f"{stem}-{trajectory.name}" if several else stem
         try:
-            clips.append(make_clip(trajectory, source, name, axes))
+            clips.append(replace(make_clip(trajectory, source, name, axes), body=recording.body))
         except TrajectoryError as error:
             if not several:
                 raise
@@ -94,6 +95,19 @@ def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip
     return Clip(name, source, axes, times, poses, notes, trajectory.metres_per_unit)
 
 
+def clip_names(wanted: Sequence[tuple[str, str]]) -> list[str]:
+    """Names for clips, as `folder_names` gives them, of what each would like to be called and of its body.
+
+    The body, empty where the user named none, is part of the name only where several would like to be called the same.
+    """
+    folded = [_safe(name).casefold() for name, _ in wanted]
+    alike = Counter(folded)
+    return folder_names(
+        f"{name}-{body}" if body and alike[same] > 1 else name
+        for (name, body), same in zip(wanted, folded, strict=True)
+    )
+
+
 def folder_names(wanted: Iterable[str]) -> list[str]:
     """Names like those wanted that are safe for folders on every system, each unlike all before it.
 
@@ -103,9 +117,7 @@ def folder_names(wanted: Iterable[str]) -> list[str]:
     names: list[str] = []
     unavailable, numbers = set(NOT_FOLDERS), {}
     for name in wanted:
-        safe = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", name)).strip("._-")[:LONGEST_NAME]
-        safe = safe.encode()[:MOST_BYTES].decode(errors="ignore").strip("._-") or "clip"
-        safe = f"clip-{safe}" if safe.casefold().split(".")[0] in DEVICES else safe
+        safe = _safe(name)
         folded = safe.casefold()
         if folded in unavailable:
             number = numbers.get(folded, 2)
@@ -116,3 +128,10 @@ def folder_names(wanted: Iterable[str]) -> list[str]:
         unavailable.add(folded)
         names.append(safe)
     return names
+
+
+def _safe(name: str) -> str:
+    """A name like the one wanted that is safe for a folder."""
+    safe = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", name)).strip("._-")[:LONGEST_NAME]
+    safe = safe.encode()[:MOST_BYTES].decode(errors="ignore").strip("._-") or "clip"
+    return f"clip-{safe}" if safe.casefold().split(".")[0] in DEVICES else safe

@@ -46,6 +46,9 @@ class StoredRecording:
     names: tuple[str, ...]
     """What its clips would like to be called."""
 
+    bodies: tuple[str, ...]
+    """And the body of each that the user asked for by name; empty where none was."""
+
     repairs: tuple[tuple[str, ...], ...]
     """Of each clip."""
 
@@ -67,7 +70,7 @@ def write_recording(arrays: Path, facts: Path, clips: Sequence[Clip], note: str)
         np.savez(beside, **content)
     listed = [
         {"name": clip.name, "source": clip.source, "axes": clip.axes, "repairs": clip.repairs}
-        | {"metres_per_unit": clip.metres_per_unit}
+        | {"metres_per_unit": clip.metres_per_unit, "body": clip.body}
         for clip in clips
     ]
     write_text(facts, json.dumps({"note": note, "clips": listed}, indent=1) + "\n")
@@ -76,8 +79,8 @@ def write_recording(arrays: Path, facts: Path, clips: Sequence[Clip], note: str)
 def read_facts(output: Path, recording: str) -> StoredRecording:
     """What there is to say about a recording."""
     content = json.loads((output / file_names(recording)[1]).read_text(encoding="utf-8"))
-    names, repairs = ([clip[key] for clip in content["clips"]] for key in ("name", "repairs"))
-    return StoredRecording(content["note"], tuple(names), tuple(map(tuple, repairs)))
+    names, bodies, repairs = ([clip[key] for clip in content["clips"]] for key in ("name", "body", "repairs"))
+    return StoredRecording(content["note"], tuple(names), tuple(bodies), tuple(map(tuple, repairs)))
 
 
 def read_times(output: Path, reference: ClipReference) -> np.ndarray:
@@ -103,6 +106,7 @@ def read_clip(output: Path, reference: ClipReference) -> Clip:
         Poses(positions, quaternions, scales),
         tuple(facts["repairs"]),
         facts["metres_per_unit"],
+        facts["body"],
     )
 
 

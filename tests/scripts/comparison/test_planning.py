@@ -137,6 +137,14 @@ def test_a_source_that_is_named_twice_is_read_once_and_gives_two_clips(tmp_path:
     assert len([task for task in comparison_tasks(found.studies, read, WANTED) if task.name.startswith("read")]) == 1
 
 
+def test_clips_of_bodies_that_were_named_in_one_file_have_their_names(tmp_path: Path) -> None:
+    read = reading_tasks(["log.csv:left", "log.csv:right"], "blender")
+    for task, body in zip(read, ("left", "right"), strict=True):
+        store(tmp_path, task, [replace(swinging_clip("log"), body=body)])
+    assert [study.clip.name for study in look_into(tmp_path, read, [Uniform("5")]).studies] == ["log-left", "log-right"]
+    assert [study.clip.name for study in look_into(tmp_path, read[1:], [Uniform("5")]).studies] == ["log"]
+
+
 def store(output: Path, task: Task, clips: list[Clip]) -> None:
     arrays, facts = file_names(task.arguments["recording"])
     write_recording(output / arrays, output / facts, clips, "")

@@ -24,6 +24,7 @@ NUMBERS = (
 PLAIN_WORDS = r"""
 * .. ../../x { } {} [ ] [] , ; : " "" ' # \ \u0000 \ud800 null true --> <script>
 t qw s scale time timestamp p_RS_R_x [ns] HIERARCHY ROOT JOINT OFFSET CHANNELS MOTION Frames: Xposition
+2026-11-22T10:00:00Z 9999-99-99T99:99:99 10:00:00.5 +25:00
 timestamp_ms t_ns x_mm pos_x left_x rot_w device hand roll euler_x
 Zrotation poses rotation Rotation Position Type XYZ Quaternion Meters
 """

@@ -79,6 +79,7 @@ MOTION
 
 _SCALES = np.linspace(1.0, 1.2, COUNT)
 _POSE = ("px", "py", "pz", "qx", "qy", "qz", "qw")
+_POSE_ROWS = _rows((POSITIONS, XYZW)).splitlines(keepends=True)
 _EUROC = (
     "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],v_RS_R_x [m s^-1]\n"
 )
@@ -94,6 +95,8 @@ SEEDS: dict[str, tuple[str, ...]] = {
         + "\t".join(f"{body}_{name}" for body in ("left", "right") for name in _POSE)
         + "\n"
         + _rows((1e6 * TIMES, POSITIONS, XYZW, POSITIONS, XYZW), "\t"),
+        "Recorder v1.2\nDate: 2026-11-22\n\ntime,x,y,z,qx,qy,qz,qw\n"
+        + "".join(f"2026-11-22T23:59:59.{row:02}+01:00,{line}" for row, line in enumerate(_POSE_ROWS)),
         '# a comment\n"t"\t"x"\t"y"\t"z"\t"qx"\t"qy"\t"qz"\t"qw"\n' + _rows((TIMES, POSITIONS, XYZW), "\t"),
     ),
     ".tum": (

@@ -153,6 +153,45 @@ def test_a_missing_column_is_answered_with_the_columns_that_are_needed(write, re
     )
 
 
+METADATA = ["Recorder v1.2", "Date: 2026-11-22", "Rate,90", 'Operator,"Ann, Bob"', "", "# calibrated", "gain;1;2;3"]
+
+
+@pytest.mark.parametrize("count", range(len(METADATA) + 1))
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_a_header_is_found_behind_lines_that_are_none(write, count: int, separator: str) -> None:
+    table = f"{HEADER}\n\n{ROWS}".replace(",", separator)
+    assert_holds_the_rows(write("take.csv", "\n".join([*METADATA[:count], table])))
+
+
+def test_a_header_behind_other_lines_may_have_columns_without_numbers_and_a_row_with_empty_cells(write) -> None:
+    rows = "left,A,0.0,1,2,3,0.1,0.2,0.3,0.9\nleft,B,0.1,4,5,6,0.4,0.5,0.6,0.4\n"
+    assert_holds_the_rows(write("take.csv", f"Recorder v1.2\nhand,button,{HEADER}\n{rows}"))
+    gap = "0.0,,,,,,,\n0.1,4,5,6,0.4,0.5,0.6,0.4\n"
+    (trajectory,) = read_trajectories(write("take.csv", f"Recorder v1.2\n{HEADER}\n{gap}")).trajectories
+    np.testing.assert_array_equal(trajectory.times, [0.0, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        (
+            f"Recorder v1.2\n\n{HEADER[:-3]}\n" + ROWS.replace(",0.9", "").replace(",0.4\n", "\n"),
+            3,
+            "no column named qw",
+        ),
+        (f"Recorder v1.2\na,b,c\n{ROWS}", 1, "no column has a known name (found Recorder, v1.2)"),
+        (f"Recorder v1.2\n{HEADER},spare\n{ROWS}", 1, "no column has a known name (found Recorder, v1.2)"),
+        (f"Recorder\n{HEADER}\n{ROWS}{HEADER}\n{ROWS}", 2, "lines 2 and 5 both name columns"),
+        ("Recorder\n" * 49 + f"{HEADER}\n{ROWS}", 1, "no column has a known name (found Recorder)"),
+        (f"Recorder\n{HEADER}\n{ROWS}0.2,1,2,three,0,0,0,1\n", 5, "z is 'three', not a number"),
+    ],
+)
+def test_what_is_no_header_behind_other_lines_is_told(write, refusal, text: str, line: int, problem: str) -> None:
+    told_line, message = refusal(write("take.csv", text))
+    assert message.startswith(problem)
+    assert told_line == line
+
+
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=FEWEST - 1).map(np.array)
 """Too few to be told from those of several devices."""

@@ -25,8 +25,9 @@ def body(name: str, sound: int, lost: int = 0) -> Trajectory:
 def recorded(monkeypatch: pytest.MonkeyPatch):
     """Lets a source hold these bodies."""
 
-    def hold(*bodies: Trajectory) -> None:
-        monkeypatch.setattr(study, "read_trajectories", lambda source, options: Recording(Path("take.csv"), bodies))
+    def hold(*bodies: Trajectory, named: str = "") -> None:
+        recording = Recording(Path("take.csv"), bodies, body=named)
+        monkeypatch.setattr(study, "read_trajectories", lambda source, options: recording)
 
     return hold
 
@@ -50,3 +51,26 @@ def test_a_source_without_any_good_body_is_refused(recorded, bodies):
     recorded(*(body(name, 1, lost=3) for name in bodies))
     with pytest.raises(TrajectoryError, match="1 usable poses are left"):
         study.read_source("take.csv:*", "blender")
+
+
+def test_a_body_that_was_named_is_remembered_and_the_clip_has_the_name_of_its_file(recorded):
+    recorded(body("left", 5), named="left")
+    ((clip,), _) = study.read_source("take.csv:left", "blender")
+    assert (clip.name, clip.body) == ("take", "left")
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names"),
+    [
+        ([("log", "left")], ["log"]),
+        ([("log", "left"), ("other", "left")], ["log", "other"]),
+        ([("log", "left"), ("log", "right")], ["log-left", "log-right"]),
+        ([("log", ""), ("Log", "right")], ["log", "Log-right"]),
+        ([("log-left", ""), ("log-right", ""), ("log", "left")], ["log-left", "log-right", "log"]),
+        ([("log", "left"), ("log", "left")], ["log-left", "log-left-2"]),
+        ([("log", ""), ("log", "")], ["log", "log-2"]),
+        ([("shot", "Rig/Hand"), ("shot", "Rig/Foot")], ["shot-Rig_Hand", "shot-Rig_Foot"]),
+    ],
+)
+def test_the_body_is_part_of_the_name_only_where_files_have_the_same(wanted, names):
+    assert study.clip_names(wanted) == names

@@ -48,15 +48,17 @@ def test_a_recording_is_read_back_to_the_bit_under_another_name(tmp_path: Path) 
         source=b"clip\xff.bvh:*".decode("utf-8", "surrogateescape"),
         axes="unity",
         metres_per_unit=0.0254,
+        body="Head",
     )
     store(tmp_path, [plain, growing], "a note")
     facts = read_facts(tmp_path, "recording")
-    assert (facts.note, facts.names, facts.repairs) == ("a note", ("hand", "head"), (plain.repairs, ()))
+    assert (facts.note, facts.repairs) == ("a note", (plain.repairs, ()))
+    assert (facts.names, facts.bodies) == (("hand", "head"), ("", "Head"))
     for body, clip in enumerate((plain, growing)):
         reference = ClipReference(f"{clip.name}-2", "recording", body)
         again = read_clip(tmp_path, reference)
         assert (again.name, again.source, again.axes) == (f"{clip.name}-2", clip.source, clip.axes)
-        assert (again.repairs, again.metres_per_unit) == (clip.repairs, clip.metres_per_unit)
+        assert (again.repairs, again.metres_per_unit, again.body) == (clip.repairs, clip.metres_per_unit, clip.body)
         assert np.array_equal(again.times, clip.times)
         assert np.array_equal(read_times(tmp_path, reference), clip.times)
         assert same(again.poses, clip.poses)

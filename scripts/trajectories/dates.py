@@ -1,0 +1,171 @@
+"""Dates and clock times in the column of time, exact to the nanosecond, as seconds since the earliest of them.
+
+Dates are those of ISO 8601 in its extended format, with `T` or a blank before the clock time, and with or without an
+offset from UTC: `2026-11-22T10:00:00.123456Z`, `2026-11-22 10:00:00+01:00`. A clock time is `10:00:00.123`. A column
+is of one kind throughout, which is that of its first time.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+from functools import lru_cache
+
+import numpy as np
+
+from .options import TICKS
+from .recordings import TrajectoryError, shown
+from .tables import Table, is_number
+from .times import earliest
+
+MOMENT = re.compile(
+    r"(?:(\d{4}-\d\d-\d\d)[T ])?(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?(Z|[+-]\d\d(?::?\d\d)?))?",
+    re.ASCII | re.IGNORECASE,
+)
+"""Day, hour, minute, second, fraction and offset. Java leaves out seconds that are 0, and Python a digit of hours."""
+
+LIKE_A_DATE = re.compile(r"\d[:/]\d|\d[-.]\d\d?[-.]\d|\d{8}T\d", re.ASCII)
+"""In dates as other standards and countries have them."""
+
+DAY = 86_400
+"""Seconds."""
+
+FURTHEST = 2**61 // 10**9
+"""Seconds from the median, 73 years. What is further is wild, and counts as so far: the difference of any two times is
+then a whole number of nanoseconds that fits 64 bits."""
+
+MISSING = -1
+"""Instead of nanoseconds, where a row has no time."""
+
+LONGEST_SHOWN = 40
+"""Characters of a time in an error: as long as any is."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What times are written as."""
+
+    dated: bool
+    """Or clock times."""
+
+    offset: bool
+    """Whether they say how far they are from UTC."""
+
+    def __str__(self) -> str:
+        kind = "date" if self.dated else "clock time"
+        return f"a {kind} {'with' if self.offset else 'without'} an offset from UTC"
+
+
+def kind_of_times(table: Table) -> Kind | None:
+    """What the times in column t of a table are, by the first that there is; None for numbers.
+
+    Raises
+    ------
+    TrajectoryError
+        Where it is a date in a way of writing that is not known.
+    """
+    number, cell = next(((number, cell) for number, cell in table.cells("t") if not _is_missing(cell)), (0, ""))
+    if match := MOMENT.fullmatch(cell):
+        return _kind(match)
+    if LIKE_A_DATE.search(cell) and not is_number(cell):
+        problem = f"t is {shown(cell, LONGEST_SHOWN)}, neither a number nor a date that can be read"
+        raise TrajectoryError(table.path, problem, "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds", number)
+    return None
+
+
+def seconds_of_dates(table: Table, kind: Kind) -> np.ndarray:
+    """The times in column t of a table.
+
+    Parameters
+    ----------
+    table : Table
+        With rows that are long enough.
+    kind : Kind
+        Of all its times.
+
+    Returns
+    -------
+    array, shape (rows,)
+        Seconds since the earliest, wild ones not counted; empty cells are NaN. A clock that falls by more than half a
+        day has passed midnight.
+
+    Raises
+    ------
+    TrajectoryError
+        With the number of the line, for what is no such time.
+    """
+    moments = np.fromiter(_moments(table, kind), np.dtype((np.int64, 2)))
+    known = moments[:, 1] != MISSING
+    seconds, nanoseconds = moments[known].T
+    if not kind.dated:
+        seconds = _through_midnights(seconds)
+    times = np.full(len(moments), np.nan)
+    if len(seconds):
+        away = np.clip(seconds - int(np.median(seconds)), -FURTHEST, FURTHEST)
+        ticks = away * 10**9 + nanoseconds
+        times[known] = (ticks - earliest(ticks)) / TICKS["ns"]
+    return times
+
+
+def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
+    """Of every row the seconds since some midnight in UTC, and the nanoseconds besides."""
+    way_out = "correct or delete the line"
+    for number, cell in table.cells("t"):
+        match = MOMENT.fullmatch(cell)
+        if match is None and _is_missing(cell):
+            yield 0, MISSING
+            continue
+        try:
+            day, hour, minute, second, fraction, offset = match.groups()
+            seconds = _minute(day, hour, minute, offset) + _below(61, second or "0")
+        except (AttributeError, ValueError):
+            name = "date" if kind.dated else "clock time"
+            raise TrajectoryError(
+                table.path, f"t is {shown(cell, LONGEST_SHOWN)}, not a {name}", way_out, number
+            ) from None
+        if _kind(match) != kind:
+            problem = f"t is {shown(cell, LONGEST_SHOWN)}, not {kind} as before"
+            raise TrajectoryError(table.path, problem, way_out, number)
+        yield seconds, int((fraction or "").ljust(9, "0"))
+
+
+@lru_cache(maxsize=1024)
+def _minute(day: str | None, hour: str, minute: str, offset: str | None) -> int:
+    """Seconds from some midnight in UTC to the beginning of a minute. Raises ValueError where there is none such."""
+    days = date.fromisoformat(day).toordinal() if day else 0
+    return DAY * days + 3600 * _below(24, hour) + 60 * _below(60, minute) - _offset(offset or "Z")
+
+
+def _offset(text: str) -> int:
+    """Seconds that a place is ahead of UTC."""
+    if text in "Zz":
+        return 0
+    ahead = 3600 * _below(24, text[1:3]) + 60 * _below(60, text[3:].lstrip(":") or "0")
+    return -ahead if text[0] == "-" else ahead
+
+
+def _below(limit: int, digits: str) -> int:
+    """A number that has to be below the limit. That of seconds is 61: some minutes have a leap second."""
+    if int(digits) >= limit:
+        raise ValueError(digits)
+    return int(digits)
+
+
+def _through_midnights(seconds: np.ndarray) -> np.ndarray:
+    """Clock times of shape (n,) as seconds since the first midnight, also those that come back from the next day."""
+    seconds = seconds % DAY  # An offset from UTC may lead out of the day.
+    steps = np.diff(seconds)
+    days = np.cumsum((steps < -DAY // 2).astype(np.int64) - (steps > DAY // 2))
+    # Before the first day there is none: what goes up there is a gap.
+    days -= np.minimum(np.minimum.accumulate(days), 0)
+    return seconds + DAY * np.concatenate(([0], days))[: len(seconds)]
+
+
+def _kind(match: re.Match[str]) -> Kind:
+    return Kind(match[1] is not None, match[6] is not None)
+
+
+def _is_missing(cell: str) -> bool:
+    return cell.lower() in ("", "nan")
