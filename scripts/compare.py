@@ -19,7 +19,7 @@ from scripts.command_line import as_typed, own_arguments
 from scripts.comparison import steps
 from scripts.comparison.explaining import explain_comparison
 from scripts.comparison.options import ALL, parse
-from scripts.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks
+from scripts.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks, without_films
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.stage.settings import SubjectError
 from scripts.comparison.steps import FILM, KEYS_NEEDED, METRICS, REPORT
@@ -155,7 +155,6 @@ class _Run:
         for note in filter(None, (study.left_out(asked.stage) for study in found.studies if asked.stage)):
             self.progress.note(note)
         tasks = comparison_tasks(found.studies, there, asked)
-        numbers = comparison_tasks(found.studies, there, asked, numbers=True) if asked.stage else []
         del there, found
         plan = plan_of(tasks, self.version)
         del tasks
@@ -163,14 +162,13 @@ class _Run:
         if options.decimate != "adaptive":
             # What an earlier run found must not pass for a finding of this.
             (options.output / KEYS_NEEDED).unlink(missing_ok=True)
-        if numbers and self._has_films_to_make(plan):
+        if asked.stage and self._has_films_to_make(plan):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
-            measured = self._do(plan_of(numbers, self.version), "Measuring")
+            measured = self._do(plan_of(without_films(plan.tasks.values()), self.version), "Measuring")
             if measured.interrupted or measured.problem:
                 return 130 if measured.interrupted else 2
             report = self.workspace.output / REPORT
             self.progress.note(f"All numbers are there, and films come as they are made: {report}")
-        del numbers
         outcome = self._do(plan, "Filming" if asked.stage else "Comparing")
         outcome.states |= read.states
         self._say(outcome, time.perf_counter() - started)

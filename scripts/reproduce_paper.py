@@ -34,7 +34,8 @@ from scripts.workplan.manifest import ManifestError
 
 CODE = (
     *("addon/animation", "addon/motion", "assets/making", "assets/models.blend"),
-    *("scripts/comparison", "scripts/files.py", "scripts/paper", "scripts/streaming", "scripts/trajectories"),
+    *("scripts/comparison", "scripts/files.py", "scripts/paper", "scripts/rows.py", "scripts/streaming"),
+    "scripts/trajectories",
 )
 """What the results depend on."""
 

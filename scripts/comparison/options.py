@@ -196,9 +196,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             deviation=options.deviation,
             distinct=options.modes.distinct,
         )
-    except ValueError as error:
-        parser.error(str(error))
-    try:
         options.choices = _choices(options)
         options.reading = reading_options(options)
     except ValueError as error:
@@ -259,14 +256,14 @@ def _modes(text: str) -> Modes:
         raise argparse.ArgumentTypeError(
             f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, DISTINCT, ALL, BEST_OF))}"
         )
-    distinct = DISTINCT in written
+    share = DISTINCT in written
     if BEST_OF not in named:
-        return Modes(tuple(modes), distinct)
+        return Modes(tuple(modes), share)
     if len(modes) < 2:
         raise argparse.ArgumentTypeError(
             f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
         )
-    return Modes((*modes, BEST_OF), distinct)
+    return Modes((*modes, BEST_OF), share)
 
 
 def _folder(text: str) -> Path:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +34,12 @@ from .version import step_versions
 
 MODULE = steps.__name__
 
+FILMING = {f"{MODULE}:{step}" for step in ("build", "render", "encode")}
+"""The steps at the end of which there is a film."""
+
 PIECE = 60
 """Frames of a film that are rendered by one task at most: a long film keeps many processors busy, and little is lost
 where one is interrupted."""
-
 
 MOST_FRAMES = 216_000
 """Of a film: an hour at 60 frames a second."""
@@ -190,19 +192,16 @@ def asked_in_vain(times: np.ndarray, choices: Iterable[Choice]) -> list[str]:
     """What to say of rates that are above that of a recording with these times, shape (n,)."""
     rate = 1.0 / float(np.median(np.diff(times)))
     above = [choice.rate for choice in choices if choice.rate and float(choice.rate) > rate * (1.0 + RATE_MARGIN)]
-    return [f"it has {rate:.3g} samples a second: {', '.join(above)} keys a second cannot be had of it"] * bool(above)
+    if not above:
+        return []
+    return [f"it has {rate:.3g} samples a second: {', '.join(above)} keys a second cannot be had of it"]
 
 
 # -- comparing --------------------------------------------------------------------------------------------------------
 
 
-def comparison_tasks(
-    studies: Sequence[Study], read: Sequence[Task], wanted: Wanted, *, numbers: bool = False
-) -> list[Task]:
-    """All tasks of a comparison, those that read the recordings among them, in the order in which they are wanted.
-
-    With `numbers`, only those for all numbers, and for a report that leaves room for the films.
-    """
+def comparison_tasks(studies: Sequence[Study], read: Sequence[Task], wanted: Wanted) -> list[Task]:
+    """All tasks of a comparison, those that read the recordings among them, in the order in which they are wanted."""
     readers = {task.arguments["recording"]: task for task in read}
     reader_of = {study.clip.name: readers[study.clip.recording].name for study in studies}
     # All numbers first: they take seconds, and are there whatever becomes of the videos.
@@ -211,9 +210,25 @@ def comparison_tasks(
     if wanted.count_keys:
         counts = [_count(study, reader_of[study.clip.name], wanted) for study in studies]
         tasks += [*counts, _table(steps.KEYS_NEEDED, "tabulate_keys", studies, [*measures, *counts])]
-    if wanted.stage and not numbers:
+    if wanted.stage:
         tasks += [task for study in studies for task in _films(study, wanted, wanted.stage)]
-    return [*tasks, *_reports(studies, {task.name: task.name for task in tasks}, wanted, coming=numbers)]
+    return [*tasks, *_reports(studies, {task.name: task.name for task in tasks}, wanted)]
+
+
+def without_films(tasks: Iterable[Task]) -> list[Task]:
+    """The tasks of a comparison but for those of its films, with reports that leave room for these."""
+    films: set[str] = set()
+    others = []
+    for task in tasks:
+        if task.function in FILMING:
+            films.add(task.name)
+        elif task.partial:
+            coming = {"coming": True} if "coming" in task.arguments else {}
+            after = tuple(before for before in task.after if before not in films)
+            others.append(replace(task, after=after, arguments={**task.arguments, **coming}))
+        else:
+            others.append(task)
+    return others
 
 
 def _measures(study: Study, reader: str, wanted: Wanted) -> Iterator[Task]:
@@ -313,13 +328,13 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
         )
 
 
-def _reports(studies: Sequence[Study], names: Mapping[str, str], wanted: Wanted, *, coming: bool) -> list[Task]:
+def _reports(studies: Sequence[Study], names: Mapping[str, str], wanted: Wanted) -> list[Task]:
     """The report: of a few clips on one page, of more on a page each.
 
     `names` are of the tasks that there are, each to itself: so the same text is not kept twice.
     """
     settings = {name: value for name, value in vars(wanted.settings).items() if name != "date"}
-    shared = {"settings": settings, "coming": coming}
+    shared = {"settings": settings, "coming": False}
     filmed = {
         study.clip.name: [(study.clip.name, choice_parts(choice)) for choice in study.filmed(wanted)]
         for study in studies

@@ -15,7 +15,8 @@ from scripts.workplan.sources import KEPT, SourceReader
 
 SOURCES = (
     *("blender_manifest.toml", "addon/motion", "addon/animation"),
-    *("scripts/comparison", "scripts/files.py", "scripts/trajectories"),
+    *("scripts/comparison", "scripts/trajectories"),
+    *("scripts/files.py", "scripts/hushing.py", "scripts/rows.py"),
 )
 """Of this program: see `workplan.code_version`."""
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
 from .options import TICKS, ReadingOptions
-from .recordings import listed, shown
+from .recordings import TrajectoryError, listed, shown
 from .tables import is_number
 
 POSITION = ("x", "y", "z")
@@ -32,6 +33,10 @@ class ColumnProblem(ValueError):
         self.problem, self.way_out = problem, way_out
         self.known = known
         """How many columns mean something: of the lines that could be the header, that with the most is believed."""
+
+    def at(self, path: Path, line: int) -> TrajectoryError:
+        """The same of a line of a file, for the user."""
+        return TrajectoryError(path, self.problem, self.way_out, line)
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
         try:
             trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
         except ColumnProblem as problem:
-            raise TrajectoryError(path, problem.problem, problem.way_out, line) from None
+            raise problem.at(path, line) from None
         way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
         require_one_body(trajectory, path, f"{way_out}, or split the file", line)
         trajectories.append(trajectory)
@@ -90,7 +90,7 @@ def _seconds(table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: L
     try:
         require_time_unit(layout)
     except ColumnProblem as problem:
-        raise TrajectoryError(table.path, problem.problem, problem.way_out, table.header) from None
+        raise problem.at(table.path, table.header) from None
     for body in wanted:
         require_seconds(table, ticks[body.rows], layout.time_unit)
     return seconds_of(table, ticks, layout.time_unit)
@@ -122,7 +122,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
     problem, number = max(problems, key=lambda known: known[0].known)
     if not problem.known:
         problem, number = problems[-1]
-    raise TrajectoryError(path, problem.problem, problem.way_out, number)
+    raise problem.at(path, number)
 
 
 def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.motion.repair import rising
+from addon.motion.repair import LARGEST, rising
 
 from .recordings import Trajectory, TrajectoryError
-from .times import FASTEST, LARGEST, SLOWEST, typical_interval
+from .times import FASTEST, SLOWEST, typical_interval
 
 HIGHEST_SPEED = 20.0
 """Metres a second, which 95 % of the speeds are below: nearly three times what a fast game has. A hand at rest in
@@ -47,9 +47,7 @@ def require_one_body(trajectory: Trajectory, path: object, way_out: str, line: i
     TrajectoryError
         With the speed at which they would have to jump.
     """
-    rows = np.abs(trajectory.times) < LARGEST
-    rows &= (np.abs(trajectory.poses.positions) < LARGEST).all(axis=-1)
-    times, positions = trajectory.times[rows], trajectory.poses.positions[rows] * trajectory.metres_per_unit
+    times, positions = _usable(trajectory)
     interval = typical_interval(times)
     if len(times) < FEWEST or not interval > 0.0:
         return
@@ -81,13 +79,18 @@ def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[str, ...
     time_unit : bool
         Whether its format takes the unit of time from the user.
     """
-    rows = np.abs(trajectory.times) < LARGEST
-    rows &= (np.abs(trajectory.poses.positions) < LARGEST).all(axis=-1)
-    times, positions = trajectory.times[rows], trajectory.poses.positions[rows] * trajectory.metres_per_unit
+    times, positions = _usable(trajectory)
     way_out = "; if its times are no seconds, --time-unit ms, us or ns" * time_unit
     # Speeds between times that are next to nothing apart leave the range of floats.
     with np.errstate(over="ignore", invalid="ignore"):
         return (*_of_times(times, way_out), *_of_lengths(times, positions))
+
+
+def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """The times and positions, in seconds and metres, of the samples where both are more than damage."""
+    rows = np.abs(trajectory.times) < LARGEST
+    rows &= (np.abs(trajectory.poses.positions) < LARGEST).all(axis=-1)
+    return trajectory.times[rows], trajectory.poses.positions[rows] * trajectory.metres_per_unit
 
 
 def _of_times(times: np.ndarray, way_out: str) -> list[str]:

@@ -6,6 +6,8 @@ from contextlib import suppress
 
 import numpy as np
 
+from addon.motion.repair import LARGEST
+
 from .options import TICKS
 from .recordings import TrajectoryError
 from .tables import Table
@@ -30,9 +32,6 @@ LARGEST_WHOLE = 2.0**62
 
 WILD = 10.0
 """How many times further from the median than half of all others a wild time is; of even times all are within two."""
-
-LARGEST = 1e30
-"""As `addon.motion.repair` has it: a number beyond is damage."""
 
 LONG_NAMES = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 

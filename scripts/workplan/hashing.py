@@ -114,12 +114,13 @@ def code_version(*paths: str) -> str:
         and the files beside them.
     """
     digest = hashlib.sha256()
-    for file in sorted({file for path in paths for file in _sources(ROOT / path)}):
+    for file in sorted({file for path in paths for file in sources_below(ROOT / path)}):
         digest.update(file.relative_to(ROOT).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
 
 
-def _sources(path: Path) -> list[Path]:
+def sources_below(path: Path) -> list[Path]:
+    """A file, or the files in a folder but for those that Python keeps there."""
     if path.is_file():
         return [path]
     return [file for file in path.rglob("*") if file.is_file() and "__pycache__" not in file.parts]

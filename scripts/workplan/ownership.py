@@ -15,10 +15,8 @@ from pathlib import Path
 from .hashing import FileState, is_regular
 from .manifest import Manifest
 from .plan import Plan
+from .status import few
 from .workspace import Workspace
-
-SHOWN = 3
-"""So many files are named."""
 
 WAYS_OUT = "choose another folder with --output, or replace {} with --force"
 
@@ -48,10 +46,9 @@ def require_free(plan: Plan, workspace: Workspace, outputs: Collection[str] = ()
         _require_no_inputs_inside(plan, workspace)
         strangers = _strangers(plan, workspace, outputs)
         if strangers and not force:
-            some = ", ".join(os.fspath(workspace.output / path) for path in strangers[:SHOWN])
-            more = f" and {len(strangers) - SHOWN} more" if len(strangers) > SHOWN else ""
+            some = few([os.fspath(workspace.output / path) for path in strangers])
             written, them = ("was", "it") if len(strangers) == 1 else ("were", "them")
-            raise OutputError(f"{some}{more} {written} not written by this program; {WAYS_OUT.format(them)}")
+            raise OutputError(f"{some} {written} not written by this program; {WAYS_OUT.format(them)}")
     except OutputError:
         if not workspace.was_ours:
             workspace.withdraw(tuple(workspace.done_here))
@@ -84,10 +81,9 @@ def require_same_inputs(plan: Plan, workspace: Workspace, *, force: bool = False
         return
     if not force:
         names = [Path(path).name for path in paths]
-        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
         other = workspace.output.with_name(Path(next(iter(plan.tasks.values())).inputs[0]).stem)
         raise OutputError(
-            f"{_shown(workspace.output)} holds another comparison, of {', '.join(names[:SHOWN])}{more}; choose another "
+            f"{_shown(workspace.output)} holds another comparison, of {few(names)}; choose another "
             f"folder, such as --output {_shown(other)}, or replace it with --force"
         )
     for name in held:

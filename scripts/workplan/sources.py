@@ -19,9 +19,9 @@ from pathlib import Path
 
 from scripts.files import write_text
 
-from .hashing import digest_of, file_digest
+from .hashing import digest_of, file_digest, sources_below
 from .module_text import Import, Module, own_text, packages_above, read_module
-from .tasks import ROOT
+from .tasks import ROOT, file_of
 
 WORK_PLAN = __package__
 
@@ -131,22 +131,12 @@ class SourceReader:
         """The files that a module names, and all those of the folders."""
         name = _from_root(path).removesuffix(".py").removesuffix("/__init__").replace("/", ".")
         for place in self._module(path, name).places:
-            for file in [ROOT / place] if (ROOT / place).is_file() else (ROOT / place).rglob("*"):
-                if file.is_file() and "__pycache__" not in file.parts:
-                    yield _from_root(file)
+            yield from map(_from_root, sources_below(ROOT / place))
 
     def _digest(self, file: str) -> str:
         if file not in self._digests:
             self._digests[file] = file_digest(ROOT / file)[:DIGITS]
         return self._digests[file]
-
-
-@cache
-def file_of(module: str) -> Path | None:
-    """The file of a module of this checkout."""
-    place = ROOT.joinpath(*module.split("."))
-    found = (place.with_suffix(".py"), place / "__init__.py")
-    return next((path for path in found if path.is_file()), None)
 
 
 @cache

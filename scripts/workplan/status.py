@@ -167,10 +167,10 @@ class Status:
                 yield Reason(INPUT, path)
         changed = list(_differences(before.get("arguments"), now["arguments"]))
         if changed or [*record.outputs] != [*task.outputs]:
-            yield Reason(OPTIONS, _listed(changed))
+            yield Reason(OPTIONS, few(changed))
         if before.get("version") != now["version"]:
             parts = self._manifest.versions.get(str(before.get("version")), {})
-            yield Reason(PROGRAM, _listed(_differing(parts, self._plan.parts_of(task.function))) if parts else "")
+            yield Reason(PROGRAM, few(_differing(parts, self._plan.parts_of(task.function))) if parts else "")
 
     def _damages(self, task: Task, record: Record) -> Iterator[Reason]:
         """The outputs that are not as they were made."""
@@ -187,7 +187,7 @@ def explain(survey: Mapping[str, Standing], plan: Plan) -> list[str]:
         if standing.reasons:
             alike = tuple(r if r.what in (INPUT, OPTIONS, PROGRAM) else r.what for r in standing.reasons)
             groups.setdefault((plan.tasks[name].function, *dict.fromkeys(alike)), []).append(name)
-    return [f"{_listed(_labels(names, plan))}: {_why(names, survey, plan)}" for names in groups.values()]
+    return [f"{few(_labels(names, plan))}: {_why(names, survey, plan)}" for names in groups.values()]
 
 
 def _why(names: Iterable[str], survey: Mapping[str, Standing], plan: Plan) -> str:
@@ -196,7 +196,7 @@ def _why(names: Iterable[str], survey: Mapping[str, Standing], plan: Plan) -> st
     for reason in (reason for name in names for reason in survey[name].reasons):
         which = _labels([reason.of], plan) if reason.what == DEPENDS and reason.of else [reason.of]
         of.setdefault(reason.what, {}).update(dict.fromkeys(filter(None, which)))
-    return "; ".join(f"{what} ({_listed(which)})" if which else what for what, which in of.items())
+    return "; ".join(f"{what} ({few(which)})" if which else what for what, which in of.items())
 
 
 def _labels(names: Iterable[str], plan: Plan) -> dict[str, None]:
@@ -226,7 +226,7 @@ def _differing(before: Mapping[str, object], now: Mapping[str, object]) -> list[
     return [name for name in sorted({*before, *now}) if before.get(name) != now.get(name)]
 
 
-def _listed(names: Collection[str]) -> str:
+def few(names: Collection[str]) -> str:
     """The first few, and how many more there are."""
     some = ", ".join([*names][:SHOWN])
     return f"{some} and {len(names) - SHOWN} more" if len(names) > SHOWN else some

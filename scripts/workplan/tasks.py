@@ -12,7 +12,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -180,13 +180,20 @@ def find_step(name: str) -> Callable[..., Mapping[str, Any] | None]:
     if not FUNCTION.fullmatch(name):
         raise ValueError(f"{name!r} is no function; write package.module:function")
     module_name, _, function_name = name.partition(":")
-    place = ROOT.joinpath(*module_name.split("."))
-    if not any(path.is_file() for path in (place.with_suffix(".py"), place / "__init__.py")):
+    if file_of(module_name) is None:
         raise ValueError(f"{name}: this checkout has no module {module_name}")
     function = getattr(importlib.import_module(module_name), function_name, None)
     if not getattr(function, "is_step", False):
         raise ValueError(f"{name}: {module_name} has no step of that name; mark it with @step")
     return function
+
+
+@cache
+def file_of(module: str) -> Path | None:
+    """The file of a module of this checkout; None where there is none."""
+    place = ROOT.joinpath(*module.split("."))
+    found = (place.with_suffix(".py"), place / "__init__.py")
+    return next((path for path in found if path.is_file()), None)
 
 
 def places_of(outputs: Iterable[str]) -> dict[str, str]:

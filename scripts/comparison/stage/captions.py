@@ -7,6 +7,7 @@ to play them; they end at a fixed place and Blender's own font has digits of one
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import bpy
 import numpy as np
@@ -80,6 +81,7 @@ def put(
     collection.objects.link(obj)
 
 
+@cache
 def width_of(text: str) -> float:
     """How wide `words` of size 1 are."""
     curve = bpy.data.curves.new("Measured", "FONT")

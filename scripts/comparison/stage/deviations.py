@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from addon.motion import Poses
-from addon.motion.quaternions import conjugate, multiply, rotate
+from addon.motion.quaternions import multiply, rotate
+from addon.motion.twists import between, exponential
 
 from . import layout
 
@@ -41,14 +42,11 @@ def magnified(shown: Poses, recording: Poses, factor: float, middle: np.ndarray)
     if factor == 1.0:
         return shown
     places, truth = (layout.swept_points(poses, middle[None]) for poses in (shown, recording))
-    turns = multiply(shown.quaternions, conjugate(recording.quaternions))
-    turns *= np.where(turns[:, :1] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(turns[:, 1:], axis=-1)
-    half = np.arctan2(sine, turns[:, 0])
-    wider = np.minimum(factor * half, np.maximum(half, np.pi / 2.0))
-    axes = np.divide(turns[:, 1:], sine[:, None], out=np.zeros_like(turns[:, 1:]), where=sine[:, None] > 0.0)
-    bent = np.concatenate((np.cos(wider)[:, None], np.sin(wider)[:, None] * axes), axis=-1)
-    quaternions = multiply(bent, recording.quaternions)
+    still = np.zeros_like(places)
+    turns = between(still, recording.quaternions, still, shown.quaternions)
+    angles = np.maximum(np.linalg.norm(turns, axis=0), 1e-12)
+    turns *= np.minimum(factor, np.maximum(angles, np.pi) / angles)
+    quaternions = multiply(recording.quaternions, exponential(turns)[0].T)
     places = truth + factor * (places - truth)
     arms = np.tile(middle, (len(places), 1)) * (1.0 if shown.scales is None else shown.scales[:, None])
     return Poses(places - rotate(quaternions, arms), quaternions, shown.scales)

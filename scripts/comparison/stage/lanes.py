@@ -230,16 +230,11 @@ class Lanes:
         cast = self.cast
         heights = height * cast.errors[mode] / (cast.largest_error or 1.0)
         mesh = trails.graph(f"{mode} graph", cast.timeline.frames, heights, width)
-        for name, material, lift in (
-            ("graph", ink(f"Graph {mode}", colour_on(cast.theme, mode)), 4),
-            ("graph to come", self.track, 3),
-        ):
-            graph = bpy.data.objects.new(f"{mode} {name}", mesh.copy() if lift == 3 else mesh)
-            if lift == 3:
-                graph.data.materials.append(material)
-            else:
-                apply_group(graph, self.graph_group, Material=material)
-            self._put(graph, left, foot, lift)
+        mesh.materials.append(self.track)
+        self._put(bpy.data.objects.new(f"{mode} graph to come", mesh), left, foot, 3)
+        passed = bpy.data.objects.new(f"{mode} graph", mesh)
+        apply_group(passed, self.graph_group, Material=ink(f"Graph {mode}", colour_on(cast.theme, mode)))
+        self._put(passed, left, foot, 4)
         base = captions.card(f"{mode} base", width, 0.0025, self.track, corner=0.0)
         self._put(bpy.data.objects.new(base.name, base), left + width / 2.0, foot - 0.00125)
 

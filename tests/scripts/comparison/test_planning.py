@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from addon.motion import MODES
 from scripts.comparison import steps
-from scripts.comparison.planning import PIECE, Study, Wanted, comparison_tasks, look_into, reading_tasks
+from scripts.comparison.planning import PIECE, Study, Wanted, comparison_tasks, look_into, reading_tasks, without_films
 from scripts.comparison.report.pages import ON_ONE_PAGE, Settings
 from scripts.comparison.stage.settings import StageSettings
 from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts, fewest_keys
@@ -45,7 +45,8 @@ def tasks_of(
 ) -> dict[str, Task]:
     read = reading_tasks([f"{name}.csv" for name in names], "blender")
     studies = [study(name, task, seconds) for name, task in zip(names, read, strict=True)]
-    return {task.name: task for task in comparison_tasks(studies, read, wanted, numbers=numbers)}
+    tasks = comparison_tasks(studies, read, wanted)
+    return {task.name: task for task in (without_films(tasks) if numbers else tasks)}
 
 
 def test_the_tasks_make_a_plan_with_all_numbers_before_the_first_film() -> None:
