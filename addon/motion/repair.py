@@ -57,14 +57,14 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     ----------
     times : array, shape (n,)
         Seconds, as recorded.
-    poses : Poses, shape (n,)
-        As recorded: rows of NaN, quaternions of any length and sign.
+    poses : Poses, shape (n,) or (joints, n)
+        As recorded: rows of NaN, quaternions of any length and sign. Of several joints a row is as good as its worst.
 
     Returns
     -------
     times : array, shape (m,)
         Strictly rising.
-    poses : Poses, shape (m,)
+    poses : Poses, shape (m,) or (joints, m)
         Finite, with unit quaternions in successive hemispheres.
     repairs : list of Repair
         What was done, in the order it was done; empty for a recording without a fault.
@@ -82,13 +82,18 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
         nonlocal times, poses, rows
         if not good.all():
             repairs.append(Repair(fault, rows[~good]))
-            times, poses, rows = times[good], poses[good], rows[good]
+            times, poses, rows = times[good], poses[..., good], rows[good]
 
-    finite = _usable(times) & _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)
+    of_joints = tuple(range(len(poses.shape) - 1))
+    finite = _usable(poses.positions).all(axis=-1) & _usable(poses.quaternions).all(axis=-1)
     if poses.scales is not None:
         finite &= (poses.scales < LARGEST_SCALE) & (poses.scales > 1.0 / LARGEST_SCALE)
-    keep(finite, "dropped rows with numbers that are missing, not finite or too large")
-    keep(np.linalg.norm(poses.quaternions, axis=-1) > 1e-6, "dropped poses with a quaternion of length zero")
+    keep(
+        _usable(times) & finite.all(axis=of_joints),
+        "dropped rows with numbers that are missing, not finite or too large",
+    )
+    long_enough = np.linalg.norm(poses.quaternions, axis=-1) > 1e-6
+    keep(long_enough.all(axis=of_joints), "dropped poses with a quaternion of length zero")
     forward = rising(times)
     keep(forward, f"dropped rows whose time runs backwards, such as {_first(times, ~forward)}")
     near = _near(times)
@@ -96,12 +101,12 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     keep(np.diff(times, append=np.inf) > SHORTEST, "dropped rows whose time comes again, keeping the last of each")
 
     lengths = np.linalg.norm(poses.quaternions, axis=-1)
-    if (uneven := np.abs(lengths - 1.0) > UNIT_TOLERANCE).any():
+    if (uneven := (np.abs(lengths - 1.0) > UNIT_TOLERANCE).any(axis=of_joints)).any():
         repairs.append(Repair("normalised quaternions whose length was not 1", rows[uneven]))
     quaternions = normalise(poses.quaternions)
     aligned = align_signs(quaternions)
     turned = np.any(aligned != quaternions, axis=-1)
-    if (flips := np.diff(turned, prepend=False)).any():
+    if (flips := np.diff(turned, prepend=False).any(axis=of_joints)).any():
         repairs.append(Repair("undid sign flips of quaternions", rows[flips]))
     intervals = np.diff(times)
     if len(intervals) and (gaps := intervals > GAP * np.median(intervals)).any():

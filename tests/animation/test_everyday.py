@@ -90,6 +90,23 @@ def _original(obj: bpy.types.Object) -> tuple:
     )
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_an_action_that_is_exchanged_for_one_that_moves_less_gives_the_rest_back(live_file, order, with_own):
+    first, second = new_object("First", order), new_object("Second", order)
+    own = give_own_deltas(first) if with_own else own_deltas(first)
+    key(first, seed=1, scale="even")
+    key(second, seed=2)
+    set_mode([first, second], "pga_lerp")
+    live_file.scene.frame_set(BETWEEN)
+    assert first.rigid_motion.filled[3]
+    action, slot = second.animation_data.action, second.animation_data.action_slot
+    link(second, None)
+    link(first, action, slot)
+    assert not first.rigid_motion.filled[3]
+    assert tuple(first.delta_scale) == own.scale
+    assert_shown([first], PLAYED, {first.name: own})
+
+
 @pytest.mark.parametrize(
     "goes",
     [

@@ -195,7 +195,7 @@ def recordings() -> dict[str, tuple[np.ndarray, Poses]]:
     for path in sorted(RECORDINGS.glob("*")):
         if path.suffix != ".md":
             trajectory = read_trajectories(str(path)).trajectories[0]
-            times, poses, _ = repair(trajectory.times, trajectory.poses)
+            times, poses, _ = repair(trajectory.times, trajectory.rigid)
             found[path.name] = times, poses
     return found
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from addon.motion import MODES, Poses, reduce_skeleton_keys
 from addon.motion.quaternions import conjugate, multiply, rotate
-from scripts.trajectories import bvh
+from scripts.trajectories import read_trajectories
 from tests.motion.bodies import body_errors, in_root_space, wandering_body
 from tests.motion.cases import random_quaternions
 from tests.recordings import RECORDINGS
@@ -337,22 +337,14 @@ BODIES = {
 
 def recorded_body(name: str, most: int = 80) -> tuple[np.ndarray, Poses, np.ndarray]:
     """Times, joints in their parents' space and parents of a real body, 1.7 m tall, at a few of its samples."""
-    joints, motion = bvh._read_hierarchy(BODIES[name])
-    values, frame_time = bvh._read_motion(BODIES[name], motion, joints)
-    step = max(1, round(1.0 / 30.0 / frame_time))
-    samples = np.arange(0, len(values), step)[:most]
-    begins = np.cumsum([0, *(len(joint.channels) for joint in joints)])
-    own = [
-        bvh._placed(joint, values[samples, first:last], None)
-        for joint, first, last in zip(joints, begins[:-1], begins[1:], strict=True)
-    ]
-    parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
-    poses = Poses([joint.positions for joint in own], [joint.quaternions for joint in own])
+    (body,) = read_trajectories(str(BODIES[name])).trajectories
+    samples = np.arange(0, len(body.times), max(1, round(1.0 / 30.0 / body.times[1])))[:most]
+    poses, parents = body.poses[:, samples], body.figure.parents
     spots = in_root_space(poses, parents)[..., :3, 3]
-    world = bvh.world_poses(joints, values[samples], [joint.name for joint in joints])
-    assert np.abs(spots - [there.positions for there in world.values()]).max() <= 1e-9 * np.abs(spots).max()
+    world = [alone.poses.positions[samples] for alone in read_trajectories(f"{BODIES[name]}:*").trajectories]
+    assert np.abs(spots - world).max() <= 1e-9 * np.abs(spots).max()
     size = 1.7 / np.ptp(spots[:, 0, 1])
-    return frame_time * samples, Poses(size * poses.positions, poses.quaternions), parents
+    return body.times[samples], Poses(size * poses.positions, poses.quaternions), parents
 
 
 @pytest.mark.recordings

@@ -84,6 +84,10 @@ class ObjectTransform(Transform):
         noted = self._noted
         return all(_BITS[channel] & noted for channel in filled if channel in _BITS)
 
+    def is_more_noted(self, filled: Iterable[Channel]) -> bool:
+        """Whether those of other channels are."""
+        return bool(self._noted & ~sum(_BITS[channel] for channel in set(filled) if channel in _BITS))
+
     def note_original(self, filled: Iterable[Channel], *, overwritten: bool = False) -> None:
         """Write the original values of these channels down, which in-betweens are about to take the place of.
 

@@ -43,8 +43,12 @@ class Deltas(Outlet):
     def show(self, place: SlotTransform) -> None:
         filled = place.filled
         for user in place.users if filled else ():
-            if not user.is_noted(filled) and user.animated.is_editable:
+            if not user.animated.is_editable:
+                continue
+            if not user.is_noted(filled):
                 user.note_original(filled, overwritten=_is_overwritten(user, filled))
+            if user.is_more_noted(filled):  # An Action that it had before may have moved more of it.
+                self.release([user])
 
     def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
         difference, filled = np.zeros(10), {} if frame is None else place.filled
