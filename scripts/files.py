@@ -6,6 +6,7 @@ Text is UTF-8 with LF line ends on every system, so that two runs can be compare
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -44,6 +45,15 @@ def replacing(path: Path) -> Iterator[TextIO]:
     """Open a text file that takes the place of `path` when the block ends well: see `written_beside`."""
     with written_beside(path) as beside, beside.open("w", encoding="utf-8", newline="\n") as stream:
         yield stream
+
+
+def clear_beside(path: Path) -> None:
+    """Delete what processes that were killed left of `path`: nobody may be writing it."""
+    remains = re.compile(rf"\.\d+\.{re.escape(path.name)}")
+    for name in os.listdir(path.parent) if path.parent.is_dir() else ():
+        if remains.fullmatch(name):
+            with suppress(OSError):
+                path.with_name(name).unlink()
 
 
 def write_text(path: Path, text: str) -> None:

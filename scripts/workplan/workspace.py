@@ -15,6 +15,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
+from scripts.files import clear_beside
+
 from .lock import FolderLock
 from .manifest import Manifest, Record
 from .performing import Made, Order
@@ -63,9 +65,12 @@ class Workspace:
         self._mend()
         self._lock.__enter__()
         try:
-            self.manifest = Manifest(self.output / "manifest.json", self.own / "records", self._only)
+            manifest = self.output / "manifest.json"
+            self.manifest = Manifest(manifest, self.own / "records", self._only)
             if not self._shared:
                 self._clear_scratch()
+                clear_beside(manifest)
+                clear_beside(self.plan_path)
                 self.manifest.failures = {}
         except BaseException:
             self._lock.__exit__()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.files import replacing, write_text
+from scripts.files import clear_beside, replacing, write_text
 
 
 def test_a_text_is_written_as_utf_8_with_lf_line_ends_and_folders_on_the_way_are_made(tmp_path: Path) -> None:
@@ -50,3 +50,12 @@ def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
     assert (tmp_path / "link.html").is_symlink()
     assert (tmp_path / "real.html").read_text() == "new"
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_what_dead_processes_left_of_a_file_is_cleared_away_and_nothing_else(tmp_path: Path) -> None:
+    others = {"plan.json", ".7.plan.json.old", ".x.plan.json", ".8.plan_json", "7.plan.json"}
+    for name in (*others, ".7.plan.json", ".12345.plan.json"):
+        (tmp_path / name).touch()
+    clear_beside(tmp_path / "plan.json")
+    assert {path.name for path in tmp_path.iterdir()} == others
+    clear_beside(tmp_path / "nowhere" / "plan.json")

@@ -12,6 +12,7 @@ from addon.motion import MODES
 from scripts.comparison.planning import Study, Wanted, comparison_tasks, reading_tasks
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.study.choices import Uniform
+from scripts.comparison.study.radii import Radii
 from scripts.comparison.study.storage import ClipReference
 from scripts.progress import Progress
 from scripts.workplan import Plan, SerialExecutor, Workspace
@@ -25,7 +26,7 @@ MOST = 10_000
 WANTED = Wanted(
     choices=tuple(map(Uniform, ("5", "10", "15", "20"))),
     modes=tuple(MODES),
-    radius=0.1,
+    radii=Radii(),
     settings=Settings(radius=0.1, program="Rigid Motion", blender="5", command="compare.py"),
     stage=None,
     every_film=False,

@@ -334,9 +334,10 @@ def test_the_lock_of_a_dead_process_is_none(output: Path) -> None:
     assert states(run_in(output, task("a"))) == done("a")
 
 
-def test_what_dead_tasks_left_is_cleared_away(output: Path) -> None:
-    half = output / ".workplan" / "scratch" / "0123" / "a.txt"
-    half.parent.mkdir(parents=True)
+@pytest.mark.parametrize("left", [".workplan/scratch/0123/a.txt", ".workplan/.7904.plan.json", ".7904.manifest.json"])
+def test_what_dead_processes_left_is_cleared_away(output: Path, left: str) -> None:
+    half = output / left
+    half.parent.mkdir(parents=True, exist_ok=True)
     half.write_text("half")
     run_in(output, task("b"))
     assert not half.exists()
