@@ -35,3 +35,8 @@ def number(text: str) -> float:
         return float(text)
     except ValueError:
         return math.nan
+
+
+def printable(text: str) -> str:
+    """The text in one line, without the control characters that a file could smuggle into a terminal."""
+    return "".join(character if character.isprintable() else " " for character in text)

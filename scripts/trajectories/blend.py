@@ -1,9 +1,9 @@
-"""Animated objects and pose bones of .blend files: their world poses on every whole frame, as Blender evaluates them.
+"""Animated objects, rigs and pose bones of .blend files: where Blender evaluates them on every whole frame.
 
-The file's data is linked into the running Blender, a probe follows the object, or the bone, in a scene of its own, and
+The file's data is linked into the running Blender, a probe follows the object, or the bones, in a scene of its own, and
 all of it is taken out again: what is open stays as it is. Python of the file (its text blocks, scripted drivers) is not
-run. A bone is named OBJECT/BONE. Times are frame / frame rate, positions are Blender units, axes are Blender's; those
-of a bone are its own, y along it.
+run. An armature whose bones move is a whole body; a bone is named OBJECT/BONE. Times are frame / frame rate, positions
+are Blender units, axes are Blender's; those of a bone are its own, y along it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .recordings import Selection, Trajectory, TrajectoryError, listed, shown
+from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
+from .rigs import LAST_FRAME, whole_body
+from .stages import probe
 
 if TYPE_CHECKING:
     import bpy
@@ -28,20 +30,17 @@ if TYPE_CHECKING:
 TRANSFORMS = ("location", "rotation_", "scale", "delta_")
 """How the data paths of the channels begin that move an object."""
 
+OF_BONES = "pose.bones["
+"""How the data paths of everything begin that a driver may drive in a bone."""
+
 BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
 """The data paths of the channels that move a pose bone, whose name is escaped in them."""
 
 FEW = 5
 """Bones of a rig that are told where one has to be named."""
 
-STILL = 1e-6
-"""What single precision makes of a body that does not move, in Blender units and in numbers of a quaternion."""
-
 STEADY = 1e-4
 """By what share a scale may differ that is one and the same: single precision, through a chain of bones."""
-
-LAST_FRAME = 1048574
-"""Blender goes no further; a damaged file could, and would keep it at work for hours."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class Body:
         if data is None:
             return None
         ranges = [(strip.frame_start, strip.frame_end) for track in data.nla_tracks for strip in track.strips]
-        for fcurve in _fcurves(data.action, data.action_slot):
+        for fcurve in fcurves_of(data.action, data.action_slot):
             # One that only its modifiers make has no keys, and says that they are on frame 0.
             has_keys = fcurve.keyframe_points or fcurve.sampled_points
             if has_keys and (
@@ -75,7 +74,10 @@ class Body:
 
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """The animated objects, in the order of their names. Any other object, and any bone, can be had by its name."""
+    """The first, by their names, of the animated objects and the rigs whose bones have keys; or all animated objects.
+
+    Any other object, and any bone, can be had by its name.
+    """
     try:
         import bpy  # noqa: F401
     except ImportError:
@@ -94,8 +96,15 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
             with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
             few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
             more = sum(map(len, with_keys.values())) - len(few)
-            taken = selection.of(animated, unlisted=[*few, *still], more=more)
-            return [_sample(path, bodies[name], scenes) for name in taken]
+            if selection.wanted == ALL:
+                taken = selection.of(animated, unlisted=[*few, *still], more=more)
+                return [_sample(path, bodies[name], scenes) for name in taken]
+            moving = [name for name in objects if name in animated or with_keys[name]]
+            still = [name for name in still if name not in moving]
+            (name,) = selection.of(moving, unlisted=[*few, *still], more=more)
+            if with_keys[name] or _bones_are_moved(objects[name]):
+                return [_sample_whole(path, objects[name], scenes)]
+            return [_sample(path, bodies[name], scenes)]
     except (UnicodeDecodeError, SystemError):
         # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
         raise TrajectoryError(path, "a name in this file is no text", "save it again from Blender") from None
@@ -146,52 +155,63 @@ def _nearest(wanted: str, names: list[str]) -> list[str]:
 
 
 def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene]) -> Trajectory:
-    import bpy
-
     from addon.animation import read_poses
 
+    frames, times, metres = _timing(path, body, scenes)
+    with probe() as seen:
+        follow = seen.constraints.new("COPY_TRANSFORMS")
+        follow.target = body.obj
+        if body.bone is not None:
+            follow.subtarget = body.bone
+        poses = read_poses(seen, frames)
+    return Trajectory(body.name, times, poses, metres, _remark(body, poses))
+
+
+def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
+    if not rig.data.bones:
+        raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "name another object of the file")
+    # What moves any bone counts.
+    frames, times, metres = _timing(path, Body(rig, rig.data.bones[0].name), scenes, rig.name)
+    return whole_body(path, rig, rig.name, frames, times, metres)
+
+
+def _timing(
+    path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = ""
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The frames that a body is looked at, their times in seconds, and the metres of a unit."""
     scene = next((scene for scene in scenes if scene in body.obj.users_scene), scenes[0])
     keyed = body.frames_of_keys()
     first, last = keyed if keyed and keyed[0] < keyed[1] else (scene.frame_start, scene.frame_end)
     if not -LAST_FRAME <= first <= last <= LAST_FRAME:
-        problem = f"{shown(body.name)} moves from frame {first:g} to {last:g}, where Blender does not go"
+        problem = f"{shown(name or body.name)} moves from frame {first:g} to {last:g}, where Blender does not go"
         raise TrajectoryError(path, problem, "delete the keys that are far off")
     rate, base = scene.render.fps, scene.render.fps_base
     if not (rate > 0 and base > 0.0):
         raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
     frames = np.arange(np.floor(first), np.ceil(last) + 1.0)
-    # Blender evaluates a hidden object only for the sake of one that is shown: hence the probe.
-    stage, probe = bpy.data.scenes.new("Reading"), bpy.data.objects.new("Probe", None)
-    try:
-        stage.collection.objects.link(probe)
-        follow = probe.constraints.new("COPY_TRANSFORMS")
-        follow.target = body.obj
-        if body.bone is not None:
-            follow.subtarget = body.bone
-        with bpy.context.temp_override(scene=stage, view_layer=stage.view_layers[0]):
-            poses = read_poses(probe, frames)
-    finally:
-        bpy.data.objects.remove(probe)
-        bpy.data.scenes.remove(stage)
     units = scene.unit_settings
-    metres = 1.0 if units.system == "NONE" else units.scale_length
-    return Trajectory(body.name, frames * base / rate, poses, metres, _remark(path, body, poses))
+    return frames, frames * base / rate, 1.0 if units.system == "NONE" else units.scale_length
 
 
-def _remark(path: Path, body: Body, poses: Poses) -> str:
-    """Where an armature stands still and its bones move, how to name one; of a bone, what its rig's size does to it."""
-    if body.bone is not None:
-        scales = poses.scales
-        if scales is None or not np.allclose(scales, scales[0], rtol=STEADY, atol=0.0):
-            return ""
-        size = f"{scales[0]:.4g} times its own size"
-        return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"
-    bones = _bones_with_keys(body.obj)
-    channels = np.hstack([poses.positions, poses.quaternions])
-    if not bones or np.ptp(channels, axis=0).max() > STILL:
+def _remark(body: Body, poses: Poses) -> str:
+    """Of a bone, what its rig's size does to it."""
+    if body.bone is None or poses.scales is None:
         return ""
-    some = listed(bones, FEW)
-    return f"{body.name} itself does not move, its bones do: name one with {path}:{body.name}/BONE: {some}"
+    if not np.allclose(poses.scales, poses.scales[0], rtol=STEADY, atol=0.0):
+        return ""
+    size = f"{poses.scales[0]:.4g} times its own size"
+    return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"
+
+
+def _bones_are_moved(obj: bpy.types.Object) -> bool:
+    """Whether drivers or constraints may move the bones of what may be an armature."""
+    if obj.type != "ARMATURE" or not obj.pose:
+        return False
+    data = obj.animation_data
+    drivers = data.drivers if data else ()
+    return any(bone.constraints for bone in obj.pose.bones) or any(
+        driver.data_path.startswith(OF_BONES) for driver in drivers
+    )
 
 
 def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
@@ -205,13 +225,14 @@ def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
     found = {
         unescape_identifier(channel["name"])
         for action, slot in [(data.action, data.action_slot), *actions]
-        for fcurve in _fcurves(action, slot)
+        for fcurve in fcurves_of(action, slot)
         if (channel := BONE_CHANNEL.match(fcurve.data_path))
     }
     return [bone.name for bone in obj.data.bones if bone.name in found]
 
 
-def _fcurves(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
+def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
+    """What an Action has for one of its slots."""
     from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
     if action is not None and slot is not None:

@@ -1,9 +1,10 @@
-"""BVH joints: a hierarchy with offsets and channels, and a row of channel values for every frame.
+"""BVH: a hierarchy of joints with offsets and channels, and a row of channel values for every frame.
 
-The poses are the joints' world poses: a joint without any rotation has the world's axes. Positions are in the file's
-unit, which BVH does not tell; angles are degrees, applied in the order of the channels. Position channels replace
-the joint's offset, as Blender's importer has it. That importer itself is not used: it works in single precision,
-needs Blender, and a file that it cannot read ends in an IndexError or, unnoticed, in a wrong skeleton.
+Without a name it is the whole body. The poses of joints that are named are their world poses: a joint without any
+rotation has the world's axes. Positions are in the file's unit, which BVH does not tell; angles are degrees, applied in
+the order of the channels. Position channels replace the joint's offset, as Blender's importer has it. That importer
+itself is not used: it works in single precision, needs Blender, and a file that it cannot read ends in an IndexError
+or, unnoticed, in a wrong skeleton.
 Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2001.
 """
 
@@ -20,7 +21,9 @@ from typing import NoReturn
 import numpy as np
 
 from addon.motion import Poses
-from addon.motion.quaternions import multiply, rotate
+from addon.motion.poses import placed
+from addon.motion.quaternions import align_signs
+from scripts.figures import Figure
 
 from .euler import quaternions_from_intrinsic_eulers
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
@@ -50,11 +53,16 @@ class Joint:
     channels: list[tuple[str, str]] = field(default_factory=list)
     """Axis and kind, in the order of the file: ("Z", "rotation")."""
 
+    end: tuple[float, ...] | None = None
+    """The offset of its end site, where it has one."""
+
 
 def read(path: Path, selection: Selection) -> list[Trajectory]:
-    """The joints, the root first."""
+    """The whole body; or joints that are named, or all, in the order of the file. A single joint is no body."""
     joints, motion = _read_hierarchy(path)
-    taken = selection.of([joint.name for joint in joints])
+    names = [joint.name for joint in joints]
+    as_body = selection.wanted is None and len(joints) > 1
+    taken = names if as_body else selection.of(names)
     values, frame_time = _read_motion(path, motion, joints)
     if len(taken) * len(values) > MOST_POSES:
         problem = f"{len(taken)} joints in {len(values)} frames are more than {MOST_POSES} poses"
@@ -62,8 +70,28 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     # What is not finite in the file is not in the poses either, and no news.
     with np.errstate(invalid="ignore", over="ignore"):
         times = np.arange(len(values)) * frame_time
+        if as_body:
+            return [Trajectory(path.stem, times, _local_poses(joints, values), figure=figure_of(joints))]
         poses = world_poses(joints, values, taken)
     return [Trajectory(name, times, poses[name]) for name in taken]
+
+
+def figure_of(joints: list[Joint]) -> Figure:
+    """The body of a hierarchy at rest, where no joint is turned: every bone ends in the middle of its children."""
+    parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
+    offsets = np.array([joint.offset for joint in joints])
+    places, tails, ends = offsets.copy(), np.zeros_like(offsets), np.zeros(len(joints))
+    for index, joint in enumerate(joints):
+        if joint.parent is not None:
+            places[index] += places[joint.parent]
+            tails[joint.parent] += offsets[index]
+            ends[joint.parent] += 1
+        if joint.end is not None:
+            tails[index] += joint.end
+            ends[index] += 1
+    tails /= np.maximum(ends, 1.0)[:, None]
+    unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1))
+    return Figure(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails)
 
 
 def world_poses(joints: list[Joint], values: np.ndarray, wanted: Iterable[str]) -> dict[str, Poses]:
@@ -83,13 +111,14 @@ def world_poses(joints: list[Joint], values: np.ndarray, wanted: Iterable[str]) 
         By name, in the order of `joints`.
     """
     wanted = set(wanted)
-    begins = np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
+    begins = _begins(joints)
     children = Counter(_needed(joints, wanted))
     world: dict[int, Poses] = {}
     for index, joint in enumerate(joints):
         if joint.name not in wanted and not children[index]:
             continue
-        world[index] = _placed(joint, values[:, begins[index] : begins[index + 1]], world.get(joint.parent))
+        own = _local(joint, values[:, begins[index] : begins[index + 1]])
+        world[index] = own if joint.parent is None else placed(world[joint.parent], own)
         # An hour of a whole skeleton is much: what nothing more hangs on is let go.
         children[joint.parent] -= 1
         if joint.parent is not None and not children[joint.parent] and joints[joint.parent].name not in wanted:
@@ -108,8 +137,25 @@ def _needed(joints: list[Joint], wanted: set[str]) -> Iterator[int | None]:
                 carrying[parent] = True
 
 
-def _placed(joint: Joint, own: np.ndarray, parent: Poses | None) -> Poses:
-    """A joint's world poses, from its own channels (n, channels) and what it hangs on."""
+def _local_poses(joints: list[Joint], values: np.ndarray) -> Poses:
+    """All joints in their parents' space, shape (joints, n), from values of shape (n, channels of all joints).
+
+    The signs of quaternions that Euler angles give say nothing, and are aligned.
+    """
+    begins = _begins(joints)
+    poses = Poses(np.empty((len(joints), len(values), 3)), np.empty((len(joints), len(values), 4)))
+    for index, joint in enumerate(joints):
+        poses[index] = _local(joint, values[:, begins[index] : begins[index + 1]])
+    return Poses(poses.positions, align_signs(poses.quaternions))
+
+
+def _begins(joints: list[Joint]) -> list[int]:
+    """The first column of each joint, and the end of the last one."""
+    return np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
+
+
+def _local(joint: Joint, own: np.ndarray) -> Poses:
+    """A joint's poses in its parent's space, from its own channels (n, channels)."""
     positions = np.tile(joint.offset, (len(own), 1))
     turns = []
     for column, (axis, kind) in enumerate(joint.channels):
@@ -118,11 +164,7 @@ def _placed(joint: Joint, own: np.ndarray, parent: Poses | None) -> Poses:
         else:
             turns.append(column)
     order = "".join(joint.channels[column][0] for column in turns)
-    quaternions = quaternions_from_intrinsic_eulers(np.radians(own[:, turns]), order)
-    if parent is not None:
-        positions = parent.positions + rotate(parent.quaternions, positions)
-        quaternions = multiply(parent.quaternions, quaternions)
-    return Poses(positions, quaternions)
+    return Poses(positions, quaternions_from_intrinsic_eulers(np.radians(own[:, turns]), order))
 
 
 class _Words:
@@ -193,6 +235,8 @@ def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
                 offset = tuple(words.number("a number of the OFFSET") for _ in range(3))
                 if joint:
                     joint.offset = offset
+                else:
+                    joints[opened[-2]].end = offset
             case "CHANNELS" if joint and not joint.channels:
                 joint.channels = _read_channels(words)
             case "}" if opened:

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from addon.motion import Poses
+from scripts.command_line import printable
+from scripts.figures import Figure
 
 ALL = "*"
 """Asks for every body of a file."""
@@ -28,7 +30,9 @@ class Trajectory:
     """Seconds, shape (n,). Neither rising nor finite unless the recording is sound."""
 
     poses: Poses
-    """Shape (n,). A sample that was not tracked is NaN; scales are None unless the file has one that is not 1."""
+    """Shape (n,). A sample that was not tracked is NaN; scales are None unless the file has one that is not 1.
+
+    Of a whole body shape (joints, n), each joint's in its parent's space, without scales."""
 
     metres_per_unit: float = 1.0
     """The length of one unit of the positions, where the file tells it; 1 otherwise."""
@@ -41,6 +45,14 @@ class Trajectory:
 
     dated: bool = False
     """Whether its times were dates or clock times, whose unit nobody can mistake."""
+
+    figure: Figure | None = None
+    """Of a whole body, what it is made of."""
+
+    @property
+    def rigid(self) -> Poses:
+        """A single rigid body of it, shape (n,): of a whole body its first root."""
+        return self.poses if self.figure is None else self.poses[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +73,9 @@ class Recording:
 
     body: str = ""
     """The body that was asked for by name; empty where the first was, or all."""
+
+    axes: str = "blender"
+    """The convention of its format: a name in `axes.AXES`."""
 
 
 class TrajectoryError(ValueError):
@@ -152,8 +167,3 @@ def listed(names: Sequence[str], limit: int = 30, more: int = 0) -> str:
 def shown(text: str, limit: int = 24) -> str:
     """A piece of a file, in quotes and short enough for a line of error."""
     return repr(text if len(text) <= limit else f"{text[:limit]}...")
-
-
-def printable(text: str) -> str:
-    """The text in one line, without the control characters that a file could smuggle into a terminal."""
-    return "".join(character if character.isprintable() else " " for character in text)

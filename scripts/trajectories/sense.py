@@ -11,7 +11,7 @@ import numpy as np
 
 from addon.motion.repair import LARGEST, rising
 
-from .recordings import Trajectory, TrajectoryError
+from .recordings import Trajectory, TrajectoryError, shown
 from .times import FASTEST, SLOWEST, typical_interval
 
 HIGHEST_SPEED = 20.0
@@ -34,6 +34,13 @@ SAME_TIME = 0.01
 MIXED = 0.25
 """The share of samples that do not follow the last one, from which on there are several devices. Of two that take turns
 it is all; of two in any order, half."""
+
+STARTLED = 10.0
+"""How many times farther any joint of a body goes from the first sample to the second than ever in the next ones, where
+the first is a pose of its own: the T-pose that programs put before a recording."""
+
+SOON = 60
+"""Samples that are looked at for that."""
 
 FEWEST = 16
 """Samples that are enough to see that."""
@@ -83,14 +90,15 @@ def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[str, ...
     way_out = "; if its times are no seconds, --time-unit ms, us or ns" * time_unit
     # Speeds between times that are next to nothing apart leave the range of floats.
     with np.errstate(over="ignore", invalid="ignore"):
-        return (*_of_times(times, way_out), *_of_lengths(times, positions))
+        return (*_of_times(times, way_out), *_of_lengths(times, positions), *_of_first_pose(trajectory))
 
 
 def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """The times and positions, in seconds and metres, of the samples where both are more than damage."""
+    """The times and positions, in seconds and metres, of the samples where both are no damage; of a body its root's."""
     rows = np.abs(trajectory.times) < LARGEST
-    rows &= (np.abs(trajectory.poses.positions) < LARGEST).all(axis=-1)
-    return trajectory.times[rows], trajectory.poses.positions[rows] * trajectory.metres_per_unit
+    positions = trajectory.rigid.positions
+    rows &= (np.abs(positions) < LARGEST).all(axis=-1)
+    return trajectory.times[rows], positions[rows] * trajectory.metres_per_unit
 
 
 def _of_times(times: np.ndarray, way_out: str) -> list[str]:
@@ -126,4 +134,21 @@ def _of_lengths(times: np.ndarray, positions: np.ndarray) -> list[str]:
     return [
         f"a twentieth of its speeds are above {fast:.3g} m/s, and it goes {extent:.3g} m far, as no hand does; if its "
         "lengths are centimetres, --scale 0.01, if millimetres, --scale 0.001"
+    ]
+
+
+def _of_first_pose(trajectory: Trajectory) -> list[str]:
+    if trajectory.figure is None or len(trajectory.times) < FEWEST:
+        return []
+    places = trajectory.figure.skeleton.in_root_space(trajectory.poses[:, :SOON]).positions * trajectory.metres_per_unit
+    steps, times = np.linalg.norm(np.diff(places, axis=1), axis=-1), np.diff(trajectory.times[:SOON])
+    joint = int(steps[:, 0].argmax())
+    first, others = steps[joint, 0], steps[:, 1:].max()
+    # What is damaged compares to nothing.
+    if not (first > HIGHEST_SPEED * times[0] > 0.0 and first > STARTLED * others):
+        return []
+    return [
+        f"its first sample is a pose of its own, perhaps the T-pose before a recording: from there to the next "
+        f"{shown(trajectory.figure.joints[joint])} jumps {first:.2g} m, and none jumps more than {others:.2g} m "
+        "afterwards; errors around it say nothing of the motion; delete that frame"
     ]

@@ -26,11 +26,31 @@ def test_a_joint_is_carried_by_its_parents(write) -> None:
     np.testing.assert_allclose(shoulder.poses.quaternions[1], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-15)
 
 
-def test_the_root_is_taken_and_the_others_are_told(write) -> None:
-    recording = read_trajectories(write("arm.bvh", ARM))
-    assert [trajectory.name for trajectory in recording.trajectories] == ["Shoulder"]
-    assert recording.others == ("Elbow",)
-    assert "holds 2 bodies; took Shoulder; others: Elbow; name one with " in recording.note
+def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM.replace("1 5 0  90", "1 2 0  90")))
+    (body,) = recording.trajectories
+    assert (body.name, recording.others, recording.note, recording.axes) == ("arm", (), "", "opengl")
+    assert body.figure.joints == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(body.figure.parents, [-1, 0])
+    np.testing.assert_allclose(body.poses.positions, [[[0, 0, 0], [1, 2, 0]], [[2, 0, 0]] * 2], atol=1e-15)
+    there = body.figure.skeleton.in_root_space(body.poses)
+    for joint, alone in enumerate(read_trajectories(str(recording.path) + ":*").trajectories):
+        np.testing.assert_allclose(there[joint].positions, alone.poses.positions, atol=1e-15)
+        assert angle_between(there[joint].quaternions, alone.poses.quaternions).max() < 1e-15
+
+
+def test_a_body_rests_where_no_joint_is_turned_and_its_bones_end_at_their_children(write) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM)).trajectories
+    np.testing.assert_array_equal(body.figure.rest.positions, [[0, 0, 0], [2, 0, 0]])
+    np.testing.assert_array_equal(body.figure.rest.quaternions, [[1, 0, 0, 0]] * 2)
+    np.testing.assert_array_equal(body.figure.tails[0], [2, 0, 0])
+    assert np.linalg.norm(body.figure.tails[1]) > 0.0  # Its end site.
+
+
+def test_a_single_joint_is_no_body(write) -> None:
+    text = "HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n}\nMOTION\nFrames: 2\n"
+    (single,) = read_trajectories(write("one.bvh", f"{text}Frame Time: 0.1\n0 0 0\n1 0 0\n")).trajectories
+    assert (single.name, single.figure, single.poses.shape) == ("A", None, (2,))
 
 
 @pytest.mark.parametrize("order", ["".join(order) for order in permutations("XYZ")])
@@ -63,12 +83,12 @@ def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
 
 def test_joints_of_one_name_are_numbered_as_blender_does(write) -> None:
     recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Shoulder")))
-    assert recording.others == ("Shoulder.001",)
+    assert recording.trajectories[0].figure.joints == ("Shoulder", "Shoulder.001")
 
 
 def test_a_name_of_several_words_is_joined_as_blender_does(write) -> None:
     recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Left Elbow : upper")))
-    assert recording.others == ("Left_Elbow_:_upper",)
+    assert recording.trajectories[0].figure.joints == ("Shoulder", "Left_Elbow_:_upper")
 
 
 def test_position_channels_take_the_place_of_the_offset(write) -> None:
@@ -173,7 +193,7 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
         (ARM.replace("1 5 0 ", "1 5 "), 20, "8 columns where 9 are needed"),
         (ARM.replace("1 5 0 ", "1 5 0 0 "), 20, "10 columns where 9 have a name"),
         (ARM.replace("1 5 0  90", "1 5 0  9O"), 20, "Shoulder Zrotation is '9O', not a number"),
-        (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'Shoulder' has 1 samp"),
+        (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
         ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "the file ends where MOTION is expected"),
         (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),

@@ -22,6 +22,10 @@ import numpy as np
 import pytest
 
 from addon.motion import MODES, interpolate, measure, reduce_keys
+from scripts.comparison.study.bodies import reconstruct_body
+from scripts.comparison.study.body_metrics import measure_modes
+from scripts.comparison.study.choices import Uniform
+from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.reading import make_clip
 from scripts.trajectories import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS
@@ -53,13 +57,9 @@ ROOT = Path(__file__).parents[3]
 
 def read_and_fill_in(source: str, number: int) -> bool:
     """Whether there is a recording; anything but that and a refusal in one line is an error."""
-    try:
-        recording = read_trajectories(source)
-        clips = [make_clip(trajectory, source, trajectory.name, "blender") for trajectory in recording.trajectories]
-    except TrajectoryError as error:
-        assert_is_one_line(str(error), source)
+    clips = clips_or_refusal(source)
+    if clips is None:
         return False
-    assert recording.note.isprintable()
     if number % FILLED_IN:
         return True
     mode = list(MODES)[number // FILLED_IN % len(MODES)]
@@ -69,11 +69,27 @@ def read_and_fill_in(source: str, number: int) -> bool:
         assert np.isfinite(poses.positions).all()
         assert np.isfinite(poses.quaternions).all()
         ends = [0, len(clip.times) - 1]
-        shown = interpolate(clip.times[ends], clip.poses[ends], clip.times, mode)
+        shown = interpolate(clip.times[ends], clip.poses[..., ends], clip.times, mode)
         assert np.isfinite(measure(clip.times, shown, clip.poses).shell).all()
-        if len(clip.times) < 50:
+        if clip.figure is not None:
+            made = reconstruct_body(clip, Uniform("5"), (mode,), 0.03)
+            if made is not None:
+                assert np.isfinite(measure_modes(made, 0.03).rows[0].rms_shell_m)
+        elif len(clip.times) < 50:
             assert len(reduce_keys(clip.times, clip.poses, mode, tolerance=0.01)) >= 2
     return True
+
+
+def clips_or_refusal(source: str) -> list[Clip] | None:
+    """What is in a file; None where that is refused, in one line. Anything else is an error."""
+    try:
+        recording = read_trajectories(source)
+        clips = [make_clip(trajectory, source, trajectory.name, "blender") for trajectory in recording.trajectories]
+    except TrajectoryError as error:
+        assert_is_one_line(str(error), source)
+        return None
+    assert recording.note.isprintable()
+    return clips
 
 
 def assert_is_one_line(message: str, source: str) -> None:
@@ -142,12 +158,12 @@ import json, os, sys, warnings
 answers = os.fdopen(os.dup(1), "w")
 os.dup2(2, 1)
 import bpy
-from tests.scripts.trajectories.test_fuzz import read_and_fill_in
+from tests.scripts.trajectories.%s import %s as read
 warnings.simplefilter("error", RuntimeWarning)
 for line in sys.stdin:
     number, source = json.loads(line)
     try:
-        answer = read_and_fill_in(source, number)
+        answer = read(source, number)
     except Exception as error:
         answer = f"{type(error).__name__}: {error}"
     print(json.dumps(answer), file=answers, flush=True)
@@ -156,15 +172,16 @@ os._exit(0)
 
 
 class Reader:
-    """A process of its own that reads .blend files, begun anew where Blender crashed on a damaged one."""
+    """A process of its own that reads what Blender opens, begun anew where it crashed on a damaged file."""
 
-    def __init__(self) -> None:
+    def __init__(self, module: str = "test_fuzz", function: str = "read_and_fill_in") -> None:
+        self._code = READER % (module, function)
         self._process: subprocess.Popen[str] | None = None
 
     def read(self, source: str, number: int) -> bool | str:
         """Whether there was a recording, or what was wrong with the reading."""
         if self._process is None:
-            command = [sys.executable, "-c", READER]
+            command = [sys.executable, "-c", self._code]
             pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
             self._process = subprocess.Popen(command, cwd=ROOT, text=True, **pipes)
         late = threading.Timer(3.0 * PATIENCE, self._process.kill)

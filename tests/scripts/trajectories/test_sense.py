@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from addon.motion import Poses
+from scripts.figures import Figure
 from scripts.trajectories import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
 from scripts.trajectories.sense import doubts, require_one_body
 from scripts.trajectories.times import typical_interval
@@ -89,6 +90,20 @@ def test_what_nobody_records_is_said(trajectory: Trajectory, told: str) -> None:
 def test_the_unit_of_time_is_a_way_out_only_where_a_format_takes_one() -> None:
     assert doubts(hand(rate=1.0), time_unit=True)[0].endswith("if its times are no seconds, --time-unit ms, us or ns")
     assert "--time-unit" not in doubts(hand(rate=1.0))[0]
+
+
+@pytest.mark.parametrize(("jump", "samples", "said"), [(0.6, 60, 1), (0.02, 60, 0), (0.6, 12, 0), (np.nan, 60, 0)])
+def test_a_pose_before_the_recording_is_said(jump: float, samples: int, said: int) -> None:
+    times = np.arange(samples) / 120.0
+    turned = np.array((np.cos(0.5 * jump), np.sin(0.5 * jump), 0.0, 0.0))
+    poses = Poses(np.zeros((2, samples, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (2, samples, 1)))
+    poses.positions[1], poses.quaternions[0, 0] = (0.0, 0.0, 1.0), turned
+    poses.positions[0, :, 0] = 1e-3 * np.arange(samples)
+    rest = Poses(((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), np.tile((1.0, 0.0, 0.0, 0.0), (2, 1)))
+    body = Figure(("Hips", "Head"), np.array((-1, 0)), rest, np.ones((2, 3)))
+    found = doubts(Trajectory("body", times, poses, figure=body))
+    assert len(found) == said
+    assert all("the next 'Head' jumps 0.59 m, and none jumps more than 0.001 m" in one for one in found)
 
 
 def test_recordings_one_behind_the_other_are_said() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scripts.trajectories import TrajectoryError, read_trajectories
-from scripts.trajectories.reading import FORMATS, split_source
+from scripts.trajectories.reading import FORMATS, files_of, split_source
 from scripts.trajectories.recordings import listed, unique
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
@@ -82,7 +82,7 @@ def test_a_missing_file_is_told(folder: Path, source: str) -> None:
 
 
 def test_a_folder_is_told(folder: Path) -> None:
-    with pytest.raises(TrajectoryError, match="this is a folder; name a file in it"):
+    with pytest.raises(TrajectoryError, match="a folder without recordings; name a file"):
         read_trajectories(str(folder))
 
 
@@ -107,8 +107,8 @@ def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> No
 
 
 def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) -> None:
-    _, message = refusal(write("take.fbx", "Kaydara FBX Binary"))
-    assert message.startswith("unknown extension '.fbx'; known are .csv, ")
+    _, message = refusal(write("take.usd", "PXR-USDC"))
+    assert message.startswith("unknown extension '.usd'; known are .csv, ")
     assert all(extension in message for known in FORMATS for extension in known.extensions)
 
 
@@ -123,12 +123,14 @@ def test_a_missing_body_is_answered_with_those_there_are(write, refusal) -> None
     assert message == "no body named 'Hand'; it holds mixamorig:Hips, mixamorig:Spine"
 
 
+HANDS = {"left": -1.0, "right": 1.0}
+
+
 def test_the_note_tells_how_to_get_the_others(write) -> None:
-    path = write("walk.bvh", BVH)
-    assert read_trajectories(path).note == (
-        f"{path} holds 2 bodies; took mixamorig:Hips; others: mixamorig:Spine; "
-        f"name one with {path}:NAME, all with {path}:*"
-    )
+    rows = "".join(f"{step * 0.01},{device},{x},0,0,0,0,0,1\n" for step in range(9) for device, x in HANDS.items())
+    path = write("log.csv", f"t,device,x,y,z,qx,qy,qz,qw\n{rows}")
+    note = f"{path} holds 2 bodies; took left; others: right; name one with {path}:NAME, all with {path}:*"
+    assert read_trajectories(path).note == note
 
 
 @pytest.mark.parametrize("body", ["mixamorig:Hips", "*"])
@@ -177,3 +179,14 @@ def test_text_formats_need_no_blender(write) -> None:
         [sys.executable, "-c", script, *sources], cwd=root, capture_output=True, text=True, check=True
     )
     assert result.stdout.strip() == f"{sources[2]}: this needs Blender; run it in Blender, or pip install bpy"
+
+
+def test_a_folder_stands_for_the_recordings_in_it(tmp_path):
+    for name in ("b.bvh", "a.CSV", "notes.md", "c.glb"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "deeper.csv").mkdir()
+    assert files_of(str(tmp_path)) == [str(tmp_path / name) for name in ("a.CSV", "b.bvh", "c.glb")]
+    assert files_of(str(tmp_path / "b.bvh")) == [str(tmp_path / "b.bvh")]
+    assert files_of(str(tmp_path / "deeper.csv")) == [str(tmp_path / "deeper.csv")]
+    assert files_of("nothing:Body") == ["nothing:Body"]
+    assert files_of("\0") == ["\0"]

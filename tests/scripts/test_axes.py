@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from addon.motion import Poses
-from scripts.trajectories.axes import AXES, to_blender
+from scripts.axes import AXES, to_blender
 
 
 def matrices(poses: Poses) -> np.ndarray:

@@ -1,0 +1,90 @@
+"""Figures: what is repaired of them, apart from how they move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.reading import make_clip
+from scripts.figures import IN_METRES, TYPICAL, UNITS, Skin, repaired, size_of, unit_of
+from scripts.trajectories import Trajectory
+from tests.scripts.comparison.bodies import JOINTS, swinging_body
+
+
+@pytest.fixture
+def clip() -> Clip:
+    """With a skin of one triangle."""
+    clip = swinging_body()
+    skin = Skin(np.eye(3), np.array([[0, 1, 2]]), np.zeros((3, 4), dtype=int), np.eye(4)[[0, 0, 0]])
+    return replace(clip, figure=replace(clip.figure, skin=skin))
+
+
+def test_a_sound_figure_stays_what_it_is(clip: Clip) -> None:
+    assert repaired(clip.figure) == (clip.figure, ())
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e38])
+def test_a_joint_that_is_nowhere_at_rest_has_no_bone_and_is_told(clip: Clip, number: float) -> None:
+    figure = clip.figure
+    figure.tails[2, 1] = number
+    figure.rest.positions[5, 0] = number
+    figure.skin.vertices[1, 1] = number
+    sound, done = repaired(figure)
+    assert done == (
+        "drew no bones for joints that are nowhere at rest (2: Head, Glove)",
+        "left out a skin with numbers that are missing, not finite or too large",
+    )
+    assert sound.skin is None
+    for joint in range(len(JOINTS)):
+        for found, before in ((sound.tails, figure.tails), (sound.rest.positions, figure.rest.positions)):
+            assert np.array_equal(found[joint], [0, 0, 0] if joint in (2, 5) else before[joint])
+    trajectory = Trajectory("walk", clip.times, clip.poses, figure=figure)
+    made = make_clip(trajectory, "walk.fbx", "walk", "blender")
+    assert made.repairs == done
+    assert np.isfinite(made.figure.tails).all()
+
+
+@pytest.mark.parametrize(
+    ("size", "unit"),
+    [
+        (1.7, "metres"),
+        (0.3, "metres"),
+        (4.9, "metres"),
+        (175.9, "centimetres"),
+        (110.0, "centimetres"),
+        (67.0, "inches"),
+        (24.9, "units of CMU's motion capture, 1/0.45 inch"),
+        (1700.0, "millimetres"),
+        (5.8, "feet"),
+        (0.0, "metres"),
+    ],
+)
+def test_a_body_is_taken_to_be_in_the_unit_that_makes_it_a_grown_up(size: float, unit: str) -> None:
+    name, length = unit_of(size)
+    assert name == unit
+    assert length == dict(UNITS)[unit]
+
+
+@given(power=st.floats(-6.0, 9.0))
+def test_a_body_of_any_size_has_a_unit_and_is_as_near_to_a_person_as_units_allow(power: float) -> None:
+    size = 10.0**power
+    _, length = unit_of(size)
+    metres = size * length
+    assert IN_METRES[0] <= metres <= IN_METRES[1] or all(
+        abs(np.log(metres / TYPICAL)) <= abs(np.log(size * other / TYPICAL)) + 1e-12 for _, other in UNITS
+    )
+
+
+def test_the_size_of_a_body_is_that_from_where_it_branches() -> None:
+    # From a reference on the ground to the root of the body, and from there an arm and a leg.
+    parents = np.array([-1, 0, 1, 1, 3])
+    places = np.array([[0, 0, 0], [0, 50, 0], [0, 51, 0], [0, 49.5, 0], [0, 49.2, 0.4]])
+    assert size_of(parents, places) == pytest.approx(1.8)
+    chain = np.array([-1, 0, 1])
+    assert size_of(chain, np.array([[0, 0, 0], [3.0, 0, 0], [3, 4, 0]])) == pytest.approx(4.0)
+    assert size_of(np.array([-1]), np.zeros((1, 3))) == 0.0

@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scripts.rows import line_of, meant, plain, read_rows, write_rows
+
+
+@dataclass
+class Row:
+    name: str
+    value: float
+    count: int
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-2+3", "@SUM(1)", "\ta", "\ra", "'=1", "''@"])
+def test_no_text_is_a_formula(text):
+    assert plain(text) == f"'{text}"
+    assert meant(plain(text)) == text
+
+
+@given(st.text(max_size=6, alphabet="'=+-@\t\rab 1"))
+def test_what_was_meant_comes_back(text):
+    assert meant(plain(text)) == text
+    assert not plain(text).startswith(("=", "+", "-", "@", "\t", "\r"))
+
+
+def test_numbers_stay_numbers_and_rows_come_back(tmp_path):
+    rows = [Row("=1+1", -2.5, -3), Row("'plain'", 1e-300, 0), Row('a,"b"\r\nc', 0.1, 7)]
+    write_rows(tmp_path / "rows.csv", Row, rows)
+    assert read_rows(tmp_path / "rows.csv", Row) == rows
+    with (tmp_path / "rows.csv").open(encoding="utf-8", newline="") as stream:
+        assert next(csv.reader(list(stream)[1:])) == ["'=1+1", "-2.5", "-3"]
+    assert line_of(["-a", -1.0]) == "'-a,-1.0\n"
