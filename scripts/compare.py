@@ -22,7 +22,7 @@ from scripts.comparison.options import ALL, parse
 from scripts.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks, without_films
 from scripts.comparison.report.pages import Settings
 from scripts.comparison.stage.settings import SubjectError
-from scripts.comparison.steps import FILM, KEYS_NEEDED, METRICS, REPORT
+from scripts.comparison.steps import DECIMATED, FILM, JOINT_METRICS, KEYS_NEEDED, METRICS, REPORT
 from scripts.comparison.version import blender_version, program_version
 from scripts.progress import Progress
 from scripts.system_libraries import missing_for_rendering, way_out
@@ -131,7 +131,9 @@ class _Run:
         reading = reading_tasks(options.inputs, options.axes, options.reading)
         first = plan_of(list({task.name: task for task in reading}.values()), self.version)
         require_same_inputs(first, self.workspace, force=options.force)
-        require_free(first, self.workspace, (METRICS, KEYS_NEEDED, REPORT), force=options.force)
+        require_free(
+            first, self.workspace, (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED, REPORT), force=options.force
+        )
         read = self._do(first, "Reading")
         if read.interrupted:
             return 130
@@ -139,11 +141,11 @@ class _Run:
         if read.problem or not there:
             return 2
         try:
-            found = look_into(self.workspace.output, there, options.choices)
+            found = look_into(self.workspace.output, there, options.choices, options.radius)
         except Exception:  # What was read before may be damaged in any way: it is read again.
             self.workspace.withdraw_damaged(first.order) or self.workspace.withdraw(first.order)
             read = self._do(first, "Reading")
-            found = look_into(self.workspace.output, there, options.choices)
+            found = look_into(self.workspace.output, there, options.choices, options.radius)
         del first, reading  # Of ten thousand clips all of this is a third of the memory.
         for note in found.notes:
             self.progress.note(note)
@@ -154,14 +156,17 @@ class _Run:
         asked = wanted(options, self.command)
         for note in filter(None, (study.left_out(asked.stage) for study in found.studies if asked.stage)):
             self.progress.note(note)
+        for note in filter(None, (study.not_decimated for study in found.studies)):
+            self.progress.note(note)
         tasks = comparison_tasks(found.studies, there, asked)
         del there, found
         plan = plan_of(tasks, self.version)
         del tasks
         require_free(plan, self.workspace, force=options.force)
-        if options.decimate != "adaptive":
-            # What an earlier run found must not pass for a finding of this.
-            (options.output / KEYS_NEEDED).unlink(missing_ok=True)
+        for table in (JOINT_METRICS, DECIMATED, KEYS_NEEDED):
+            if table not in plan.tasks:
+                # What an earlier run found must not pass for a finding of this.
+                (options.output / table).unlink(missing_ok=True)
         if asked.stage and self._has_films_to_make(plan):
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
             measured = self._do(plan_of(without_films(plan.tasks.values()), self.version), "Measuring")
@@ -219,7 +224,8 @@ def wanted(options: argparse.Namespace, command: str) -> Wanted:
     stage = options.stage
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     settings = Settings(
-        radius=options.radius,
+        radius=options.radius.rigid,
+        joint_radius=options.radius.joint,
         program=f"{manifest['name']} {manifest['version']}",
         blender=blender_version(),
         command=command,
@@ -233,12 +239,13 @@ def wanted(options: argparse.Namespace, command: str) -> Wanted:
     return Wanted(
         choices=tuple(options.choices),
         modes=options.modes.names,
-        radius=options.radius,
+        radii=options.radius,
         settings=settings,
         stage=None if options.no_video else stage,
         every_film=options.films == ALL,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
+        shared=options.shared,
     )
 
 

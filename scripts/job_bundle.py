@@ -39,6 +39,7 @@ KINDS = {
     "Report": steps.REPORT,
     "Read": "read {Recording}",
     "Measure": "measure {Clip}",
+    "Decimate": "decimate {Clip}",
     "Count keys": "count keys {Clip}",
     "Tables": "{Table}.csv",
     "Build": "build {Clip}",
@@ -181,7 +182,7 @@ def make_plan(options: argparse.Namespace, command: str) -> tuple[Plan | None, i
         if read.interrupted:
             raise KeyboardInterrupt
         there = [task for task in reading if read.states[task.name].there]
-        found = look_into(workspace.output, there, options.choices)
+        found = look_into(workspace.output, there, options.choices, options.radius)
         for note in found.notes:
             progress.note(note)
     if not found.studies:

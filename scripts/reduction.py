@@ -82,9 +82,9 @@ class Outcome:
 
 
 def read(path: Path, rate: float) -> Recording:
-    """The first body of a file, at so many frames a second, between samples by the shortest way."""
+    """The first body of a file, at so many frames a second, between samples by the shortest way; a skeleton's root."""
     trajectory = read_trajectories(str(path)).trajectories[0]
-    times, poses, _ = repair(trajectory.times, trajectory.poses)
+    times, poses, _ = repair(trajectory.times, trajectory.rigid)
     if len(times) < 2:
         raise TrajectoryError(path, f"{len(times)} usable poses are left", "record at least 2")
     poses = Poses(trajectory.metres_per_unit * poses.positions, poses.quaternions)

@@ -40,5 +40,5 @@ def explain_comparison(output: Path, reading: Sequence[Task], wanted: Wanted, *,
 
 def _compared(output: Path, known: list[Task], wanted: Wanted) -> list[Task]:
     """The tasks of a comparison of the recordings that are known; none where there is nothing to compare."""
-    found = look_into(output, known, wanted.choices)
+    found = look_into(output, known, wanted.choices, wanted.radii)
     return comparison_tasks(found.studies, known, wanted) if found.studies else []

@@ -9,14 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from addon.motion import KEYFRAME_MODES, MODES
+from scripts.axes import AXES
 from scripts.command_line import number
+from scripts.trajectories import files_of
 from scripts.trajectories.arguments import add_reading_options, reading_options
-from scripts.trajectories.axes import AXES
 
 from .palette import THEMES
 from .stage.settings import ANTIALIASING, ENGINES, StageSettings
 from .study.choices import Budget, Choice, Tolerance, Uniform, distinct
 from .study.modes import BEST_OF, single_modes
+from .study.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -38,9 +40,17 @@ ALL, DISTINCT = "all", "distinct"
 EPILOG = """
 inputs:
   CSV with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM, EuRoC,
-  Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, .blend. FILE:BODY takes one body of several, FILE:* all.
-  Of a .blend a body is an object (FILE.blend:OBJECT) or a bone of a rig (FILE.blend:OBJECT/BONE), as Blender shows it
-  in the world, with parents, constraints, drivers and NLA strips. FILE.blend:* is every object that is animated.
+  Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, FBX, glTF, .blend; a folder stands for the recordings in it.
+  FILE:BODY takes one body of several, FILE:* all. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of it.
+  Of a .blend a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
+  (FILE.blend:RIG), as Blender shows it in the world, with parents, constraints, drivers and NLA strips. FILE.blend:* is
+  every object that is animated.
+
+whole bodies:
+  Each joint has its keys in its parent's space, as a rig has them, and is measured where that puts it. The unit of a
+  body is found by its size, and said; --scale says otherwise. OUTPUT/metrics.csv has the body, its worst joint and how
+  far feet slide that stand, OUTPUT/metrics_joints.csv every joint. In the film each mode moves a rig of its own, which
+  comparison.blend has with the modes on its bones.
 
 examples:
   python scripts/compare.py
@@ -48,7 +58,10 @@ examples:
   python scripts/compare.py log.csv:left --columns t=when,device=who --time-unit ms --scale 0.01
   python scripts/compare.py unity.csv --axes unity --euler YXZ --degrees
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
-  python scripts/compare.py dance.bvh:LeftHand --axes opengl --object controller
+  python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
+  python scripts/compare.py dances/ --no-video
+  python scripts/compare.py dance.bvh --decimate adaptive --tolerance 1cm --shared
+  python scripts/compare.py dance.bvh:LeftHand --object controller
   python scripts/compare.py shot.blend:Camera --no-video
   python scripts/compare.py shot.blend:Rig/Hand --no-video
   python scripts/compare.py hand_left.csv --modes all,best_of
@@ -71,9 +84,10 @@ choosing modes:
   each segment is a column of best_of.keys.csv.
 
 It writes OUTPUT/report.html (all of it in one file; of more than 24 clips each has a page of its own, beside its
-folders), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv, and for every clip and choice of keys a folder
-(OUTPUT/CLIP/10, /budget-10, /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4
-and comparison.blend. The last line it prints is the path of the report.
+folders), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv and of whole bodies OUTPUT/decimated.csv, which
+sets them beside Blender's Decimate, and for every clip and choice of keys a folder (OUTPUT/CLIP/10, /budget-10,
+/tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The last
+line it prints is the path of the report.
 
 one folder, one comparison:
   With the same recordings, more of them or fewer, a second run into a folder goes on. A folder that holds another
@@ -109,14 +123,20 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         f"streams, which know no later keys, and {BEST_OF} for the best of each segment",
     )
     parser.add_argument(
+        "-o",
         "--output",
         type=_folder,
         default=ROOT / "renders" / "comparison",
         help="folder to write to (renders/comparison)",
     )
-    parser.add_argument("--axes", choices=AXES, default="blender", help="axes of the recordings (%(default)s)")
+    parser.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
     parser.add_argument(
-        "--radius", type=_positive, default=0.1, metavar="M", help="of the shell error, in metres (%(default)s)"
+        "--radius",
+        type=_radii,
+        default=EVERYWHERE,
+        metavar="M|CSV",
+        help=f"of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table joint,radius_m "
+        "for joints by name",
     )
     add_reading_options(parser)
     workers = parser.add_mutually_exclusive_group()
@@ -147,6 +167,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     keys.add_argument(
         "--budget", type=_amounts(Budget), metavar="HZ,...", help="adaptive keys a second, on average over the clip"
+    )
+    keys.add_argument(
+        "--shared",
+        action="store_true",
+        help="key poses: all joints of a body have their keys at the same times; otherwise each where it needs them",
     )
     keys.add_argument("--fit", action="store_true", help="count the keys needed also where they are fitted")
     video = parser.add_argument_group("video")
@@ -205,14 +230,16 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         if Path.cwd() == ROOT:
             assets = assets.relative_to(ROOT)
         options.inputs = [str(path) for path in sorted(assets.glob("*.csv"))]
+    options.inputs = [file for source in options.inputs for file in files_of(source)]
     return options
 
 
 def _choices(options: argparse.Namespace) -> list[Choice]:
     """All choices of keys of the run. Raises ValueError for options that do not go together."""
-    rates, tolerance, budget = options.rates, options.tolerance, options.budget
+    rates, tolerance, budget, shared = options.rates, options.tolerance, options.budget, options.shared
     if options.decimate == "uniform":
-        for option, given in (("--tolerance", tolerance), ("--budget", budget), ("--fit", options.fit)):
+        by_motion = (("--tolerance", tolerance), ("--budget", budget), ("--fit", options.fit), ("--shared", shared))
+        for option, given in by_motion:
             if given:
                 raise ValueError(f"{option} is for keys that are chosen by the motion: add --decimate adaptive")
         return rates or _amounts(Uniform)(RATES)
@@ -283,6 +310,13 @@ def _positive(text: str) -> float:
     if not 0.0 < positive < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
     return positive
+
+
+def _radii(text: str) -> Radii:
+    try:
+        return read_radii(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _resolution(text: str) -> tuple[int, int]:

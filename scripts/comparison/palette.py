@@ -8,7 +8,12 @@ reaches a contrast of 3 on the dark stage, and is darkened to reach it on the li
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
+
+from .study.metrics import NOTHING
 
 MODE_COLOURS: dict[str, str] = {
     "lerp_slerp": "#D55E00",
@@ -50,6 +55,13 @@ THEMES = {
 }
 DARK = THEMES["dark"]
 
+ERROR_COLOURS = ("#5B7FB0", "#C9B98A", "#F08A24", "#C4162A")
+"""What an error looks like where it is a colour, evenly from none to the largest: calm where all is well, red where it
+is not. They differ in lightness as well, for people who cannot tell red from green."""
+
+NEARLY_ALL = 0.995
+"""The share of all errors that the colours reach up to: a single wild frame would leave no other to be seen."""
+
 LEAST_CONTRAST = 3.0
 """Of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
 
@@ -69,6 +81,26 @@ def colour_on(theme: Theme, mode: str) -> str:
     return "#" + "".join(f"{int(255.0 * _encoded(share * value)):02X}" for value in (red, green, blue))
 
 
+def error_hex(share: float) -> str:
+    """The colour of an error by its share of the largest, 0 to 1: between those of `ERROR_COLOURS`."""
+    place = min(max(share, 0.0), 1.0) * (len(ERROR_COLOURS) - 1)
+    first = min(int(place), len(ERROR_COLOURS) - 2)
+    low, high = map(_parts, ERROR_COLOURS[first : first + 2])
+    mixed = (a + (place - first) * (b - a) for a, b in zip(low, high, strict=True))
+    return "#" + "".join(f"{round(255.0 * value):02x}" for value in mixed)
+
+
+def full_colour(errors: Iterable[np.ndarray]) -> float:
+    """The error that colours reach up to, so that one scale is good for all of these: nearly the largest.
+
+    In metres. What is only rounding has the colour of nothing.
+    """
+    errors = list(errors)
+    nearly_all = max(float(np.quantile(some, NEARLY_ALL)) for some in errors)
+    largest = max(float(some.max()) for some in errors)
+    return next((size for size in (nearly_all, largest) if size > NOTHING), 1.0)
+
+
 def luminance(colour: str) -> float:
     """Relative luminance, 0 to 1."""
     red, green, blue = linear(colour)
@@ -77,9 +109,13 @@ def luminance(colour: str) -> float:
 
 def linear(colour: str) -> tuple[float, float, float]:
     """The linear RGB, 0 to 1, that Blender computes in, of an sRGB colour such as "#56B4E9"."""
-    encoded = (int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
-    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in encoded)
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in _parts(colour))
     return red, green, blue
+
+
+def _parts(colour: str) -> list[float]:
+    """Red, green and blue, 0 to 1, as they are written."""
+    return [int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)]
 
 
 def _encoded(value: float) -> float:

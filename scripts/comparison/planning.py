@@ -17,9 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from scripts.command_line import printable
 from scripts.trajectories import ReadingOptions, TrajectoryError
 from scripts.trajectories.options import AS_THE_FILE_SAYS
 from scripts.trajectories.reading import split_source
+from scripts.trajectories.recordings import listed
 from scripts.workplan import Plan, Task
 
 from . import steps
@@ -27,14 +29,16 @@ from .report.pages import ON_ONE_PAGE, Settings
 from .stage.settings import StageSettings, place_of_subject
 from .stage.timeline import Timeline
 from .study.choices import Choice, choice_parts, fewest_keys
-from .study.metrics import table_names
+from .study.metrics import body_table_names, table_names
+from .study.modes import single_modes
+from .study.radii import EVERYWHERE, Radii
 from .study.reading import clip_names
 from .study.storage import ClipReference, file_names, read_facts, read_times
 from .version import step_versions
 
 MODULE = steps.__name__
 
-FILMING = {f"{MODULE}:{step}" for step in ("build", "render", "encode")}
+FILMING = {f"{MODULE}:{step}" for step in ("build", "build_body", "render", "encode")}
 """The steps at the end of which there is a film."""
 
 PIECE = 60
@@ -43,6 +47,12 @@ where one is interrupted."""
 
 MOST_FRAMES = 216_000
 """Of a film: an hour at 60 frames a second."""
+
+MOST_POSES = 600_000
+"""Frames times joints of a film of a body, whose rigs take half a kilobyte for each in every lane."""
+
+MOST_DECIMATED = 50_000
+"""Samples times joints of a body that is set beside Blender's Decimate: minutes for a choice of keys."""
 
 RATE_MARGIN = 0.01
 """By what share a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
@@ -54,8 +64,8 @@ class Wanted:
 
     choices: tuple[Choice, ...]
     modes: tuple[str, ...]
-    radius: float
-    """Of the shell, in metres."""
+    radii: Radii
+    """Of the shell."""
 
     settings: Settings
     """What the report says of the run."""
@@ -72,6 +82,9 @@ class Wanted:
     fit: bool = False
     """And how many where they may be fitted."""
 
+    shared: bool = False
+    """Whether the joints of a body have their keys at the same samples where the motion chooses them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Study:
@@ -82,21 +95,45 @@ class Study:
     choices: dict[Choice, tuple[float, float]]
     """Each with the times of the first and the last key."""
 
+    joints: int = 0
+    """How many a whole body has; 0 for a single rigid one."""
+
     def filmed(self, wanted: Wanted) -> list[Choice]:
         """The choices that there are films of."""
         asked = list(self.choices) if wanted.every_film else fewest_keys(self.choices)
-        return [choice for choice in asked if wanted.stage and self._frames(choice, wanted.stage) <= MOST_FRAMES]
+        return [choice for choice in asked if wanted.stage and self._frames(choice, wanted.stage) <= self._most_frames]
 
     def left_out(self, stage: StageSettings) -> str:
         """Why there is no film of the clip, for the user; empty where there can be one."""
         frames = max(self._frames(choice, stage) for choice in self.choices)
-        if frames <= MOST_FRAMES:
+        if frames <= self._most_frames:
             return ""
         start, end = next(iter(self.choices.values()))
         return (
-            f"{self.clip.name}: no video: its {end - start:.6g} s make {frames:.6g} frames, more than {MOST_FRAMES}; "
-            "see whether its times are in seconds, cut it, or give a lower --fps or --slow-motion"
+            f"{self.clip.name}: no video: its {end - start:.6g} s make {frames:.6g} frames, more than "
+            f"{self._most_frames}; see whether its times are in seconds, cut it, or give a lower --fps or --slow-motion"
         )
+
+    @property
+    def decimated(self) -> list[Choice]:
+        """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
+        if self.samples * self.joints > MOST_DECIMATED:
+            return []
+        return [choice for choice in self.choices if self.joints and choice.decimation == "adaptive"]
+
+    @property
+    def not_decimated(self) -> str:
+        """Why the clip is not, for the user; empty where it is, or nobody asks."""
+        if self.decimated or not (self.joints and any(choice.decimation == "adaptive" for choice in self.choices)):
+            return ""
+        return (
+            f"{self.clip.name}: not compared with Blender's Decimate: {self.joints} joints with {self.samples} samples "
+            f"would take too long; cut it to {MOST_DECIMATED // self.joints}"
+        )
+
+    @property
+    def _most_frames(self) -> int:
+        return min(MOST_FRAMES, MOST_POSES // max(self.joints, 1))
 
     def _frames(self, choice: Choice, stage: StageSettings) -> float:
         start, end = self.choices[choice]
@@ -116,12 +153,12 @@ def plan_of(tasks: Sequence[Task], version: str) -> Plan:
     return Plan(tasks, version, versions=step_versions(task.function for task in tasks))
 
 
-def reading_tasks(sources: Iterable[str], axes: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Task]:
+def reading_tasks(sources: Iterable[str], axes: str | None, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Task]:
     """A task for every source, in their order; for a source that is named twice the same one twice."""
     return [_reading(source, axes, options) for source in sources]
 
 
-def _reading(source: str, axes: str, options: ReadingOptions) -> Task:
+def _reading(source: str, axes: str | None, options: ReadingOptions) -> Task:
     digest = hashlib.sha256(json.dumps([source, axes, asdict(options)]).encode()).hexdigest()[:16]
     recording = steps.recording_of(digest)
     try:
@@ -150,7 +187,7 @@ class Found:
     """What the user should know, a line each."""
 
 
-def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> Found:
+def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice], radii: Radii = EVERYWHERE) -> Found:
     """See what clips there are in the recordings that were read, in the order of the sources.
 
     Parameters
@@ -161,6 +198,8 @@ def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> 
         Of `reading_tasks`, done. A task that is there twice gives its clips twice, under different names.
     choices : sequence of Choice
         That are wanted.
+    radii : Radii
+        Of whose joints it is said where no body has them.
     """
     recordings = [task.arguments["recording"] for task in read]
     known = {recording: read_facts(output, recording) for recording in dict.fromkeys(recordings)}
@@ -170,6 +209,8 @@ def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> 
     studies = []
     for (recording, body), name in zip(bodies, names, strict=True):
         notes += [f"{name}: {repaired}" for repaired in known[recording].repairs[body]]
+    if unknown := radii.unknown(joint for one in known.values() for some in one.joints for joint in some):
+        notes.append(printable(f"no body has a joint {listed(unknown)}, for which --radius has a radius"))
     for (recording, body), name in zip(bodies, names, strict=True):
         clip = ClipReference(name, recording, body)
         times = read_times(output, clip)
@@ -184,7 +225,7 @@ def look_into(output: Path, read: Sequence[Task], choices: Sequence[Choice]) -> 
             choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
         }
         if long_enough:
-            studies.append(Study(clip, len(times), long_enough))
+            studies.append(Study(clip, len(times), long_enough, len(known[recording].joints[body])))
     return Found(tuple(studies), tuple(notes))
 
 
@@ -207,6 +248,11 @@ def comparison_tasks(studies: Sequence[Study], read: Sequence[Task], wanted: Wan
     # All numbers first: they take seconds, and are there whatever becomes of the videos.
     measures = [task for study in studies for task in _measures(study, reader_of[study.clip.name], wanted)]
     tasks = [*readers.values(), *measures, _table(steps.METRICS, "tabulate", studies, measures)]
+    if bodies := [study for study in studies if study.joints]:
+        of_bodies = [task for task in measures if task.function == f"{MODULE}:measure_body"]
+        tasks.append(_table(steps.JOINT_METRICS, "tabulate_joints", bodies, of_bodies))
+        if beside := [task for study in bodies for task in _decimations(study, reader_of[study.clip.name], wanted)]:
+            tasks += [*beside, _table(steps.DECIMATED, "tabulate_decimated", bodies, [*of_bodies, *beside])]
     if wanted.count_keys:
         counts = [_count(study, reader_of[study.clip.name], wanted) for study in studies]
         tasks += [*counts, _table(steps.KEYS_NEEDED, "tabulate_keys", studies, [*measures, *counts])]
@@ -234,35 +280,62 @@ def without_films(tasks: Iterable[Task]) -> list[Task]:
 def _measures(study: Study, reader: str, wanted: Wanted) -> Iterator[Task]:
     clip = study.clip.name
     for choice in study.choices:
-        folder = steps.folder_of(clip, choice)
-        tables = [f"{folder}/{name}" for name in table_names(choice, wanted.modes)]
-        adaptive = 1.0 if choice.decimation == "uniform" else 50.0
+        uniform = choice.decimation == "uniform"
+        arguments = {"clip": asdict(study.clip), "choice": choice_parts(choice)}
+        outputs = (*steps.result_of(clip, choice), steps.keys_of(clip, choice))
+        if study.joints:
+            modes = single_modes(wanted.modes)
+            tables = body_table_names(choice, modes)
+            outputs += (steps.joints_of(clip, choice), steps.body_of(clip, choice))
+            arguments |= {"modes": modes, "radii": asdict(wanted.radii), "shared": wanted.shared}
+            weight = 0.1 + 5e-6 * study.samples * study.joints * len(modes) * (1.0 if uniform else 40.0)
+        else:
+            tables = table_names(choice, wanted.modes)
+            arguments |= {"modes": wanted.modes, "radius": wanted.radii.rigid}
+            weight = 0.02 + 8e-6 * study.samples * len(wanted.modes) * (1.0 if uniform else 50.0)
         yield Task(
             name=steps.measuring(clip, choice),
-            function=f"{MODULE}:measure",
-            arguments={
-                "clip": asdict(study.clip),
-                "choice": choice_parts(choice),
-                "modes": wanted.modes,
-                "radius": wanted.radius,
-            },
-            outputs=(*tables, *steps.result_of(clip, choice), steps.keys_of(clip, choice)),
+            function=f"{MODULE}:measure_body" if study.joints else f"{MODULE}:measure",
+            arguments=arguments,
+            outputs=(*(f"{steps.folder_of(clip, choice)}/{name}" for name in tables), *outputs),
             after=(reader,),
             title=f"{clip} {choice.phrase}",
-            weight=0.02 + 8e-6 * study.samples * len(wanted.modes) * adaptive,
+            weight=weight,
+        )
+
+
+def _decimations(study: Study, reader: str, wanted: Wanted) -> Iterator[Task]:
+    clip = study.clip.name
+    for choice in study.decimated:
+        arguments = {"clip": asdict(study.clip), "choice": choice_parts(choice)}
+        yield Task(
+            name=steps.decimating(clip, choice),
+            function=f"{MODULE}:decimate_body",
+            arguments=arguments | {"radii": asdict(wanted.radii), "shared": wanted.shared},
+            outputs=steps.decimated_of(clip, choice),
+            after=(reader, steps.measuring(clip, choice)),
+            title=f"{clip} {choice.phrase}, Decimate",
+            weight=0.5 + 8e-3 * study.samples * study.joints,
         )
 
 
 def _count(study: Study, reader: str, wanted: Wanted) -> Task:
     clip = study.clip.name
+    arguments = {"clip": asdict(study.clip), "modes": wanted.modes}
+    if study.joints:
+        arguments |= {"radii": asdict(wanted.radii)}
+        weight = 0.003 * study.samples * study.joints
+    else:
+        arguments |= {"radius": wanted.radii.rigid, "fit": wanted.fit}
+        weight = (0.03 if wanted.fit else 0.01) * study.samples
     return Task(
         name=steps.counting(clip),
-        function=f"{MODULE}:count_keys",
-        arguments={"clip": asdict(study.clip), "modes": wanted.modes, "radius": wanted.radius, "fit": wanted.fit},
+        function=f"{MODULE}:count_key_poses" if study.joints else f"{MODULE}:count_keys",
+        arguments=arguments,
         outputs=(steps.needed_of(clip),),
         after=(reader,),
         title=f"{clip}, keys needed",
-        weight=(0.03 if wanted.fit else 0.01) * study.samples,
+        weight=weight,
     )
 
 
@@ -288,16 +361,16 @@ def _films(study: Study, wanted: Wanted, stage: StageSettings) -> Iterator[Task]
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
         names = {first: f"render {clip}/{choice.name} from {first}" for first in firsts[:-1]}
         building, title, parts = f"build {clip}/{choice.name}", f"{clip} {choice.phrase}", choice_parts(choice)
+        arguments = {"clip": asdict(study.clip), "choice": parts, "stage": asdict(stage)}
+        if study.joints:
+            arguments |= {"radii": asdict(wanted.radii), "shared": wanted.shared}
+        else:
+            arguments |= {"radius": wanted.radii.rigid}
         yield Task(
             name=building,
-            function=f"{MODULE}:build",
-            arguments={
-                "clip": asdict(study.clip),
-                "choice": parts,
-                "radius": wanted.radius,
-                "stage": asdict(stage),
-            },
-            inputs=(str(place_of_subject(stage.subject)[0]),),
+            function=f"{MODULE}:build_body" if study.joints else f"{MODULE}:build",
+            arguments=arguments,
+            inputs=() if study.joints else (str(place_of_subject(stage.subject)[0]),),
             outputs=(steps.blend_of(clip, choice),),
             after=(steps.measuring(clip, choice),),
             title=title,
@@ -382,6 +455,8 @@ def _shown_of(study: Study, names: Mapping[str, str]) -> list[str]:
     """The tasks whose results a report shows of a clip."""
     clip = study.clip.name
     of_choices = [
-        name for choice in study.choices for name in (steps.measuring(clip, choice), steps.filming(clip, choice))
+        name
+        for choice in study.choices
+        for name in (steps.measuring(clip, choice), steps.decimating(clip, choice), steps.filming(clip, choice))
     ]
     return [names[name] for name in (*of_choices, steps.counting(clip)) if name in names]

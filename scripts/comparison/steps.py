@@ -19,12 +19,14 @@ from .study.storage import ClipReference, file_names, read_clip, read_keys, writ
 if TYPE_CHECKING:
     from .report.clip_section import Films
     from .study.metrics import Metrics
-    from .study.needed import KeysNeeded
+    from .study.needed import KeysNeeded, Ways
     from .study.results import ClipResults
 
 PARTS = ".parts"
 
-METRICS, KEYS_NEEDED, REPORT, FILM = "metrics.csv", "keys_needed.csv", "report.html", "comparison.mp4"
+METRICS, JOINT_METRICS, KEYS_NEEDED = "metrics.csv", "metrics_joints.csv", "keys_needed.csv"
+DECIMATED = "decimated.csv"
+REPORT, FILM = "report.html", "comparison.mp4"
 
 
 # -- where things are, and the tasks that make them -------------------------------------------------------------------
@@ -38,6 +40,11 @@ def measuring(clip: str, choice: Choice) -> str:
 def counting(clip: str) -> str:
     """The task that finds the keys that a clip needs."""
     return f"count keys {clip}"
+
+
+def decimating(clip: str, choice: Choice) -> str:
+    """The task that sets the keys of a body beside those of Blender's Decimate."""
+    return f"decimate {clip}/{choice.name}"
 
 
 def filming(clip: str, choice: Choice) -> str:
@@ -63,6 +70,21 @@ def result_of(clip: str, choice: Choice) -> tuple[str, str]:
 def keys_of(clip: str, choice: Choice) -> str:
     """The file of the keys that the modes kept."""
     return f"{PARTS}/clips/{clip}/{choice.name}.npz"
+
+
+def body_of(clip: str, choice: Choice) -> str:
+    """The file of what the report shows of a whole body."""
+    return f"{PARTS}/clips/{clip}/{choice.name}.body.html"
+
+
+def joints_of(clip: str, choice: Choice) -> str:
+    """The file of the numbers of a body's joints."""
+    return f"{PARTS}/clips/{clip}/{choice.name}.joints.csv"
+
+
+def decimated_of(clip: str, choice: Choice) -> tuple[str, str]:
+    """The files of a body's keys beside Decimate's: the numbers, and what the report shows of them."""
+    return f"{PARTS}/clips/{clip}/{choice.name}.decimated.csv", f"{PARTS}/clips/{clip}/{choice.name}.decimated.html"
 
 
 def needed_of(clip: str) -> str:
@@ -142,14 +164,90 @@ def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: 
 
 
 @step
+def measure_body(
+    job: Job,
+    *,
+    clip: Mapping[str, Any],
+    choice: Sequence[str],
+    modes: Sequence[str],
+    radii: Mapping[str, Any],
+    shared: bool,
+) -> None:
+    """Choose keys of a whole body, let the modes fill them in, and measure what was lost."""
+    from .report.body_charts import body_charts, body_curves
+    from .study.bodies import reconstruct_body
+    from .study.body_metrics import measure_modes, write_joint_metrics, write_key_tables
+    from .study.body_storage import write_body_keys
+    from .study.metrics import body_table_names
+    from .study.radii import Radii
+    from .study.results import Result, write_result
+
+    whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
+    of_joints = Radii(**radii).of(whole.figure.joints)
+    made = reconstruct_body(whole, chosen, modes, of_joints, shared=shared)
+    if made is None:
+        raise TaskError(f"{whole.name}: too short for two keys {chosen.phrase}")
+    measured = measure_modes(made, of_joints)
+    numbers, charts = result_of(whole.name, chosen)
+    tables = body_table_names(chosen, modes)
+    write_key_tables(job.writes(f"{folder_of(whole.name, chosen)}/{tables[0]}").parent, made)
+    write_result(job.writes(numbers), whole, Result.of_body(measured))
+    write_joint_metrics(job.writes(joints_of(whole.name, chosen)), measured.joints)
+    write_text(job.writes(charts), body_curves(measured))
+    write_text(job.writes(body_of(whole.name, chosen)), body_charts(measured))
+    write_body_keys(job.writes(keys_of(whole.name, chosen)), made)
+
+
+@step
+def decimate_body(
+    job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radii: Mapping[str, Any], shared: bool
+) -> None:
+    """See what Blender's Decimate needs to be as good as the keys of a whole body under each mode."""
+    from .decimating import beside_decimate
+    from .report.decimated_table import decimated_table
+    from .study.body_decimated import write_keys_of_bodies
+    from .study.body_storage import read_body_keys
+    from .study.radii import Radii
+    from .study.results import read_numbers
+
+    whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
+    made = read_body_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, shared=shared)
+    _, measured = read_numbers(job.reads(result_of(whole.name, chosen)[0]))
+    try:
+        rows = beside_decimate(made, Radii(**radii).of(whole.figure.joints), measured.rows)
+    except RuntimeError as error:
+        problem = " ".join(str(error).split())
+        raise TaskError(f"{whole.name} {chosen.phrase}: not compared with Blender's Decimate: {problem}") from None
+    numbers, shown = decimated_of(whole.name, chosen)
+    write_keys_of_bodies(job.writes(numbers), rows)
+    write_text(job.writes(shown), decimated_table(f"{whole.name} {chosen.phrase}", rows, measured.groups))
+
+
+@step
 def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radius: float, fit: bool) -> None:
     """Find how many keys every mode needs on a clip."""
+    from .study.needed import OfRigidBody
+
+    whole = read_clip(job.output, ClipReference(**clip))
+    _write_needed(job, whole.name, OfRigidBody(whole, radius, fit=fit), modes)
+
+
+@step
+def count_key_poses(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radii: Mapping[str, Any]) -> None:
+    """Find how many key poses every mode needs on a whole body."""
+    from .study.body_needed import OfBody
+    from .study.radii import Radii
+
+    whole = read_clip(job.output, ClipReference(**clip))
+    _write_needed(job, whole.name, OfBody(whole, Radii(**radii).of(whole.figure.joints)), modes)
+
+
+def _write_needed(job: Job, clip: str, ways: Ways, modes: Sequence[str]) -> None:
     from .study import needed
     from .study.modes import single_modes
 
-    whole = read_clip(job.output, ClipReference(**clip))
-    found = needed.keys_needed(whole, single_modes(modes), radius, fit=fit, advance=_counted(job, needed.RATES))
-    write_text(job.writes(needed_of(whole.name)), needed.to_json(found))
+    found = needed.keys_needed(ways, single_modes(modes), advance=_counted(job, needed.RATES))
+    write_text(job.writes(needed_of(clip)), needed.to_json(found))
 
 
 @step
@@ -166,6 +264,39 @@ def tabulate(job: Job, *, studies: Sequence[Any]) -> None:
             advance()
 
     write_metrics(job.writes(METRICS), rows())
+
+
+@step
+def tabulate_joints(job: Job, *, studies: Sequence[Any]) -> None:
+    """Write the table of the joints of all bodies."""
+    from .study.body_metrics import join_tables, write_joint_metrics
+
+    parts = _parts(job, studies, measuring, joints_of)
+    if parts:
+        join_tables(job.writes(JOINT_METRICS), parts)
+    else:
+        write_joint_metrics(job.writes(JOINT_METRICS), ())
+
+
+@step
+def tabulate_decimated(job: Job, *, studies: Sequence[Any]) -> None:
+    """Write the table of the keys of all bodies beside Decimate's."""
+    from .study.body_decimated import write_keys_of_bodies
+    from .study.body_metrics import join_tables
+
+    parts = _parts(job, studies, decimating, lambda clip, choice: decimated_of(clip, choice)[0])
+    if parts:
+        join_tables(job.writes(DECIMATED), parts)
+    else:
+        write_keys_of_bodies(job.writes(DECIMATED), ())
+
+
+def _parts(
+    job: Job, studies: Sequence[Any], task: Callable[[str, Choice], str], file: Callable[[str, Choice], str]
+) -> list[Path]:
+    """The files of those tasks, one for each clip and choice of keys, that have been done."""
+    whole = [(clip, choice_from(*choice)) for clip, choices in studies for choice in choices]
+    return [job.reads(file(clip, choice)) for clip, choice in whole if task(clip, choice) in job.finished]
 
 
 @step
@@ -194,6 +325,33 @@ def build(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radius: f
         build_stage(made, StageSettings(**{**stage, "resolution": tuple(stage["resolution"])}))
         save_blend(job.writes(blend_of(whole.name, chosen)))
     except (RuntimeError, SubjectError) as error:
+        raise TaskError(f"{whole.name} {chosen.phrase}: no video: {error}") from None
+
+
+@step
+def build_body(
+    job: Job,
+    *,
+    clip: Mapping[str, Any],
+    choice: Sequence[str],
+    radii: Mapping[str, Any],
+    shared: bool,
+    stage: Mapping[str, Any],
+) -> None:
+    """Build the stage of a film of whole bodies, and save it."""
+    from .stage.body_scene import build_body_stage
+    from .stage.film import save_blend
+    from .stage.settings import StageSettings
+    from .study.body_storage import read_body_keys
+    from .study.radii import Radii
+
+    whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
+    made = read_body_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, shared=shared)
+    settings = StageSettings(**{**stage, "resolution": tuple(stage["resolution"])})
+    try:
+        build_body_stage(made, settings, Radii(**radii).of(whole.figure.joints))
+        save_blend(job.writes(blend_of(whole.name, chosen)))
+    except RuntimeError as error:
         raise TaskError(f"{whole.name} {chosen.phrase}: no video: {error}") from None
 
 
@@ -250,7 +408,11 @@ class Clips:
 
         for clip, choices in self._studies:
             read = [
-                read_result(*map(self._job.reads, result_of(clip, choice)))
+                read_result(
+                    *map(self._job.reads, result_of(clip, choice)),
+                    self._job.output / body_of(clip, choice),
+                    self._decimated(clip, choice),
+                )
                 for choice in choices
                 if measuring(clip, choice) in self._job.finished
             ]
@@ -274,6 +436,11 @@ class Clips:
         """The pages of all of them."""
         names = [clip for clip, _ in self._studies]
         return {clip: page_of(clip) if paging(clip) in self._job.finished else None for clip in names}
+
+    def _decimated(self, clip: str, choice: Choice) -> Path | None:
+        if decimating(clip, choice) not in self._job.finished:
+            return None
+        return self._job.reads(decimated_of(clip, choice)[1])
 
     def _needed(self, clip: str) -> KeysNeeded | None:
         from .study import needed

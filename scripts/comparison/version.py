@@ -16,7 +16,8 @@ from scripts.workplan.sources import KEPT, SourceReader
 SOURCES = (
     *("blender_manifest.toml", "addon/motion", "addon/animation"),
     *("scripts/comparison", "scripts/trajectories"),
-    *("scripts/files.py", "scripts/hushing.py", "scripts/rows.py"),
+    *("scripts/axes.py", "scripts/command_line.py", "scripts/decimated_bodies.py", "scripts/figures.py"),
+    *("scripts/files.py", "scripts/graph_decimate.py", "scripts/hushing.py", "scripts/rows.py"),
 )
 """Of this program: see `workplan.code_version`."""
 

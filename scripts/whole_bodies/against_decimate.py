@@ -3,44 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from addon.motion import reduce_skeleton_keys
-from scripts.graph_decimate import decimate
+from scripts.decimated_bodies import FREE, STRAIGHT, TRIALS, Decimations, Left, left_of_fcurves
 
 from .bodies import RADIUS, Body, Keys
 from .rigs import Rig
-
-FREE, STRAIGHT = 6, 2
-"""The numbers of a key with free handles, and of one between straight lines."""
-
-MARGINS = (1e-5, 10.0)
-"""The smallest and the largest error margin of Decimate, in the units of the channels."""
-
-TRIALS = 12
-"""Margins tried, at most."""
-
-NEAR = 0.98
-"""Of the tolerance: an error that is as good as equal to it."""
-
-
-@dataclass(frozen=True)
-class Left:
-    """What is left of the keys of the channels that vary, and the largest error in metres."""
-
-    how: str
-    frames: int
-    """With a key of any joint."""
-
-    keys: int
-    """Poses of joints; with Decimate, keys of F-curves."""
-
-    numbers: int
-    """A pose is a frame, and a value for each channel of the joint that varies; a key of an F-curve is six."""
-
-    largest: float
 
 
 def of_poses(how: str, body: Body, keys: Keys, mode: str) -> Left:
@@ -65,34 +35,19 @@ def of_key_poses(how: str, body: Body, keys: np.ndarray, mode: str) -> Left:
 
 def of_fcurves(how: str, rig: Rig, body: Body, numbers_of_key: int) -> Left:
     """What the F-curves have now; the body is that of the rig as it was imported, of any size."""
-    curves, poses = rig.keys(), rig.poses()
+    poses = rig.poses()
     poses.positions[...] *= body.enlarged
     largest = float(body.errors(body.skeleton.in_root_space(poses)).max())
-    count = sum(map(len, curves.values()))
-    return Left(how, len(set().union(*curves.values())), count, numbers_of_key * count, largest)
+    return left_of_fcurves(how, rig.keys(), largest, numbers_of_key)
 
 
 def decimated(rig: Rig, body: Body, tolerance: float) -> Left:
-    """Of Decimate with one error margin for all F-curves: the largest that keeps the body within the tolerance.
+    """Of Decimate with one error margin for all F-curves: the fewest keys that keep the body within the tolerance."""
 
-    Margins are tried by bisection.
-    """
-    recorded = rig.obj.animation_data.action
-    best, (low, high) = None, np.log(MARGINS)
-    for _ in range(TRIALS):
-        margin = 0.5 * (low + high)
-        rig.obj.animation_data.action = recorded.copy()
-        decimate(rig.obj, mode="ERROR", remove_error_margin=float(np.exp(margin)))
-        tried = of_fcurves("Decimate", rig, body, FREE)
-        if tried.largest <= tolerance:
-            low = margin
-            best = tried if best is None or tried.keys < best.keys else best
-            if tried.largest >= NEAR * tolerance:
-                break
-        else:
-            high = margin
-    rig.obj.animation_data.action = recorded
-    return best or of_fcurves("Decimate", rig, body, FREE)
+    def seen() -> Left:
+        return of_fcurves("Decimate", rig, body, FREE)
+
+    return Decimations(rig.obj, seen, TRIALS).within(tolerance) or seen()
 
 
 def measure(rig: Rig, body: Body, mode: str, tolerance: float) -> list[Left]:

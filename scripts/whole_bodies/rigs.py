@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import bpy
@@ -16,6 +15,7 @@ from addon.motion import Poses
 from addon.motion.eulers import quaternions_from_extrinsic_eulers
 from addon.motion.poses import placed
 from addon.motion.quaternions import align_signs, normalise
+from scripts.decimated_bodies import Curve, key_frames_of, values_of, varying
 from scripts.hushing import hushed
 
 from .bodies import Body
@@ -25,13 +25,7 @@ IMPORTERS = {".bvh", ".fbx"}
 MOST_FRAMES = 1200
 """Longer recordings are cut off."""
 
-VARIES = 1e-4
-"""A channel that never changes by more is one that does not vary: importers calculate in single precision."""
-
 CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3}
-
-Curve = tuple[str, int]
-"""A data path and an index."""
 
 
 class UnusableRigError(ValueError):
@@ -67,7 +61,7 @@ class Rig:
 
     def __init__(self, name: str, obj: bpy.types.Object, frames: np.ndarray) -> None:
         self.name, self.obj, self.frames = name, obj, frames
-        self.varying = {curve for curve, values in self._values().items() if np.ptp(values) > VARIES}
+        self.varying = varying(values_of(obj, frames))
         """The F-curves that change, and count."""
         if any(path.endswith("scale") for path, _ in self.varying):
             raise UnusableRigError(f"{name}: its joints grow or shrink, which is not measured here")
@@ -92,7 +86,7 @@ class Rig:
 
     def poses(self) -> Poses:
         """What the F-curves show now, shape (joints, n), each joint in its parent's space."""
-        values, of_size = self._values(), float(np.mean(self.obj.scale))
+        values, of_size = values_of(self.obj, self.frames), float(np.mean(self.obj.scale))
         rows = [placed(joint.rest, self._local(joint, values)) for joint in self.joints]
         positions = np.stack([row.positions for row in rows])
         in_bones = np.array([isinstance(joint.carrier, bpy.types.PoseBone) for joint in self.joints])
@@ -101,25 +95,7 @@ class Rig:
 
     def keys(self) -> dict[Curve, list[float]]:
         """The frames of the keys of all F-curves that vary in the recording."""
-        return {
-            curve: [key.co.x for key in fcurve.keyframe_points]
-            for curve, fcurve in self._fcurves.items()
-            if curve in self.varying
-        }
-
-    @property
-    def _fcurves(self) -> dict[Curve, bpy.types.FCurve]:
-        return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in animation.channelbag_of(self.obj).fcurves}
-
-    @cached_property
-    def _frame_list(self) -> list[float]:
-        return self.frames.tolist()
-
-    def _values(self) -> dict[Curve, np.ndarray]:
-        return {
-            curve: np.array([fcurve.evaluate(frame) for frame in self._frame_list])
-            for curve, fcurve in self._fcurves.items()
-        }
+        return key_frames_of(self.obj, self.varying)
 
     def _local(self, joint: _Joint, values: dict[Curve, np.ndarray]) -> Poses:
         """What a joint's channels say, shape (n,)."""

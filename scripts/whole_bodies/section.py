@@ -9,10 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from addon.motion import Poses
+from scripts.decimated_bodies import VARIES
 
 from . import against_decimate, against_greedy, against_published, feet, timing
 from .bodies import RADIUS, Body, repeated
-from .rigs import MOST_FRAMES, VARIES, UnusableRigError, import_rig
+from .rigs import MOST_FRAMES, UnusableRigError, import_rig
 
 TOLERANCE = 0.01
 """Metres, of every joint's ball."""

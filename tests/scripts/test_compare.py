@@ -33,7 +33,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,rms_shell_m,p95_shell_m,max_shell_m,"
-    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m,keys_per_s"
+    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m,keys_per_s,"
+    "joints,key_frames,worst_joint,foot_slide_m,recorded_slide_m"
 )
 SMALL = ["--resolution", "160x90", "--fps", "6"]
 
@@ -439,7 +440,7 @@ def test_the_same_amount_written_in_two_ways_is_one_choice(arguments, folders):
 
 def test_the_help_names_every_mode_there_is(capsys):
     assert exit_code("--help") == 0
-    said = " ".join(capsys.readouterr().out.split("--output")[1].split())
+    said = " ".join(capsys.readouterr().out.partition("--modes MODE")[2].partition("--output")[0].split())
     assert [mode for mode in (*MODES, "all", "best_of") if mode not in said] == []
 
 

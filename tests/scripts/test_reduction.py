@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from addon import animation
 from addon.motion import shell_error
 from scripts import reduction
 from scripts.trajectories import TrajectoryError
+from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
 
 TOLERANCE, RADIUS = 0.005, 0.1
 
@@ -54,6 +57,14 @@ def test_decimated_curves_are_measured_in_the_scene(live, clip):
 def test_an_imported_recording_shows_its_poses(live, clip):
     obj = reduction.import_recording(clip, "XYZ")
     assert shell_error(animation.read_poses(obj, clip.frames), clip.poses, RADIUS).max() < 1e-6
+
+
+def test_of_a_skeleton_the_root_is_read(tmp_path):
+    path = tmp_path / "walk.bvh"
+    path.write_text(seed("ZXY", 60), encoding="utf-8")
+    whole, root = (reduction.read(source, 30.0) for source in (path, Path(f"{path}:Hips")))
+    assert np.array_equal(whole.poses.positions, root.poses.positions)
+    assert shell_error(whole.poses, root.poses, RADIUS).max() < 1e-9
 
 
 def test_the_page_names_what_was_measured(live, clip, monkeypatch, tmp_path):

@@ -16,12 +16,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from addon.motion import decimate, reduce_keys
+from addon.motion import decimate, reduce_keys, reduce_skeleton_keys
 
 from .clips import Clip
 
 MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
 """Units of a tolerance, and how many millimetres they have."""
+
+Radius = float | np.ndarray
+"""Of the ball at every joint, in metres: one for all, or shape (joints,)."""
 
 METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
 """Units of a tolerance, and their lengths."""
@@ -55,6 +58,13 @@ class Choice(ABC):
         """The samples of the clip that are kept under a mode, rising, shape (k,).
 
         The radius of the shell is in metres. Fewer than two keys where the clip is too short.
+        """
+
+    @abstractmethod
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        """The samples that are kept of each joint of a clip with a figure, the same for all where they are `shared`.
+
+        The radius is that of the balls at the joints in metres, one or shape (joints,).
         """
 
     @property
@@ -112,6 +122,9 @@ class Uniform(Choice):
     def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
         return decimate(clip.times, float(self.written))
 
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        return (decimate(clip.times, float(self.written)),) * clip.poses.shape[0]
+
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
         keys = decimate(times, float(self.written))
         return (int(keys[0]), int(keys[-1])) if len(keys) > 1 else None
@@ -128,6 +141,10 @@ class Budget(Choice):
         if count < 2:
             return np.array([0])
         return _reduced(clip, mode, radius, budget=min(count, len(clip.times)), rms=True)
+
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        poses = min(self._count(clip.times), len(clip.times))
+        return _reduced_body(clip, mode, radius, shared, budget=poses * (1 if shared else clip.poses.shape[0]))
 
     def ends(self, times: np.ndarray) -> tuple[int, int] | None:
         return (0, len(times) - 1) if self._count(times) > 1 else None
@@ -153,6 +170,9 @@ class Tolerance(Choice):
 
     def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
         return _reduced(clip, mode, radius, tolerance=self.tolerance(clip) / clip.metres_per_unit)
+
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        return _reduced_body(clip, mode, radius, shared, tolerance=self.tolerance(clip) / clip.metres_per_unit)
 
     def ends(self, times: np.ndarray) -> tuple[int, int]:
         return 0, len(times) - 1
@@ -205,6 +225,18 @@ class Tolerance(Choice):
 
 def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np.ndarray:
     return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)
+
+
+def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: float) -> tuple[np.ndarray, ...]:
+    return reduce_skeleton_keys(
+        clip.times,
+        clip.poses,
+        clip.figure.parents,
+        mode,
+        radius=radius / clip.metres_per_unit,
+        shared=shared,
+        **wanted,
+    )
 
 
 KINDS: dict[str, type[Choice]] = {kind.__name__.lower(): kind for kind in (Uniform, Budget, Tolerance)}

@@ -1,7 +1,7 @@
-"""Clips: what a comparison is about, the motion of one body in one recording.
+"""Clips: what a comparison is about, the motion of one rigid body, or of a whole figure of joints, in one recording.
 
 Times are seconds and poses are in the recording's own axes and units, repaired. Errors are in metres and do not depend
-on the axes; only what Blender shows is converted (`scripts.trajectories.axes`).
+on the axes; only what Blender shows is converted (`scripts.axes`).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from addon.motion import Poses
+from scripts.figures import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +25,13 @@ class Clip:
     """What the user gave: the file, and the body where one was named."""
 
     axes: str
-    """The convention of the recording: a name in `scripts.trajectories.axes.AXES`."""
+    """The convention of the recording: a name in `scripts.axes.AXES`."""
 
     times: np.ndarray
     """Seconds, strictly rising, shape (n,)."""
 
     poses: Poses
-    """Shape (n,), signs aligned."""
+    """Shape (n,), signs aligned. Of a figure shape (joints, n), each joint's in its parent's space."""
 
     repairs: tuple[str, ...]
     """What is hard to believe of the recording, and what had to be repaired in it, a sentence each."""
@@ -40,6 +41,9 @@ class Clip:
 
     body: str = ""
     """The body that the user asked for by name. It becomes part of the clip's where another clip has the same."""
+
+    figure: Figure | None = None
+    """What a whole body is made of; None for a single rigid body."""
 
     def in_metres(self, poses: Poses) -> Poses:
         """Poses of this clip with positions in metres."""

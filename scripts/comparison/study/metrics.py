@@ -6,7 +6,7 @@ reads back exactly what was computed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,7 +69,22 @@ class Metrics:
     """The largest shell error that was allowed; empty in the table where a rate decides."""
 
     keys_per_s: float
-    """On average, the first key not counted."""
+    """On average, the first key not counted; of a whole body, for each joint."""
+
+    joints: int | None = None
+    """How many a whole body has; this and the following are empty for a single rigid body."""
+
+    key_frames: int | None = None
+    """Samples that are a key of any joint: key poses, where joints share them."""
+
+    worst_joint: str | None = None
+    """The one that `max_shell_m` is of."""
+
+    foot_slide_m: float | None = None
+    """The farthest that a joint which stands on the ground in the recording gets from where it began to stand."""
+
+    recorded_slide_m: float | None = None
+    """The same in the recording itself."""
 
 
 def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
@@ -151,15 +166,22 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str
         header += ",s"
     with replacing(path) as stream:
         stream.write(f"{header},mode\n" if modes else f"{header}\n")
-        # Numbers take many times their memory as text, and a recording may have hours of them.
-        for first in range(0, len(times), BLOCK):
-            rows = np.stack([column[first : first + BLOCK] for column in columns], axis=-1).tolist()
-            lines = [",".join(map(repr, row)) for row in rows]
+        for first, lines in lines_of_poses(columns):
             if modes:
                 lines = [
                     f"{line},{mode}" for line, mode in zip(lines, (*modes, "")[first : first + BLOCK], strict=True)
                 ]
             stream.write("\n".join([*lines, ""]))
+
+
+def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
+
+    Numbers take many times their memory as text, and a recording may have hours of them.
+    """
+    for first in range(0, len(columns[0]), BLOCK):
+        rows = np.stack([column[first : first + BLOCK] for column in columns], axis=-1).tolist()
+        yield first, [",".join(map(repr, row)) for row in rows]
 
 
 def table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
@@ -169,6 +191,11 @@ def table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
     if choice.decimation == "uniform":
         keys = {"keys.csv": ""} | ({f"{BEST_OF}.keys.csv": BEST_OF} if BEST_OF in modes else {})
     return [*(f"{mode}.csv" for mode in modes), *keys]
+
+
+def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
+    """The files of the keys of a whole body: one for all modes where they have the same."""
+    return ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
 
 
 def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:

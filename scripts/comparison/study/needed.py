@@ -12,6 +12,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from scripts.rows import write_rows
 from .clips import Clip
 from .metrics import NOTHING, geometric_mean
 from .modes import REFERENCE
-from .reconstructions import same_motions
+from .reconstructions import Groups, same_motions
 
 RATES = ("30", "20", "15", "12", "8", "5")
 """Keys a second of the reference that others are to be as good as."""
@@ -101,19 +102,35 @@ class KeysNeeded:
         return (self.keys - 1.0) / self.durations
 
 
-def keys_needed(
-    clip: Clip, modes: Iterable[str], radius: float, *, fit: bool = False, advance: Callable[[], object] = lambda: None
-) -> KeysNeeded:
+class Ways(Protocol):
+    """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres."""
+
+    clip: Clip
+
+    decimations: tuple[str, ...]
+    """Those of `DECIMATIONS` that are tried."""
+
+    def groups(self, modes: tuple[str, ...]) -> Groups:
+        """The modes, those together that are one motion on the clip."""
+
+    def between(self, first: int, last: int) -> Ways:
+        """The same for the part of the clip from one sample to another."""
+
+    def error(self, keys: np.ndarray, mode: str) -> float:
+        """Of a mode that has these samples for keys."""
+
+    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
+        """The keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
+
+
+def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], object] = lambda: None) -> KeysNeeded:
     """Find the keys that each mode needs on a clip.
 
     Parameters
     ----------
-    clip : Clip
+    ways : Ways
+        The clip, and what can be done with it.
     modes : iterable of str
-    radius : float
-        Of the shell, in metres.
-    fit : bool
-        Whether to find fitted keys too, which takes two to three times as long.
     advance : callable
         Called once for each of `RATES`.
 
@@ -122,36 +139,27 @@ def keys_needed(
     The adaptive keys begin and end where the reference's do. Evenly spaced ones are searched for by bisection, as if
     the error fell with every key: the result is as good as the reference, one key fewer is not.
     """
-    groups = same_motions(clip, tuple(modes), radius)
-    shape = len(groups), len(DECIMATIONS) if fit else 2, len(RATES)
+    clip, groups = ways.clip, ways.groups(tuple(modes))
+    shape = len(groups), len(ways.decimations), len(RATES)
     keys, reached = np.full(shape, np.nan), np.full(shape, np.nan)
     durations, reference_keys, targets = np.full((3, len(RATES)), np.nan)
     errors = np.full((len(groups), len(RATES)), np.nan)
     for place, rate in enumerate(RATES):
         kept = decimate(clip.times, float(rate))
-        stretch = _between(clip, kept)
-        kept = kept - kept[0]
+        stretch = ways.between(int(kept[0]), int(kept[-1]))
+        times, kept = stretch.clip.times, kept - kept[0]
         if len(kept) >= 2:
-            durations[place] = stretch.times[-1] - stretch.times[0]
+            durations[place] = times[-1] - times[0]
             reference_keys[place] = len(kept)
-            targets[place] = rms_error(stretch, kept, REFERENCE, radius)
-            errors[:, place] = [rms_error(stretch, kept, group[0], radius) for group in groups]
+            targets[place] = stretch.error(kept, REFERENCE)
+            errors[:, place] = [stretch.error(kept, group[0]) for group in groups]
         if targets[place] > NOTHING:
             for row, group in enumerate(groups):
-                evenly = kept if REFERENCE in group else _fewest_evenly(stretch, group[0], targets[place], radius, kept)
-                by_motion = reduce_keys(
-                    stretch.times,
-                    stretch.poses,
-                    group[0],
-                    targets[place] / clip.metres_per_unit,
-                    radius / clip.metres_per_unit,
-                    rms=True,
-                )
-                ways = [(found, rms_error(stretch, found, group[0], radius)) for found in (evenly, by_motion)]
-                if fit:
-                    ways.append(_fewest_fitted(stretch, group[0], targets[place], radius, *ways[1]))
-                for column, (found, error) in enumerate(ways):
-                    keys[row, column, place] = np.inf if len(found) == len(stretch.times) else len(found)
+                evenly = kept if REFERENCE in group else _fewest_evenly(stretch, group[0], targets[place], kept)
+                found = [(evenly, stretch.error(evenly, group[0]))]
+                found += stretch.by_motion(group[0], targets[place], len(evenly))
+                for column, (own, error) in enumerate(found):
+                    keys[row, column, place] = np.inf if len(own) == len(times) else len(own)
                     reached[row, column, place] = error
         advance()
     return KeysNeeded(clip.name, groups, RATES, durations, reference_keys, targets, keys, reached, errors)
@@ -162,20 +170,14 @@ def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:
     return decimate(clip.times, segments / float(clip.times[-1] - clip.times[0]))
 
 
-def rms_error(clip: Clip, keys: np.ndarray, mode: str, radius: float, poses: Poses | None = None) -> float:
-    """The RMS shell error of a mode over all samples of a clip, in metres. The keys have these poses, or their own."""
-    filled = interpolate(clip.times[keys], clip.poses[keys] if poses is None else poses, clip.times, mode)
-    return rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), radius))
-
-
-def _fewest_evenly(clip: Clip, mode: str, target: float, radius: float, start: np.ndarray) -> np.ndarray:
+def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> np.ndarray:
     """The fewest evenly spaced keys with which a mode is within the target, searched from as many as `start`."""
 
     def good(segments: int) -> bool:
-        return rms_error(clip, evenly_spaced(clip, segments), mode, radius) <= target
+        return ways.error(evenly_spaced(ways.clip, segments), mode) <= target
 
     # Twice the samples are ticks enough for every sample to be a key, which is always good.
-    most = 2 * len(clip.times)
+    most = 2 * len(ways.clip.times)
     enough = len(start) - 1
     too_few = 0
     while enough < most and not good(enough):
@@ -186,34 +188,71 @@ def _fewest_evenly(clip: Clip, mode: str, target: float, radius: float, start: n
             enough = middle
         else:
             too_few = middle
-    return evenly_spaced(clip, enough)
+    return evenly_spaced(ways.clip, enough)
 
 
-def _fewest_fitted(
-    clip: Clip, mode: str, target: float, radius: float, adaptive: np.ndarray, reached: float
-) -> tuple[np.ndarray, float]:
-    """The fewest keys, and their error, that are within the target when fitted.
-
-    They are searched from the adaptive ones on, which have reached this error without.
-    """
-    best, keys, aim, scale = adaptive, adaptive, target, clip.metres_per_unit
-    for number in range(TRIES):
-        if number:
-            keys = reduce_keys(clip.times, clip.poses, mode, aim / scale, radius / scale, rms=True)
-        fitted = fit_keys(clip.times, clip.poses, keys, mode, radius / scale)
-        error = rms_error(clip, keys, mode, radius, fitted)
-        if error <= target and len(keys) <= len(best):
-            best, reached = keys, error
-        if error <= NOTHING:
-            break
-        aim *= target / error
-    return best, reached
+def part_of(clip: Clip, first: int, last: int) -> Clip:
+    """A clip from one sample to another."""
+    part = slice(first, last + 1)
+    return replace(clip, times=clip.times[part], poses=clip.poses[..., part])
 
 
-def _between(clip: Clip, keys: np.ndarray) -> Clip:
-    """The part of a clip from the first key to the last."""
-    part = slice(int(keys[0]), int(keys[-1]) + 1)
-    return replace(clip, times=clip.times[part], poses=clip.poses[part])
+@dataclass(frozen=True)
+class OfRigidBody:
+    """Keys of a single rigid body: where the motion needs them, and moved to where they fit best."""
+
+    clip: Clip
+
+    radius: float
+    """Of the shell, in metres."""
+
+    fit: bool = False
+    """Whether to find fitted keys too, which takes two to three times as long."""
+
+    @property
+    def decimations(self) -> tuple[str, ...]:
+        return DECIMATIONS if self.fit else DECIMATIONS[:2]
+
+    def groups(self, modes: tuple[str, ...]) -> Groups:
+        return same_motions(self.clip, modes, self.radius)
+
+    def between(self, first: int, last: int) -> OfRigidBody:
+        return replace(self, clip=part_of(self.clip, first, last))
+
+    def error(self, keys: np.ndarray, mode: str, poses: Poses | None = None) -> float:
+        """Where the keys have other poses than their own, these."""
+        clip = self.clip
+        filled = interpolate(clip.times[keys], clip.poses[keys] if poses is None else poses, clip.times, mode)
+        return rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
+
+    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
+        adaptive = self._reduced(mode, target)
+        found = [(adaptive, self.error(adaptive, mode))]
+        return [*found, self._fewest_fitted(mode, target, *found[0])] if self.fit else found
+
+    def _reduced(self, mode: str, target: float) -> np.ndarray:
+        clip, scale = self.clip, self.clip.metres_per_unit
+        return reduce_keys(clip.times, clip.poses, mode, target / scale, self.radius / scale, rms=True)
+
+    def _fewest_fitted(
+        self, mode: str, target: float, adaptive: np.ndarray, reached: float
+    ) -> tuple[np.ndarray, float]:
+        """The fewest keys, and their error, that are within the target when fitted.
+
+        They are searched from the adaptive ones on, which have reached this error without.
+        """
+        clip, best, keys, aim = self.clip, adaptive, adaptive, target
+        for number in range(TRIES):
+            if number:
+                keys = self._reduced(mode, aim)
+            fitted = fit_keys(clip.times, clip.poses, keys, mode, self.radius / clip.metres_per_unit)
+            error = self.error(keys, mode, fitted)
+            if error <= target and len(keys) <= len(best):
+                best, reached = keys, error
+            if error <= NOTHING:
+                break
+            aim *= target / error
+        return best, reached
 
 
 def to_json(found: KeysNeeded) -> str:

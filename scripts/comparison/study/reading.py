@@ -9,6 +9,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from addon.motion import repair
+from scripts.command_line import printable
+from scripts.figures import repaired
 from scripts.trajectories import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
 from scripts.trajectories.options import AS_THE_FILE_SAYS
 from scripts.trajectories.recordings import shown
@@ -21,7 +23,9 @@ LONGEST_NAME = 80
 MOST_BYTES = 240
 """Of a clip's name in UTF-8, in which some characters have four: file systems allow 255."""
 
-NOT_FOLDERS = {"metrics.csv", "keys_needed.csv", "report.html", "manifest.json"}
+NOT_FOLDERS = {
+    *("metrics.csv", "metrics_joints.csv", "decimated.csv", "keys_needed.csv", "report.html", "manifest.json"),
+}
 """Names that the output needs itself."""
 
 DEVICES = {"con", "prn", "aux", "nul"} | {
@@ -31,7 +35,7 @@ DEVICES = {"con", "prn", "aux", "nul"} | {
 
 
 def read_clips(
-    sources: Iterable[str], axes: str, options: ReadingOptions = AS_THE_FILE_SAYS
+    sources: Iterable[str], axes: str | None, options: ReadingOptions = AS_THE_FILE_SAYS
 ) -> tuple[list[Clip], list[str]]:
     """Read, repair and name the clips of all sources.
 
@@ -39,8 +43,8 @@ def read_clips(
     ----------
     sources : iterable of str
         As `scripts.trajectories.read_trajectories` takes them.
-    axes : str
-        A name in `scripts.trajectories.axes.AXES`.
+    axes : str or None
+        A name in `scripts.axes.AXES`; None for those of each format.
     options : ReadingOptions
         What the files do not say of themselves.
 
@@ -63,7 +67,7 @@ def read_clips(
     ]
 
 
-def read_source(source: str, axes: str, options: ReadingOptions = AS_THE_FILE_SAYS) -> tuple[list[Clip], str]:
+def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_FILE_SAYS) -> tuple[list[Clip], str]:
     """The clips of one source, repaired but not yet told apart by their names, and a note on it, which may be empty.
 
     Of several bodies those are left out, with a note, that there are no two poses of. Raises TrajectoryError where the
@@ -75,7 +79,8 @@ def read_source(source: str, axes: str, options: ReadingOptions = AS_THE_FILE_SA
     for trajectory in recording.trajectories:
         name = f"{stem}-{trajectory.name}" if several else stem
         try:
-            clips.append(replace(make_clip(trajectory, source, name, axes), body=recording.body))
+            clip = make_clip(trajectory, source, name, axes or recording.axes)
+            clips.append(replace(clip, body=recording.body))
         except TrajectoryError as error:
             if not several:
                 raise
@@ -91,8 +96,9 @@ def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip
     if len(times) < 2:
         found = "; ".join(map(str, repairs))
         raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
-    notes = (*trajectory.warnings, *map(str, repairs))
-    return Clip(name, source, axes, times, poses, notes, trajectory.metres_per_unit)
+    figure, drawn = repaired(trajectory.figure) if trajectory.figure else (None, ())
+    notes = (*trajectory.warnings, *map(str, repairs), *map(printable, drawn))
+    return Clip(name, source, axes, times, poses, notes, trajectory.metres_per_unit, figure=figure)
 
 
 def clip_names(wanted: Sequence[tuple[str, str]]) -> list[str]:

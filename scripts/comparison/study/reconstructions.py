@@ -22,6 +22,9 @@ Groups = tuple[tuple[str, ...], ...]
 PROBE = 4
 """Of so many samples one is a key where it is looked which modes are one motion."""
 
+FEWEST_PROBED = 4
+"""Keys that are needed to see which modes are one motion: between two, a spline is a screw like any other."""
+
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
@@ -131,10 +134,15 @@ def fill_in(
 
 
 def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tuple[str, ...], ...]:
-    """The modes in groups that are one motion on this clip, seen with about every `PROBE`th sample as a key."""
+    """The modes in groups that are one motion on this clip, seen with about every `PROBE`th sample as a key.
+
+    Each is on its own where there are too few samples to see it.
+    """
     rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
     probe = reconstruct(clip, Uniform(f"{max(rate, 1e-6):.6f}"), modes, radius)
-    return identical_modes([probe]) if probe else tuple((mode,) for mode in modes)
+    if probe is None or len(probe.keys[modes[0]]) < FEWEST_PROBED:
+        return tuple((mode,) for mode in modes)
+    return identical_modes([probe])
 
 
 def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:

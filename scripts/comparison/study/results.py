@@ -8,10 +8,10 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from scripts.files import write_text
 
@@ -21,6 +21,9 @@ from .metrics import Metrics, measure_reconstruction
 from .modes import BEST_OF
 from .needed import KeysNeeded
 from .reconstructions import Groups, Reconstruction, identical_modes
+
+if TYPE_CHECKING:
+    from .body_metrics import MeasuredBody
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,14 @@ class ClipFacts:
 
     repairs: tuple[str, ...]
 
+    joints: int = 0
+    """Of a whole body; 0 for a single rigid one."""
+
     @classmethod
     def of(cls, clip: Clip) -> ClipFacts:
         duration = float(clip.times[-1] - clip.times[0])
-        return cls(clip.name, clip.source, clip.axes, len(clip.times), duration, clip.repairs)
+        joints = len(clip.figure.joints) if clip.figure else 0
+        return cls(clip.name, clip.source, clip.axes, len(clip.times), duration, clip.repairs, joints)
 
 
 @dataclass(frozen=True)
@@ -80,6 +87,12 @@ class Result:
     charts: Callable[[], str]
     """The errors over time, as the report has them: markup."""
 
+    body: Callable[[], str] = str
+    """What the report shows of a whole body: markup; nothing of a single rigid one."""
+
+    decimated: Callable[[], str] = str
+    """Its keys beside those of Blender's Decimate: markup; nothing where that was not looked for."""
+
     @classmethod
     def of(cls, reconstruction: Reconstruction, charts: Callable[[], str] = str) -> Result:
         return cls(
@@ -89,6 +102,10 @@ class Result:
             SegmentModes.of(reconstruction),
             charts,
         )
+
+    @classmethod
+    def of_body(cls, measured: MeasuredBody, charts: Callable[[], str] = str) -> Result:
+        return cls(measured.made.choice, measured.rows, measured.groups, None, charts)
 
     @property
     def clip(self) -> str:
@@ -118,8 +135,23 @@ def write_result(path: Path, clip: Clip, result: Result) -> None:
     write_text(path, json.dumps(content, indent=1) + "\n")
 
 
-def read_result(path: Path, charts: Path) -> tuple[ClipFacts, Result]:
-    """What `write_result` wrote, with charts from a file that is read when they are wanted."""
+def read_result(path: Path, charts: Path, body: Path, decimated: Path | None = None) -> tuple[ClipFacts, Result]:
+    """What `write_result` wrote, with markup from files that are read when it is wanted."""
+    facts, result = read_numbers(path)
+
+    def markup_of(file: Path | None) -> Callable[[], str]:
+        return (lambda: file.read_text(encoding="utf-8")) if file else str
+
+    return facts, replace(
+        result,
+        charts=markup_of(charts),
+        body=markup_of(body if facts.joints else None),
+        decimated=markup_of(decimated),
+    )
+
+
+def read_numbers(path: Path) -> tuple[ClipFacts, Result]:
+    """What `write_result` wrote, without any markup."""
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     facts = ClipFacts(**{**content["clip"], "repairs": tuple(content["clip"]["repairs"])})
     return facts, Result(
@@ -127,5 +159,5 @@ def read_result(path: Path, charts: Path) -> tuple[ClipFacts, Result]:
         tuple(Metrics(**row) for row in content["rows"]),
         tuple(map(tuple, content["groups"])),
         SegmentModes(**content["segment_modes"]) if content["segment_modes"] else None,
-        lambda: charts.read_text(encoding="utf-8"),
+        str,
     )

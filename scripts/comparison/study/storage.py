@@ -6,13 +6,14 @@ A recording is one source, which may hold several bodies. What is read back is e
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from addon.motion import Poses
+from scripts.figures import Figure, Skin
 from scripts.files import write_text, written_beside
 
 from .choices import Choice
@@ -52,6 +53,9 @@ class StoredRecording:
     repairs: tuple[tuple[str, ...], ...]
     """Of each clip."""
 
+    joints: tuple[tuple[str, ...], ...]
+    """Of each clip their names; none for a single rigid body."""
+
 
 def file_names(recording: str) -> tuple[str, str]:
     """The files of a recording."""
@@ -66,21 +70,43 @@ def write_recording(arrays: Path, facts: Path, clips: Sequence[Clip], note: str)
         content |= {f"{body}.quaternions": clip.poses.quaternions}
         if clip.poses.scales is not None:
             content[f"{body}.scales"] = clip.poses.scales
+        if clip.figure is not None:
+            content |= {f"{body}.figure.{name}": array for name, array in _arrays_of(clip.figure).items()}
     with written_beside(arrays) as beside:
         np.savez(beside, **content)
     listed = [
         {"name": clip.name, "source": clip.source, "axes": clip.axes, "repairs": clip.repairs}
         | {"metres_per_unit": clip.metres_per_unit, "body": clip.body}
+        | {"joints": list(clip.figure.joints) if clip.figure else []}
         for clip in clips
     ]
     write_text(facts, json.dumps({"note": note, "clips": listed}, indent=1) + "\n")
+
+
+def _arrays_of(figure: Figure) -> dict[str, np.ndarray]:
+    arrays = {"parents": figure.parents, "rest positions": figure.rest.positions, "tails": figure.tails}
+    arrays |= {"rest quaternions": figure.rest.quaternions}
+    return arrays | ({f"skin {name}": array for name, array in vars(figure.skin).items()} if figure.skin else {})
+
+
+def _figure_of(joints: Sequence[str], arrays: Mapping[str, np.ndarray]) -> Figure:
+    """The figure of `_arrays_of`."""
+    skin = {name.removeprefix("skin "): array for name, array in arrays.items() if name.startswith("skin ")}
+    return Figure(
+        tuple(joints),
+        arrays["parents"],
+        Poses(arrays["rest positions"], arrays["rest quaternions"]),
+        arrays["tails"],
+        Skin(**skin) if skin else None,
+    )
 
 
 def read_facts(output: Path, recording: str) -> StoredRecording:
     """What there is to say about a recording."""
     content = json.loads((output / file_names(recording)[1]).read_text(encoding="utf-8"))
     names, bodies, repairs = ([clip[key] for clip in content["clips"]] for key in ("name", "body", "repairs"))
-    return StoredRecording(content["note"], tuple(names), tuple(bodies), tuple(map(tuple, repairs)))
+    joints = tuple(tuple(clip["joints"]) for clip in content["clips"])
+    return StoredRecording(content["note"], tuple(names), tuple(bodies), tuple(map(tuple, repairs)), joints)
 
 
 def read_times(output: Path, reference: ClipReference) -> np.ndarray:
@@ -98,6 +124,8 @@ def read_clip(output: Path, reference: ClipReference) -> Clip:
             arrays[name] if (name := f"{reference.body}.{kind}") in arrays else None
             for kind in ("times", "positions", "quaternions", "scales")
         )
+        start = f"{reference.body}.figure."
+        of_figure = {name.removeprefix(start): arrays[name] for name in arrays.files if name.startswith(start)}
     return Clip(
         reference.name,
         facts["source"],
@@ -107,6 +135,7 @@ def read_clip(output: Path, reference: ClipReference) -> Clip:
         tuple(facts["repairs"]),
         facts["metres_per_unit"],
         facts["body"],
+        _figure_of(facts["joints"], of_figure) if of_figure else None,
     )
 
 

@@ -11,11 +11,21 @@ from hypothesis import strategies as st
 
 from addon.motion import MODES
 from scripts.comparison import steps
-from scripts.comparison.planning import PIECE, Study, Wanted, comparison_tasks, look_into, reading_tasks, without_films
+from scripts.comparison.planning import (
+    MOST_POSES,
+    PIECE,
+    Study,
+    Wanted,
+    comparison_tasks,
+    look_into,
+    reading_tasks,
+    without_films,
+)
 from scripts.comparison.report.pages import ON_ONE_PAGE, Settings
 from scripts.comparison.stage.settings import StageSettings
 from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts, fewest_keys
 from scripts.comparison.study.clips import Clip
+from scripts.comparison.study.radii import Radii
 from scripts.comparison.study.reading import folder_names
 from scripts.comparison.study.reconstructions import reconstruct
 from scripts.comparison.study.storage import ClipReference, file_names, write_recording
@@ -27,7 +37,7 @@ from tests.thoroughness import tried
 WANTED = Wanted(
     choices=(Uniform("5"), Tolerance("5mm")),
     modes=("lerp_slerp", "dq_sclerp"),
-    radius=0.1,
+    radii=Radii(),
     settings=Settings(radius=0.1, program="Rigid Motion", blender="5", command="compare.py"),
     stage=StageSettings(),
     every_film=True,
@@ -94,6 +104,15 @@ def test_a_film_that_nobody_can_watch_is_left_out_and_the_user_told(seconds: flo
     assert not study("reach", reading).left_out(WANTED.stage)
 
 
+@pytest.mark.parametrize(("seconds", "filmed"), [(199.9, True), (200.1, False)])
+def test_a_body_of_many_joints_has_a_shorter_film_at_most(seconds: float, filmed: bool) -> None:
+    body = Study(ClipReference("dance", "", 0), 90, dict.fromkeys(WANTED.choices, (0.0, seconds)), joints=100)
+    stage = WANTED.stage
+    assert bool(body.filmed(WANTED)) == filmed
+    assert bool(body.left_out(stage)) != filmed
+    assert stage.fps * 200 * 100 == MOST_POSES
+
+
 def test_the_numbers_can_be_had_before_the_films() -> None:
     everything, numbers = tasks_of(["reach"]), tasks_of(["reach"], numbers=True)
     assert {name for name in everything if name not in numbers} == {
@@ -121,7 +140,7 @@ def test_another_option_changes_only_what_depends_on_it() -> None:
     assert changed(WANTED) == set()
     assert changed(replace(WANTED, stage=StageSettings(resolution=(640, 360)))) == {"build", "render", "encode"}
     assert changed(replace(WANTED, settings=replace(WANTED.settings, command="other"))) == {"report.html"}
-    assert changed(replace(WANTED, radius=0.2)) == {"measure", "count", "build"}
+    assert changed(replace(WANTED, radii=Radii(0.2))) == {"measure", "count", "build"}
 
 
 def test_a_source_that_is_named_twice_is_read_once_and_gives_two_clips(tmp_path: Path) -> None:

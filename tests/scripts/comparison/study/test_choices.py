@@ -80,7 +80,7 @@ def test_a_reconstruction_keeps_the_keys_of_each_mode_apart_but_those_of_one_mot
         assert made.errors[mode].shell.max() == pytest.approx(shell_errors(clip, keys, mode).max(), rel=1e-9)
 
 
-@pytest.mark.parametrize("samples", [2, 3, 4, 7])
+@pytest.mark.parametrize("samples", [2, 3, 4, 5, 7, 8, 12])
 def test_recordings_of_a_few_samples_have_adaptive_keys_too(samples: int) -> None:
     clip = swinging_clip()
     few = replace(clip, times=clip.times[::20][:samples], poses=clip.poses[::20][:samples])

@@ -19,7 +19,8 @@ from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,"
     "rms_shell_m,p95_shell_m,max_shell_m,rms_position_m,rms_rotation_deg,rms_velocity_m_s,"
-    "decimation,tolerance_m,keys_per_s"
+    "decimation,tolerance_m,keys_per_s,"
+    "joints,key_frames,worst_joint,foot_slide_m,recorded_slide_m"
 )
 
 

@@ -13,6 +13,7 @@ from scripts.comparison.study.needed import (
     RATES,
     TABLE_RATES,
     KeysNeeded,
+    OfRigidBody,
     evenly_spaced,
     keys_needed,
     overall,
@@ -39,7 +40,7 @@ def swing() -> Clip:
 
 @pytest.fixture(scope="module")
 def found(swing: Clip) -> KeysNeeded:
-    return keys_needed(swing, KEYFRAME_MODES, 0.1)
+    return keys_needed(OfRigidBody(swing, 0.1), KEYFRAME_MODES)
 
 
 def test_the_rates_are_those_of_the_papers_table_and_some_below() -> None:
@@ -92,7 +93,7 @@ def test_the_reference_needs_its_own_keys_and_shares_are_counted_from_them(found
 
 
 def test_without_the_reference_among_the_modes_it_is_still_what_is_reached(swing: Clip, found: KeysNeeded) -> None:
-    alone = keys_needed(swing, ["dq_sclerp"], 0.1)
+    alone = keys_needed(OfRigidBody(swing, 0.1), ["dq_sclerp"])
     assert np.array_equal(alone.targets, found.targets)
     assert np.array_equal(alone.keys[0], found.keys[1])
 
@@ -100,7 +101,7 @@ def test_without_the_reference_among_the_modes_it_is_still_what_is_reached(swing
 def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> None:
     shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
     clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))
-    with_fitted = keys_needed(clip, ["motor_spline"], 0.1, fit=True)
+    with_fitted = keys_needed(OfRigidBody(clip, 0.1, fit=True), ["motor_spline"])
     assert with_fitted.keys.shape == (1, 3, len(RATES))
     assert (with_fitted.reached[:, 2] <= with_fitted.targets * (1.0 + 1e-9)).all()
     assert (with_fitted.keys[:, 2] <= with_fitted.keys[:, 1]).all()
@@ -111,16 +112,16 @@ def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> N
 
 def test_the_unit_of_a_recording_makes_no_difference(swing: Clip, found: KeysNeeded) -> None:
     poses = Poses(swing.poses.positions * 1e2, swing.poses.quaternions)
-    other = keys_needed(replace(swing, poses=poses, metres_per_unit=1e-2), KEYFRAME_MODES, 0.1)
+    other = keys_needed(OfRigidBody(replace(swing, poses=poses, metres_per_unit=1e-2), 0.1), KEYFRAME_MODES)
     np.testing.assert_allclose(other.targets, found.targets, rtol=1e-9)
     assert np.array_equal(other.keys, found.keys)
 
 
 def test_where_the_reference_has_all_samples_or_no_two_there_is_nothing_to_reach() -> None:
-    slow = keys_needed(swinging_clip(seconds=2.0, rate=15.0), ["lerp_slerp", "motor_spline"], 0.1)
+    slow = keys_needed(OfRigidBody(swinging_clip(seconds=2.0, rate=15.0), 0.1), ["lerp_slerp", "motor_spline"])
     assert np.isnan(slow.keys[:, :, :3]).all()
     assert np.isfinite(slow.keys[:, :, 3:]).all()
-    short = keys_needed(swinging_clip(seconds=0.1), ["lerp_slerp"], 0.1)
+    short = keys_needed(OfRigidBody(swinging_clip(seconds=0.1), 0.1), ["lerp_slerp"])
     assert np.isnan(short.keys[:, :, RATES.index("8")]).all()
     assert np.isfinite(short.keys[:, :, RATES.index("30")]).all()
 
@@ -129,7 +130,7 @@ def test_what_takes_every_sample_is_not_reached() -> None:
     random = np.random.default_rng(0)
     clip = swinging_clip(seconds=2.0, rate=30.5)
     shaken = replace(clip, poses=Poses(random.normal(size=(len(clip.times), 3)), clip.poses.quaternions))
-    found = keys_needed(shaken, ["lerp_slerp", "motor_spline"], 0.1)
+    found = keys_needed(OfRigidBody(shaken, 0.1), ["lerp_slerp", "motor_spline"])
     at = RATES.index("30")
     assert found.targets[at] > 0.1
     assert np.isinf(found.keys[1, 0, at])

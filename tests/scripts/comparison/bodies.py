@@ -1,0 +1,72 @@
+"""Whole bodies for the tests of the comparison: small, in centimetres with y upwards, and different for every seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from addon.motion import Poses
+from scripts.comparison.study.clips import Clip
+from scripts.figures import Figure
+
+BONES = {
+    "Hips": (None, (0, 90, 0)),
+    "Spine": ("Hips", (0, 20, 0)),
+    "Head": ("Spine", (0, 40, 0)),
+    "Arm": ("Spine", (20, 25, 0)),
+    "Hand": ("Arm", (50, 0, 0)),
+    "Glove": ("Hand", (10, 0, 0)),
+    "Leg": ("Hips", (10, -5, 0)),
+    "Foot": ("Leg", (0, -80, 0)),
+}
+"""Parents, and where joints are in their space. The glove moves with the hand that it is on."""
+
+JOINTS = tuple(BONES)
+
+PARENTS = np.array([-1 if parent is None else JOINTS.index(parent) for parent, _ in BONES.values()])
+
+
+def turns(angles: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) of turns by angles (...) about axes (..., 3)."""
+    axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    return np.concatenate((np.cos(angles / 2.0)[..., None], np.sin(angles / 2.0)[..., None] * axes), axis=-1)
+
+
+def swinging_body(
+    name: str = "walk", *, seconds: float = 2.0, rate: float = 30.0, seed: int = 1, joints: Sequence[str] = JOINTS
+) -> Clip:
+    """A body that walks ahead and swings all but its glove; the foot stands for the first half second."""
+    random = np.random.default_rng(seed)
+    times = 7.0 + np.arange(round(seconds * rate) + 1) / rate
+    since = np.maximum(times - times[0] - 0.5, 0.0)
+    phases = random.uniform(2.0, 6.0, (len(BONES), 1)) * since
+    poses = Poses(
+        np.tile(np.array([offset for _, offset in BONES.values()], dtype=float)[:, None], (1, len(times), 1)),
+        turns(0.8 * np.sin(phases), random.normal(size=(len(BONES), 1, 3)) * np.ones((1, len(times), 1))),
+    )
+    poses.positions[0] += 60.0 * np.stack((0.0 * since, 0.2 * np.sin(5.0 * since), since), axis=-1)
+    glove = list(BONES).index("Glove")
+    poses.quaternions[glove] = poses.quaternions[glove, :1]
+    # The arm swings from the first moment on.
+    arm = list(BONES).index("Arm")
+    poses.quaternions[arm] = turns(np.sin(4.0 * times), np.tile((0.0, 0.3, 1.0), (len(times), 1)))
+    clip = Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01)
+    return replace(clip, figure=figure_of(clip, joints))
+
+
+def figure_of(clip: Clip, joints: Sequence[str]) -> Figure:
+    """The figure of a clip whose joints are called so, at rest as it begins."""
+    tails = np.tile((0.0, 10.0, 0.0), (len(joints), 1))
+    unplaced = Figure(tuple(joints), PARENTS, Poses(np.zeros((len(joints), 3)), np.eye(4)[[0] * len(joints)]), tails)
+    return replace(unplaced, rest=unplaced.skeleton.in_root_space(clip.poses)[:, 0])
+
+
+def still_body(name: str = "statue") -> Clip:
+    """The same body, of which nothing moves."""
+    clip = swinging_body(name)
+    poses = Poses(
+        *(np.repeat(some[:, :1], len(clip.times), axis=1) for some in (clip.poses.positions, clip.poses.quaternions))
+    )
+    return replace(clip, poses=poses)

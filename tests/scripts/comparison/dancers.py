@@ -1,0 +1,74 @@
+"""Bodies that dance: clips of whole figures, made up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from addon.motion import Poses
+from addon.motion.poses import placed
+from addon.motion.quaternions import normalise
+from scripts.comparison.study.clips import Clip
+from scripts.figures import Figure, Skin
+
+JOINTS = ("Hips", "Spine", "Head", "Left leg", "Right leg", "Left foot")
+PARENTS = (-1, 0, 1, 0, 0, 3)
+OFFSETS = ((0, 0, 1.0), (0, 0.05, 0.3), (0, 0, 0.35), (0.12, 0, -0.1), (-0.12, 0, -0.1), (0, 0, -0.75))
+TAILS = ((0, 0.05, 0.3), (0, 0, 0.35), (0, 0, 0.2), (0, 0, -0.75), (0, 0, -0.8), (0, 0.15, -0.05))
+
+
+def dancing_clip(
+    *,
+    name: str = "dance",
+    seconds: float = 1.2,
+    rate: float = 60.0,
+    axes: str = "blender",
+    metres_per_unit: float = 1.0,
+    joints: Sequence[str] = JOINTS,
+    walked: float = 0.0,
+    still: Sequence[int] = (),
+    skin: bool = False,
+) -> Clip:
+    """A body of six joints that turn every way, and walks so many metres; some joints stay as they are."""
+    times = np.arange(0.0, seconds + 1e-9, 1.0 / rate)
+    random = np.random.default_rng(7)
+    count = len(JOINTS)
+    at_rest = normalise(random.normal(size=(count, 4)) * 0.2 + (1.0, 0.0, 0.0, 0.0))
+    speeds, phases = random.uniform(2.0, 9.0, (count, 3, 1)), random.uniform(0.0, 6.0, (count, 3, 1))
+    waves = 0.5 * np.sin(speeds * times + phases)
+    waves[list(still)] = 0.3
+    turns = normalise(np.concatenate((np.ones((count, 1, len(times))), waves), axis=1).transpose(0, 2, 1))
+    places = np.repeat(np.array(OFFSETS, dtype=float)[:, None], len(times), axis=1)
+    if 0 not in still:
+        places[0] += np.stack(
+            (walked * times / seconds, 0.1 * np.sin(3.0 * times), 0.05 * np.sin(7.0 * times)), axis=-1
+        )
+    local = Poses(np.array(OFFSETS, dtype=float), at_rest)
+    rest = Poses(np.zeros((count, 3)), np.zeros((count, 4)))
+    for joint, parent in enumerate(PARENTS):
+        rest[joint] = local[joint] if parent < 0 else placed(rest[parent], local[joint])
+    scale = 1.0 / metres_per_unit
+    figure = Figure(
+        tuple(joints),
+        np.array(PARENTS),
+        Poses(rest.positions * scale, rest.quaternions),
+        np.array(TAILS, dtype=float) * scale,
+        _skin(rest, scale) if skin else None,
+    )
+    poses = Poses(places * scale, turns)
+    return Clip(name, f"{name}.bvh", axes, times, poses, (), metres_per_unit, figure=figure)
+
+
+def _skin(rest: Poses, scale: float) -> Skin:
+    """A tetrahedron around each joint, carried by it and a third by its parent."""
+    around = 0.1 * np.array(((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)), dtype=float)
+    faces = np.array(((0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)))
+    count = len(JOINTS)
+    carriers = np.zeros((4 * count, 4), dtype=np.int64)
+    carriers[:, 0] = np.repeat(np.arange(count), 4)
+    carriers[:, 1] = np.repeat(np.maximum(PARENTS, 0), 4)
+    weights = np.tile((2.0 / 3.0, 1.0 / 3.0, 0.0, 0.0), (4 * count, 1))
+    weights[:4] = (1.0, 0.0, 0.0, 0.0)
+    vertices = (rest.positions[:, None] + around).reshape(-1, 3) * scale
+    return Skin(vertices, np.concatenate([faces + 4 * joint for joint in range(count)]), carriers, weights)

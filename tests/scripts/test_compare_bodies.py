@@ -1,0 +1,293 @@
+"""compare.py on whole bodies: what it writes of them, and what becomes of the others where one cannot be read."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scripts import compare
+from scripts.trajectories import read_trajectories
+from tests.blank import blank
+from tests.scripts.comparing import ROOT, write_toss
+from tests.scripts.comparison.study.test_body_metrics import HEADER
+from tests.scripts.test_compare import COLUMNS
+from tests.scripts.trajectories.skeletons import body, export
+from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
+
+MODES = ("lerp_slerp", "dq_sclerp")
+
+QUICK = ("--no-video", "--modes", ",".join(MODES))
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def write_body(folder: Path, name: str = "walk") -> Path:
+    """A BVH of a body with two arms, which swings all of its joints for two seconds."""
+    path = folder / f"{name}.bvh"
+    path.write_text(seed("ZXY", 60, speed=0.1), encoding="utf-8")
+    return path
+
+
+def joints_in(path: Path) -> tuple[str, ...]:
+    return read_trajectories(str(path)).trajectories[0].figure.joints
+
+
+def run(*arguments: object, jobs: int = 0) -> int:
+    return compare.main(["--jobs", str(jobs), *map(str, arguments)])
+
+
+# -- what is written --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A body, and what the command that people type writes of it, beside a single rigid one."""
+    folder = tmp_path_factory.mktemp("bodies")
+    walk, toss, output = write_body(folder), write_toss(folder / "toss.csv"), folder / "output"
+    radii = folder / "radii.csv"
+    radii.write_text("joint,radius_m\nHips1_2,0.5\nTail,0.1\n", encoding="utf-8")
+    command = [sys.executable, ROOT / "scripts" / "compare.py", walk, toss, *QUICK, "--jobs", "1", "--output", output]
+    command += ["--decimate", "adaptive", "--tolerance", "1cm", "--shared", "--rates", "5,10", "--radius", radii]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "no body has a joint Tail, for which --radius has a radius" in done.stderr
+    assert done.stdout.splitlines()[-1] == str(output / "report.html")
+    return walk, output
+
+
+def test_the_table_has_a_row_for_every_body_choice_and_mode(written: tuple[Path, Path]) -> None:
+    walk, output = written
+    joints = joints_in(walk)
+    assert (output / "metrics.csv").read_text().splitlines()[0] == COLUMNS
+    rows = rows_of(output / "metrics.csv")
+    choices = [("5", "uniform", ""), ("10", "uniform", ""), ("", "adaptive", "0.01")]
+    for clip in ("walk", "toss"):
+        found = [
+            (row["rate_hz"], row["decimation"], row["tolerance_m"], row["mode"]) for row in rows if row["clip"] == clip
+        ]
+        assert found == [(*choice, mode) for choice in choices for mode in MODES]
+    for row in rows:
+        if row["clip"] == "toss":
+            assert {row[name] for name in COLUMNS.split(",")[-5:]} == {""}
+            continue
+        assert int(row["joints"]) == len(joints)
+        assert row["worst_joint"] in joints
+        assert int(row["key_frames"]) <= int(row["keys"]) <= len(joints) * int(row["key_frames"])
+        assert 0.0 < float(row["rms_shell_m"]) <= float(row["p95_shell_m"]) <= float(row["max_shell_m"]) < 1.0
+        if row["decimation"] == "adaptive":
+            assert float(row["max_shell_m"]) <= 0.01 * (1.0 + 1e-9)
+
+
+def test_the_table_of_joints_has_a_row_for_every_joint_of_these(written: tuple[Path, Path]) -> None:
+    walk, output = written
+    joints = joints_in(walk)
+    assert (output / "metrics_joints.csv").read_text().splitlines()[0] == HEADER
+    rows = rows_of(output / "metrics_joints.csv")
+    assert len(rows) == len(joints) * len(MODES) * 3
+    assert {row["clip"] for row in rows} == {"walk"}
+    for whole in (row for row in rows_of(output / "metrics.csv") if row["clip"] == "walk"):
+        own = [row for row in rows if all(row[name] == whole[name] for name in ("mode", "rate_hz", "decimation"))]
+        assert [row["joint"] for row in own] == list(joints)
+        assert max(float(row["max_shell_m"]) for row in own) == float(whole["max_shell_m"])
+        assert sum(int(row["keys"]) for row in own) == int(whole["keys"])
+        (worst,) = (row for row in own if row["joint"] == whole["worst_joint"])
+        assert worst["max_shell_m"] == whole["max_shell_m"]
+
+
+def test_keys_are_in_a_table_for_all_modes_or_one_for_each_and_shared_by_the_joints(written: tuple[Path, Path]) -> None:
+    walk, output = written
+    folders = {path.name: path for path in (output / "walk").iterdir()}
+    assert set(folders) == {"5", "10", "tolerance-1cm"}
+    assert [path.name for path in folders["5"].iterdir()] == ["keys.csv"]
+    assert sorted(path.name for path in folders["tolerance-1cm"].iterdir()) == sorted(
+        f"{mode}.keys.csv" for mode in MODES
+    )
+    for path in output.glob("walk/*/*.csv"):
+        moments = {}
+        for row in rows_of(path):
+            moments.setdefault(row["joint"], []).append(float(row["t"]))
+        assert tuple(moments) == joints_in(walk)
+        assert len({tuple(own) for own in moments.values()}) == 1
+        if path.parent.name == "10":
+            np.testing.assert_allclose(np.diff(moments["Hips"]), 0.1, atol=1e-4)
+
+
+def test_the_keys_needed_are_told_of_bodies_too(written: tuple[Path, Path]) -> None:
+    _, output = written
+    rows = [row for row in rows_of(output / "keys_needed.csv") if row["clip"] == "walk"]
+    assert {row["mode"] for row in rows} == set(MODES)
+    assert {row["decimation"] for row in rows} == {"uniform", "adaptive"}
+    for row in rows:
+        if row["keys"]:
+            assert float(row["rms_shell_m"]) <= float(row["wanted_rms_shell_m"]) * (1.0 + 1e-9)
+
+
+def test_the_report_shows_the_body_and_names_its_joints(written: tuple[Path, Path]) -> None:
+    walk, output = written
+    page = (output / "report.html").read_text(encoding="utf-8")
+    assert "Error of each joint over time" in page
+    for joint in joints_in(walk):
+        assert f">{joint}<" in page
+    assert page.count('class="stick-figure"') == len(MODES) * 3
+
+
+def test_a_radius_of_its_own_changes_the_errors_of_that_joint_alone(written: tuple[Path, Path], tmp_path: Path) -> None:
+    walk, output = written
+    assert run(walk, *QUICK, "--rates", "5", "--output", tmp_path) == 0
+    without = {(row["mode"], row["joint"]): row for row in rows_of(tmp_path / "metrics_joints.csv")}
+    for row in rows_of(output / "metrics_joints.csv"):
+        if row["rate_hz"] == "5":
+            other = without[row["mode"], row["joint"]]
+            same = float(row["rms_shell_m"]) == pytest.approx(float(other["rms_shell_m"]), rel=1e-9)
+            assert same == (row["joint"] != "Hips1_2")
+            assert row["rms_position_m"] == other["rms_position_m"]
+            assert float(row["rms_shell_m"]) >= float(other["rms_shell_m"]) * (1.0 - 1e-9)
+
+
+def test_a_second_run_has_nothing_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    walk = write_body(tmp_path)
+    asked = (walk, *QUICK, "--rates", "5", "--output", tmp_path / "output")
+    assert run(*asked) == 0
+    before = (tmp_path / "output" / "metrics_joints.csv").read_bytes()
+    capsys.readouterr()
+    assert run(*asked) == 0
+    assert "Tasks: 5 up to date." in capsys.readouterr().err
+    assert (tmp_path / "output" / "metrics_joints.csv").read_bytes() == before
+
+
+def test_the_joints_of_an_earlier_run_do_not_pass_for_those_of_this(tmp_path: Path) -> None:
+    walk, toss, output = write_body(tmp_path), write_toss(tmp_path / "toss.csv"), tmp_path / "output"
+    asked = (toss, *QUICK, "--rates", "5", "--output", output)
+    assert run(walk, *asked) == 0
+    table = (output / "metrics_joints.csv").read_bytes()
+    assert run(*asked) == 0
+    assert not (output / "metrics_joints.csv").exists()
+    assert run(walk, *asked) == 0
+    assert (output / "metrics_joints.csv").read_bytes() == table
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        ("joint,radius_m\nHips,0.1\nHips,0.2\n", ":3: the joint 'Hips' comes a second time; leave one"),
+        ("joint,radius_m\nHips,wide\n", ":2: 'wide' is no number of metres above 0"),
+    ],
+)
+def test_a_wrong_table_of_radii_ends_with_code_2_and_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str, complaint: str
+) -> None:
+    table = tmp_path / "radii.csv"
+    table.write_text(content, encoding="utf-8")
+    with pytest.raises(SystemExit) as ended:
+        run(write_body(tmp_path), *QUICK, "--radius", table, "--output", tmp_path / "output")
+    assert ended.value.code == 2
+    assert f"{table}{complaint}" in capsys.readouterr().err
+
+
+# -- bodies that cannot be read ---------------------------------------------------------------------------------------
+
+DEADLY = """
+import os, signal, sys
+
+def end(event, arguments):
+    # As where Blender crashes: in the middle of its importer, after we have looked at the file.
+    if event == "open" and str(arguments[0]).endswith("deadly.fbx"):
+        frame = sys._getframe()
+        while frame is not None:
+            if "io_scene_fbx" in frame.f_code.co_filename:
+                os.kill(os.getpid(), signal.SIGSEGV)
+            frame = frame.f_back
+
+sys.addaudithook(end)
+"""
+
+
+@pytest.fixture
+def fbx(empty_file: object, tmp_path: Path) -> Path:
+    """A sound one."""
+    body()
+    return export(tmp_path / "deadly.fbx")
+
+
+@pytest.fixture
+def deadly(fbx: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An FBX with which any process dies that imports it, but for this one."""
+    (tmp_path / "hook").mkdir()
+    (tmp_path / "hook" / "sitecustomize.py").write_text(DEADLY, encoding="utf-8")
+    monkeypatch.setenv(
+        "PYTHONPATH", os.pathsep.join(filter(None, (str(tmp_path / "hook"), os.environ.get("PYTHONPATH"))))
+    )
+    return fbx
+
+
+def lines_about(said: str, path: Path) -> list[str]:
+    assert "Traceback" not in said
+    return [line for line in said.splitlines() if str(path) in line]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(
+    deadly: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
+) -> None:
+    walk, stroll, output = write_body(tmp_path), write_body(tmp_path, "stroll"), tmp_path / "output"
+    assert run(walk, deadly, stroll, *QUICK, "--rates", "5", "--output", output, jobs=jobs) == 1
+    lines = [line for line in lines_about(capfd.readouterr().err, deadly) if "its process died (SIGSEGV)" in line]
+    *again, last = lines
+    assert all(line.endswith("; trying again") for line in again)
+    assert last.startswith(f"compare.py: {deadly}: its process died (SIGSEGV)")
+    assert last.endswith("; given up after 3 attempts")
+    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "stroll"}
+    assert {row["clip"] for row in rows_of(output / "metrics_joints.csv")} == {"walk", "stroll"}
+    assert (output / "report.html").is_file()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
+def test_a_body_that_ends_the_only_process_loses_what_is_not_done_and_the_command_without_it_goes_on(
+    deadly: Path, tmp_path: Path
+) -> None:
+    walk, output = write_body(tmp_path), tmp_path / "output"
+    command, options = [sys.executable, str(ROOT / "scripts" / "compare.py"), str(walk)], [*QUICK, "--rates", "5"]
+    options += ["--jobs", "0", "--output", str(output)]
+    done = subprocess.run([*command, str(deadly), *options], capture_output=True, text=True, timeout=300)
+    assert done.returncode == -signal.SIGSEGV, done.stderr
+    done = subprocess.run([*command, *options], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk"}
+
+
+@pytest.mark.parametrize("jobs", [0, 1])
+def test_a_damaged_body_is_told_in_one_line_and_the_others_go_on(
+    fbx: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
+) -> None:
+    content, walk, output = fbx.read_bytes(), write_body(tmp_path), tmp_path / "output"
+    cut, torn = tmp_path / "cut.fbx", tmp_path / "torn.bvh"
+    cut.write_bytes(content[: len(content) // 2])
+    torn.write_text(walk.read_text().replace("}", "", 1), encoding="utf-8")
+    assert run(cut, walk, torn, fbx, *QUICK, "--rates", "5", "--output", output, jobs=jobs) == 1
+    said = capfd.readouterr().err
+    for path in (cut, torn):
+        (line,) = lines_about(said, path)
+        assert "; " in line
+    assert {row["clip"] for row in rows_of(output / "metrics.csv")} == {"walk", "deadly"}
+    blank()
+
+
+@pytest.mark.parametrize("jobs", [0, 1])
+def test_where_nothing_can_be_read_the_code_is_2(tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int) -> None:
+    path = tmp_path / "torn.bvh"
+    path.write_text(seed("ZXY", 5).partition("MOTION")[0], encoding="utf-8")
+    assert run(path, *QUICK, "--output", tmp_path / "output", jobs=jobs) == 2
+    (line,) = lines_about(capfd.readouterr().err, path)
+    assert line.endswith("the file ends where MOTION is expected; export the BVH again")
+    assert not (tmp_path / "output" / "metrics.csv").exists()
