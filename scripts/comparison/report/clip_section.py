@@ -49,6 +49,9 @@ COLUMNS = (
 )
 
 
+SLIDE = Column("Feet slide", "mm", "foot_slide_m", 1e3)
+"""Of a whole body that stands on the ground."""
+
 KEY_COLUMNS = (Column("Keys", "", "keys", 1.0), Column("Keys", "/s", "keys_per_s", 1.0))
 """Where the modes have different numbers of keys."""
 
@@ -79,7 +82,8 @@ def clip_section(name: str, clip: ClipResults, films: Films, folder: Path, *, wi
             element("h2", facts.name),
             element(
                 "p",
-                f"{facts.duration:.1f} s, {facts.samples} samples ({rate:.0f} a second), axes {facts.axes}, from ",
+                f"{f'{facts.joints} joints, ' if facts.joints else ''}{facts.duration:.1f} s, {facts.samples} samples "
+                f"({rate:.0f} a second), axes {facts.axes}, from ",
                 element("code", facts.source),
                 class_="note",
             ),
@@ -149,7 +153,11 @@ def _rate_section(name: str, clip: str, result: Result, films: Films, folder: Pa
     if (clip, choice.name) in films:
         charts = [_film(name, films[clip, choice.name], folder), element("div", charts)]
     own_counts = len({row.keys for row in rows}) > 1
-    counted = "Each mode has keys of its own" if own_counts else f"{rows[0].keys} keys"
+    columns = (*(KEY_COLUMNS if own_counts else ()), *COLUMNS)
+    if rows[0].foot_slide_m is not None:
+        columns = (*columns, SLIDE)
+    poses = f"{rows[0].key_frames} key poses" if rows[0].joints else f"{rows[0].keys} keys"
+    counted = "Each mode has keys of its own" if own_counts else poses
     sent = "" if own_counts else f", {rows[0].bytes_per_s:.0f} bytes/s"
     return element(
         "section",
@@ -160,10 +168,25 @@ def _rate_section(name: str, clip: str, result: Result, films: Films, folder: Pa
             class_="note",
         ),
         element("div", charts, class_="pair"),
-        _numbers(f"{clip} {choice.phrase}", rows, KEY_COLUMNS + COLUMNS if own_counts else COLUMNS),
+        _numbers(f"{clip} {choice.phrase}", rows, columns),
+        element("p", _said_of_body(rows), class_="note") if rows[0].joints else None,
+        Markup(result.body()),
+        Markup(result.decimated()),
         _best_of(result.segment_modes, rows) if result.segment_modes else None,
         id=name,
         class_="rate",
+    )
+
+
+def _said_of_body(rows: Sequence[Metrics]) -> str:
+    """What the numbers of a whole body are of."""
+    first = rows[0]
+    said = f"Over all {first.joints} joints, each in the root's space; the largest is that of the worst joint."
+    if first.recorded_slide_m is None:
+        return said
+    return (
+        f"{said} Feet slide: the farthest that a joint which stands on the ground gets meanwhile; in the recording "
+        f"itself {rounded(1e3 * first.recorded_slide_m)} mm."
     )
 
 

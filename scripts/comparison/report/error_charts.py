@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..palette import colour_of
-from ..study.reconstructions import Reconstruction, identical_modes
+from ..study.reconstructions import Groups, Reconstruction, identical_modes
 from .charts import Axis, Marks, axis_over, line_chart, with_rows_below
 from .elements import curve
 from .markup import Markup, element, join
@@ -16,25 +18,58 @@ CLOSE_UP_SEGMENTS = 12
 
 def errors_over_time(reconstruction: Reconstruction) -> Markup:
     """The shell errors over the whole clip and, where that is too much to make out, over the segments at the worst."""
-    # Nothing but blanks may not be in an id, and neither name has a slash.
-    name = f"{reconstruction.clip.name}/{reconstruction.choice.name}"
-    times = reconstruction.times - reconstruction.times[0]
-    errors = {mode: some.shell * 1e3 for mode, some in reconstruction.errors.items()}
-    groups = identical_modes([reconstruction])
-    keys = {mode: kept - reconstruction.samples.start for mode, kept in reconstruction.keys.items()}
+    return error_curves(
+        # Nothing but blanks may not be in an id, and neither name has a slash.
+        f"{reconstruction.clip.name}/{reconstruction.choice.name}",
+        reconstruction.times - reconstruction.times[0],
+        {mode: some.shell * 1e3 for mode, some in reconstruction.errors.items()},
+        identical_modes([reconstruction]),
+        {mode: kept - reconstruction.samples.start for mode, kept in reconstruction.keys.items()},
+        alike=reconstruction.choice.decimation == "uniform",
+    )
+
+
+def error_curves(
+    name: str,
+    times: np.ndarray,
+    errors: Mapping[str, np.ndarray],
+    groups: Groups,
+    keys: Mapping[str, np.ndarray],
+    *,
+    alike: bool,
+    measured: str = "shell error",
+) -> Markup:
+    """Errors over time, and over the segments around the largest.
+
+    Parameters
+    ----------
+    name : str
+        Of the charts among all of the page.
+    times : array, shape (n,)
+        Seconds from the first key on.
+    errors : mapping of mode to array, shape (n,)
+        In millimetres, of the first mode of each group at least.
+    groups : groups of modes that are one motion
+    keys : mapping of mode to array of int, shape (k,)
+        Which of the times are keys.
+    alike : bool
+        Whether the keys are those of all modes.
+    measured : str
+        What the errors are.
+    """
 
     def marks(samples: slice) -> list[Marks]:
         def within(mode: str) -> np.ndarray:
             return times[keys[mode][(keys[mode] >= samples.start) & (keys[mode] < samples.stop)]]
 
-        if reconstruction.choice.decimation == "uniform":
+        if alike:
             return [Marks(within(groups[0][0]))]
         return [Marks(within(group[0]), colour_of(group[0])) for group in groups]
 
     def chart(suffix: str, title: str, samples: slice) -> Markup:
         shown = {mode: some[samples] for mode, some in errors.items()}
         seconds, rows = times[samples], marks(samples)
-        errors_axis = axis_over("shell error", "mm", np.concatenate(list(shown.values())))
+        errors_axis = axis_over(measured, "mm", np.concatenate(list(shown.values())))
         # The larger errors behind, or they would cover the smaller ones.
         ordered = sorted(groups, key=lambda group: -shown[group[0]].mean())
         return element(
@@ -42,7 +77,7 @@ def errors_over_time(reconstruction: Reconstruction) -> Markup:
             line_chart(
                 f"{name}-{suffix}",
                 title,
-                "Shell error of each mode over time; strokes on the time axis mark the keys.",
+                f"{measured.capitalize()} of each mode over time; strokes on the time axis mark the keys.",
                 [curve(group, seconds, shown[group[0]]) for group in ordered],
                 Axis("time since the first key", "s", float(seconds[0]), float(seconds[-1])),
                 with_rows_below(errors_axis, len(rows)) if len(rows) > 1 else errors_axis,

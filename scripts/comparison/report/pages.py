@@ -25,6 +25,7 @@ from ..study.choices import Budget, Choice, Tolerance, Uniform
 from ..study.metrics import NOTHING
 from ..study.modes import REFERENCE, description_of, label_of, single_modes
 from ..study.needed import KeysNeeded
+from ..study.radii import JOINT
 from ..study.results import ClipResults, Result
 from .clip_section import Films, clip_section, film_name
 from .elements import heading, number_cell, rounded, swatch, text_cell
@@ -50,7 +51,7 @@ class Settings:
     """What the reader needs to know of a run, beyond the numbers themselves."""
 
     radius: float
-    """Of the shell, in metres."""
+    """Of the shell of a rigid body, in metres."""
 
     program: str
     """Name and version."""
@@ -62,6 +63,9 @@ class Settings:
     """The command line, as one would type it."""
 
     date: datetime = field(default_factory=datetime.now)
+
+    joint_radius: float = JOINT
+    """Of the shell of a joint, in metres."""
 
     details: Mapping[str, str] = field(default_factory=dict)
     """Whatever else is worth a line: what it is, and its value."""
@@ -376,11 +380,14 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
         )
         for mode in summary.modes
     ]
-    radius = f"{settings.radius * 1e3:g} mm"
+    radius, of_joints = (f"{length * 1e3:g} mm" for length in (settings.radius, settings.joint_radius))
+    of_joints = (
+        f", or {of_joints} of that of a joint of a whole body" if settings.joint_radius != settings.radius else ""
+    )
     measures = [
         (
             "Shell error",
-            f"The largest displacement of any point within {radius} of the body's origin: "
+            f"The largest displacement of any point within {radius} of the body's origin{of_joints}: "
             "position and rotation together, as a body of that size shows them.",
         ),
         ("Position, rotation", "The distance of the origin, and the angle of the rotation, from the recorded ones."),
@@ -426,7 +433,7 @@ def _settings_section(summaries: Sequence[Summary], settings: Settings) -> Marku
         ("Blender", settings.blender),
         *((FACTS[summary.kind], f"{listed(summary.amounts)} {summary.kind.unit}".strip()) for summary in summaries),
         ("Modes", [[element("code", mode), " "] for mode in summaries[0].modes]),
-        ("Radius of the shell", f"{settings.radius:g} m"),
+        ("Radius of the shell", f"{settings.radius:g} m, of joints {settings.joint_radius:g} m"),
         *settings.details.items(),
         ("Command", element("code", settings.command)),
     ]

@@ -14,7 +14,7 @@ import numpy as np
 
 from addon.animation import write_channel
 
-from .nodes import Group, apply_group, input_path
+from .nodes import Group, Socket, apply_group, input_path
 
 CORNER = 0.012
 BOLDNESS = 0.008
@@ -103,20 +103,14 @@ def readout_group(name: str, decimals: int, material: bpy.types.Material) -> bpy
         curves.node.inputs["Align X"].default_value = "Right"
     else:
         curves.node.align_x = "RIGHT"
-    filled = group.add("GeometryNodeFillCurve", curves)
-    return group.finish(group.add("GeometryNodeSetMaterial", filled, Material=material))
+    return _lettered(group, curves, material)
 
 
 def readout(
     name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, values: np.ndarray
 ) -> bpy.types.Object:
     """A number that has `values` at `frames`, both of shape (n,)."""
-    obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-    obj.scale = (size, size, size)
-    modifier = apply_group(obj, group, Value=float(values[0]))
-    write_channel(obj, input_path(modifier, "Value"), frames, values)
-    obj.animation_data.action.name = name
-    return obj
+    return _written(name, group, size, frames, values)
 
 
 def decimals_for(largest: float) -> int:
@@ -124,3 +118,51 @@ def decimals_for(largest: float) -> int:
     if largest <= 0.0:
         return 1
     return int(np.clip(2 - np.floor(np.log10(largest)), 1 if largest < 1000.0 else 0, 4))
+
+
+def choice_group(name: str, texts: Sequence[str], material: bpy.types.Material) -> bpy.types.NodeTree:
+    """One of some texts, that with the number `Value`, written from the origin on in letters of size 1."""
+    group = Group(name, Value="Float")
+    chosen = group.add("GeometryNodeIndexSwitch", settings={"data_type": "STRING"}).node
+    while len(chosen.index_switch_items) < len(texts):
+        chosen.index_switch_items.new()
+    # Numbers are cut off to be an index.
+    group.tree.links.new(group.math("ADD", group.inputs["Value"], 0.5), chosen.inputs[0])
+    for socket, text in zip(chosen.inputs[1:], texts, strict=False):
+        socket.default_value = text
+    return _lettered(group, group.add("GeometryNodeStringToCurves", chosen.outputs[0], 1.0), material)
+
+
+def choice(
+    name: str, group: bpy.types.NodeTree, size: float, frames: np.ndarray, chosen: np.ndarray
+) -> bpy.types.Object:
+    """A text that is number `chosen` of those of the group at `frames`, both of shape (n,)."""
+    return _written(name, group, size, *_changes(frames, chosen), interpolation="CONSTANT")
+
+
+def _lettered(group: Group, curves: Socket, material: bpy.types.Material) -> bpy.types.NodeTree:
+    filled = group.add("GeometryNodeFillCurve", curves)
+    return group.finish(group.add("GeometryNodeSetMaterial", filled, Material=material))
+
+
+def _changes(frames: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Only where a value is not that before."""
+    new = np.append(True, np.diff(values) != 0)
+    return frames[new], values[new]
+
+
+def _written(
+    name: str,
+    group: bpy.types.NodeTree,
+    size: float,
+    frames: np.ndarray,
+    values: np.ndarray,
+    interpolation: str = "LINEAR",
+) -> bpy.types.Object:
+    """An object with a group, in which `Value` has these values at `frames`, both of shape (n,)."""
+    obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+    obj.scale = (size, size, size)
+    modifier = apply_group(obj, group, Value=float(values[0]))
+    write_channel(obj, input_path(modifier, "Value"), frames, values, interpolation=interpolation)
+    obj.animation_data.action.name = name
+    return obj

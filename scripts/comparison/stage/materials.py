@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import bpy
 
-from ..palette import linear
+from ..palette import Theme, linear
 
 GLOSS, BOUNCE = 0.0142, 0.878
 """What Workbench's light `paint.sl` shows of a rough colour c that faces the camera: GLOSS + BOUNCE c (measured)."""
+
+
+GHOST_ALPHA = 0.3
+
+
+def ghost(theme: Theme, alpha: float = GHOST_ALPHA) -> bpy.types.Material:
+    """What the recording is made of."""
+    return surface("Recording", theme.ghost, alpha=alpha)
 
 
 def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:

@@ -8,20 +8,26 @@ without scripts. The scene's custom properties tell where the recording's origin
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
 from ..palette import DARK, THEMES, linear
-from ..study.reconstructions import Reconstruction, identical_modes
+from ..study.reconstructions import Groups, Reconstruction, identical_modes
 from . import captions, layout
 from .deviations import largest_deviation, magnification, magnified
-from .framing import SMOOTHING, Framing
-from .lanes import Cast, Lanes
+from .framing import SMOOTHING, Framing, Solid
+from .lanes import Actors, Cast, Lanes
+from .materials import ink
 from .settings import SMALL_PICTURE, StageSettings
+from .solids import Shape, Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
+
+LEGEND = 0.032
+"""The size of the letters below the lanes, in units of the frame's height, where there is room."""
 
 
 def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.types.Scene:
@@ -43,7 +49,7 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     mesh = load_subject(settings.subject)
     smoothing = SMOOTHING * settings.fps * timeline.steps
     outline = layout.outermost(vertices_of(mesh))
-    framing = Framing.of(motion.recording, outline, smoothing)
+    framing = Framing.of(Solid(motion.recording, outline), smoothing)
     enlarged = layout.display_scale(motion.recording.positions - framing.focus, float(np.ptp(outline, axis=0).max()))
     mesh.transform(Matrix.Scale(enlarged, 4))
     outline = outline * enlarged
@@ -52,37 +58,65 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     farthest = max(largest_deviation(poses, motion.recording, outline) for poses in motion.modes.values())
     deviation = settings.deviation or magnification(farthest, size)
     deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
-    low, high = framing.extent([motion.recording, *deviated.values()], outline)
+    low, high = framing.extent([Solid(poses, outline) for poses in (motion.recording, *deviated.values())])
     width, height = settings.resolution
     plan = layout.arrange(len(lanes_of), (high - low)[:2], width / height)
     errors = _errors_in_mm(reconstruction, timeline)
     cast = Cast(
         timeline=timeline,
-        motion=motion,
-        deviated=deviated,
         framing=framing,
+        framing_steps=timeline.steps,
         layout=plan,
         middle=np.append((low + high)[:2] / 2.0, high[2]),
         errors=errors,
         largest_error=max(float(error.max()) for error in errors.values()),
-        mesh=mesh,
         notes=_notes(reconstruction),
-        traced=layout.telling_point(motion.recording, outline),
         theme=theme,
+        ink=ink("Ink", theme.ink),
+        faint=ink("Faint", theme.faint),
     )
-
-    frame = make_frame(plan.metres)
-    lanes = Lanes(cast, frame)
-    for modes, cell in zip(lanes_of, plan.cells, strict=True):
-        lanes.build(modes, cell)
-    _make_header(reconstruction, settings, cast, lanes, _legend(cast, settings, deviation, enlarged))
-    make_camera(scene, plan.metres, depth=float(high[2] - low[2]))
-    make_lights(scene)
-    set_up_render(scene, settings, timeline.count, theme.background)
+    shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
+    header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
+    put_on_stage(scene, settings, cast, lanes_of, Solids(cast, shape), header, depth=float(high[2] - low[2]))
     scene["recording_centre_m"] = motion.centre.tolist()
     scene["recording_start_s"] = timeline.start
     scene["deviation_shown_times"] = deviation
     return scene
+
+
+@dataclass(frozen=True)
+class Header:
+    """What is written above and below the lanes."""
+
+    clip: str
+    choice: str
+
+    legend: str
+    """How to read the picture."""
+
+    reserved: float = 0.0
+    """What has to be left free to the right of that, in units of the frame's height."""
+
+
+def put_on_stage(
+    scene: bpy.types.Scene,
+    settings: StageSettings,
+    cast: Cast,
+    lanes_of: Groups,
+    actors: Actors,
+    header: Header,
+    depth: float,
+) -> None:
+    """Make the lanes, what is written around them, camera and lights; the depth of what moves in metres."""
+    plan = cast.layout
+    frame = make_frame(plan.metres)
+    lanes = Lanes(cast, frame, actors)
+    for modes, cell in zip(lanes_of, plan.cells, strict=True):
+        lanes.build(modes, cell)
+    _make_header(header, cast, frame)
+    make_camera(scene, plan.metres, depth)
+    make_lights(scene)
+    set_up_render(scene, settings, cast.timeline.count, cast.theme.background)
 
 
 def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[str, np.ndarray]:
@@ -124,32 +158,30 @@ def make_frame(metres: float) -> bpy.types.Object:
     return frame
 
 
-def _make_header(
-    reconstruction: Reconstruction, settings: StageSettings, cast: Cast, lanes: Lanes, legend: str
-) -> None:
+def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
     """What is written above and below the lanes: clip, rate and time, and how to read the picture."""
     collection = bpy.data.collections.new("Captions")
     bpy.context.scene.collection.children.link(collection)
-    collection.objects.link(lanes.frame)
+    collection.objects.link(frame)
     left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN - 0.042
     right = -left
 
     def put(obj: bpy.types.Object, x: float, y: float) -> None:
-        captions.put(obj, lanes.frame, collection, x, y)
+        captions.put(obj, frame, collection, x, y)
 
-    name_width = captions.width_of(reconstruction.clip.name)
+    name_width = captions.width_of(header.clip)
     size = min(0.046, 0.5 * (right - left) / name_width)
-    put(captions.words("Clip", reconstruction.clip.name, size, lanes.ink), left, line)
-    rate = captions.words("Choice of keys", reconstruction.choice.title, 0.034, lanes.faint)
+    put(captions.words("Clip", header.clip, size, cast.ink), left, line)
+    rate = captions.words("Choice of keys", header.choice, 0.034, cast.faint)
     put(rate, left + name_width * size + 0.03, line)
     timeline = cast.timeline
     ends = timeline.frames[[0, -1]]
-    decimals = captions.readout_group("Time in s", 2, lanes.ink)
+    decimals = captions.readout_group("Time in s", 2, cast.ink)
     put(captions.readout("Time", decimals, 0.046, ends, timeline.times_of(ends) - timeline.start), right - 0.03, line)
-    put(captions.words("Seconds", "s", 0.034, lanes.faint, "RIGHT"), right, line)
+    put(captions.words("Seconds", "s", 0.034, cast.faint, "RIGHT"), right, line)
 
-    size = min(0.032, (right - left) / captions.width_of(legend))
-    put(captions.words("Legend", legend, size, lanes.faint), left, -0.5 + layout.MARGIN + 0.004)
+    size = min(LEGEND, (right - left - header.reserved) / captions.width_of(header.legend))
+    put(captions.words("Legend", header.legend, size, cast.faint), left, -0.5 + layout.MARGIN + 0.004)
 
 
 def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:

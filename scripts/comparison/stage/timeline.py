@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from addon.motion import Poses, interpolate
-from scripts.trajectories.axes import to_blender
+from scripts.axes import to_blender
 
 from ..study.reconstructions import Reconstruction
 

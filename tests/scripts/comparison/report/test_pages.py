@@ -25,7 +25,7 @@ from scripts.comparison.report.pages import Settings, write_clip_page, write_ove
 from scripts.comparison.study.choices import Tolerance, Uniform
 from scripts.comparison.study.metrics import measure_reconstruction
 from scripts.comparison.study.modes import BEST_OF, label_of
-from scripts.comparison.study.needed import KeysNeeded, keys_needed
+from scripts.comparison.study.needed import KeysNeeded, OfRigidBody, keys_needed
 from scripts.comparison.study.reconstructions import Reconstruction
 from scripts.comparison.study.reconstructions import reconstruct as choose
 from scripts.comparison.study.results import ClipFacts, ClipResults, Result
@@ -293,7 +293,7 @@ def adaptive(runs: list[Reconstruction], tmp_path_factory: pytest.TempPathFactor
     clips = [runs[0].clip, runs[3].clip]
     choices = (Uniform("10"), Tolerance("5mm"), Tolerance("2cm"))
     made = [choose(clip, choice, KEYFRAME_MODES, 0.1) for clip in clips for choice in choices]
-    needed = [keys_needed(clip, KEYFRAME_MODES, 0.1) for clip in clips]
+    needed = [keys_needed(OfRigidBody(clip, 0.1), KEYFRAME_MODES) for clip in clips]
     path = tmp_path_factory.mktemp("adaptive") / "report.html"
     write_report(path, results_of(made, needed), films={}, settings=SETTINGS)
     return Page(path), needed
@@ -357,7 +357,7 @@ def test_the_mode_that_did_with_the_fewest_keys_is_named(adaptive: tuple[Page, l
 
 
 def test_a_cell_says_where_an_error_is_not_reached_or_there_is_none(tmp_path: Path, runs: list[Reconstruction]) -> None:
-    whole = keys_needed(runs[0].clip, ("lerp_slerp", "motor_spline"), 0.1)
+    whole = keys_needed(OfRigidBody(runs[0].clip, 0.1), ("lerp_slerp", "motor_spline"))
     keys = whole.keys.copy()
     keys[1, 0, 0], keys[:, :, 1] = np.inf, np.nan
     one = results_of(runs[:1], [replace(whole, keys=keys)])

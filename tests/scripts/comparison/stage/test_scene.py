@@ -11,6 +11,7 @@ from mathutils import Vector
 from addon.animation import channelbag_of, read_poses
 from addon.motion import KEYFRAME_MODES, Poses, interpolate
 from addon.motion.quaternions import angle_between, conjugate, multiply, rotate
+from scripts.axes import to_blender
 from scripts.comparison.stage import layout
 from scripts.comparison.stage.nodes import input_path
 from scripts.comparison.stage.scene import build_stage
@@ -20,7 +21,6 @@ from scripts.comparison.stage.timeline import Timeline
 from scripts.comparison.study.choices import Tolerance
 from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.reconstructions import reconstruct as choose
-from scripts.trajectories.axes import to_blender
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 from tests.thoroughness import sample
 
