@@ -1,7 +1,8 @@
 """Reproduce the paper: its figures, its table and its example, from this program, with the paper's numbers beside them.
 
 Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table is made from the
-clips in assets/, and with --recordings from those in a folder as well.
+clips in assets/, and with --recordings from those in a folder as well. Whole bodies among these, and those that
+--bodies names, are studied as bodies too.
 """
 
 from __future__ import annotations
@@ -23,9 +24,11 @@ import bpy
 import numpy as np
 
 from scripts.command_line import own_arguments
-from scripts.files import written_beside
+from scripts.files import write_text, written_beside
+from scripts.paper.bodies import body_files
 from scripts.paper.motions import recordings_in
-from scripts.paper.steps import PAGE, plan
+from scripts.paper.page import with_bodies
+from scripts.paper.steps import PAGE, SECTION, plan, plan_bodies
 from scripts.paper.timing import ROUNDS
 from scripts.progress import Progress
 from scripts.trajectories import TrajectoryError
@@ -34,8 +37,8 @@ from scripts.workplan.manifest import ManifestError
 
 CODE = (
     *("addon/animation", "addon/motion", "assets/making", "assets/models.blend"),
-    *("scripts/comparison", "scripts/files.py", "scripts/paper", "scripts/rows.py", "scripts/streaming"),
-    "scripts/trajectories",
+    *("scripts/axes.py", "scripts/command_line.py", "scripts/comparison", "scripts/figures.py", "scripts/files.py"),
+    *("scripts/paper", "scripts/rows.py", "scripts/streaming", "scripts/trajectories"),
 )
 """What the results depend on."""
 
@@ -44,12 +47,15 @@ examples:
   python scripts/reproduce_paper.py
   python scripts/reproduce_paper.py --recordings ../recordings
   python scripts/reproduce_paper.py --recordings ../recordings --docs
+  python scripts/reproduce_paper.py --recordings ../recordings --bodies ../rigs run.fbx
+  python scripts/reproduce_paper.py --bodies ../rigs --only-bodies --docs
   python scripts/reproduce_paper.py --no-video --output /tmp/paper
   blender --background --python scripts/reproduce_paper.py -- --no-pictures
 
 It writes OUTPUT/paper.md, the page, with its pictures in OUTPUT/paper/, and every number of it in OUTPUT/*.csv. What is
 done is not done again: after Ctrl-C, or with more recordings, the same call goes on. A second run gives the same
-numbers, those of timing.csv aside. The last line it prints is the path of the page.
+numbers, those of timing.csv aside. With --only-bodies it writes the section on whole bodies alone, OUTPUT/bodies.md,
+which --docs puts into the page there; its other sections stay. The last line it prints is the path of the page.
 Exit code: 0 done, 1 a part of it failed (the page holds the others), 2 a wrong input or option, 130 stopped by Ctrl-C.
 """
 
@@ -63,6 +69,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="recordings to make the table from as well")
+    parser.add_argument(
+        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them, to study"
+    )
+    parser.add_argument("--only-bodies", action="store_true", help="the section on whole bodies, and nothing else")
     parser.add_argument(
         "--output", type=Path, default=ROOT / "renders" / "paper", help="folder to write to (renders/paper)"
     )
@@ -84,17 +94,23 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Reproduce the paper, and return the exit code."""
     options = parse(arguments)
-    missing = None if options.no_pictures else missing_for_rendering()
+    missing = None if options.no_pictures or options.only_bodies else missing_for_rendering()
     if missing:
         print(f"reproduce_paper.py: {way_out(missing)}\nOr go without pictures: --no-pictures", file=sys.stderr)
         return 2
     try:
         work = _plan(options)
+        if options.only_bodies and options.docs and not (options.docs / PAGE).is_file():
+            raise ValueError(f"{options.docs / PAGE}: there is no page to put the section into; leave --docs out")
         with Workspace(options.output) as workspace, Progress() as progress, SerialExecutor() as executor:
             outcome = run(work, workspace, executor, force=options.force, progress=progress, title="Reproducing")
-        page = options.output / PAGE
+        page = options.output / (SECTION if options.only_bodies else PAGE)
         if options.docs and outcome.states[work.order[-1]].there:
-            copy_page(work, outcome, options.output, options.docs)
+            if options.only_bodies:
+                section, whole = page.read_text(encoding="utf-8"), (options.docs / PAGE).read_text(encoding="utf-8")
+                write_text(options.docs / PAGE, with_bodies(whole, section))
+            else:
+                copy_page(work, outcome, options.output, options.docs)
             page = options.docs / PAGE
     except (TrajectoryError, ValueError, FolderInUse, ManifestError) as error:
         print(f"reproduce_paper.py: {error}", file=sys.stderr)
@@ -122,13 +138,19 @@ def copy_page(work: Plan, outcome: Outcome, output: Path, docs: Path) -> None:
 def _plan(options: argparse.Namespace) -> Plan:
     # Relative paths where that can be: the same output folder then serves a checkout that was moved.
     assets = ROOT / "assets" if Path.cwd() != ROOT else Path("assets")
+    recordings = recordings_in(options.recordings) if options.recordings else []
+    bodies = body_files(options.bodies)
+    version = f"{code_version(*CODE)} Blender {bpy.app.version_string} NumPy {np.__version__}"
+    if options.only_bodies:
+        return plan_bodies(recordings, bodies, version=version)
     return plan(
         sorted(assets.glob("*.csv")),
-        recordings_in(options.recordings) if options.recordings else [],
+        recordings,
+        bodies,
         pictures=not options.no_pictures,
         film=not options.no_video,
         rounds=options.rounds,
-        version=f"{code_version(*CODE)} Blender {bpy.app.version_string} NumPy {np.__version__}",
+        version=version,
     )
 
 

@@ -64,13 +64,18 @@ def recordings_in(folder: Path) -> list[Path]:
 
 
 def read_motion(source: str, name: str, of: str) -> tuple[Motion, Clip | None]:
-    """Read and repair the first body of a recording; no clip where it cannot be read or does not move."""
+    """Read and repair the first body of a recording; no clip where it cannot be read or does not move.
+
+    A whole skeleton is represented by its first joint, a root: the paper's bodies are rigid.
+    """
     file = Path(source).name
     try:
-        (read,), _ = read_clips([source], "blender")
+        read = read_clips([source], "blender")[0][0]
     except TrajectoryError as error:
         return Motion(name, file, of, left_out=str(error).replace(source, file)), None
     clip = replace(read, name=name)
+    if clip.figure:
+        clip = replace(clip, poses=clip.poses[0], figure=None)
     moved = spread(clip.in_metres(clip.poses))
     reason = f"at rest: it stays within {moved * 1e3:.1f} mm of its mean pose" if moved < REST else ""
     seconds = float(clip.times[-1] - clip.times[0])

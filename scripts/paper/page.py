@@ -15,6 +15,7 @@ from scripts.comparison.study.modes import REFERENCE
 
 from . import claims, strips, triangle
 from .bandwidths import Bandwidth
+from .bodies_section import HEADING, bodies_section
 from .bows import SCREW
 from .catching import LINK
 from .results import Results
@@ -26,6 +27,9 @@ BLEND = "pga_lerp"
 """The multivectors of the paper."""
 
 SPLINES = ("motor_spline", "motor_spline_causal")
+
+AFTER_BODIES = ("## Running time", "## Bytes", "## Files")
+"""Headings of sections that come after that on bodies."""
 
 WHAT_ASSETS_ARE = {
     "pivot": "a tool turned about its resting tip",
@@ -48,11 +52,25 @@ def write_page(found: Results) -> str:
         _clip_by_clip(found),
         _look_ahead(found),
         _bows(found),
+        bodies_section(found.of_bodies),
         _running_time(found),
         _bandwidth(found),
         _files(found),
     ]
     return "\n".join(line for section in sections if section for line in [*section, ""]).rstrip() + "\n"
+
+
+def with_bodies(page: str, section: str) -> str:
+    """A page with this section on bodies instead of its own, or where it belongs; the rest stays as it is."""
+    before, heading, after = f"\n{page}".partition(f"\n{HEADING}\n")
+    if heading:
+        _, following, rest = after.partition("\n## ")
+        rest = following + rest
+    else:
+        places = [place for name in AFTER_BODIES if (place := before.find(f"\n{name}\n")) >= 0]
+        place = min(places, default=len(before))
+        before, rest = before[:place], before[place:]
+    return "\n\n".join(part.strip("\n") for part in (before, section, rest) if part.strip("\n")) + "\n"
 
 
 # -- sections ----------------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from scripts.rows import read_rows
 
 from . import claims, strips, triangle
 from .bandwidths import Bandwidth
+from .bodies_section import BodyResults
 from .bows import Bow
 from .catching import View
 from .motions import ASSETS, RECORDINGS, Motion
@@ -36,6 +37,8 @@ class Results:
     pictures: frozenset[str]
     """Those that there are, as paths below the folder."""
 
+    of_bodies: BodyResults = field(default_factory=BodyResults)
+
     @classmethod
     def read(cls, folder: Path, there: Iterable[str]) -> Results:
         """Read the files of a run, of which these are there: paths below the folder."""
@@ -56,6 +59,7 @@ class Results:
             steps=rows("triangle.csv", triangle.Step),
             instants=rows("strips.csv", strips.Instant),
             pictures=frozenset(name for name in files if name.endswith((".png", ".svg", ".mp4"))),
+            of_bodies=BodyResults.read(folder, files),
         )
 
     @property

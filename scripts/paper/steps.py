@@ -19,11 +19,12 @@ from scripts.comparison.stage.film import render_film, render_still
 from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.modes import REFERENCE
 from scripts.comparison.study.reading import folder_names, read_clips
+from scripts.comparison.version import step_versions
 from scripts.files import write_text
 from scripts.rows import read_rows, write_rows
 from scripts.workplan import Job, Plan, Task, step
 
-from . import bows, catching, engines, strips, table, timing, triangle
+from . import bodies, bodies_section, body_steps, bows, catching, engines, strips, table, timing, triangle
 from .bandwidths import Bandwidth, bandwidths
 from .motions import ASSETS, RECORDINGS, Motion, read_motion
 from .page import write_page
@@ -34,18 +35,31 @@ ADAPTIVE = (REFERENCE, "motor_spline")
 
 PAGE = "paper.md"
 
+SECTION = "bodies.md"
+"""The section on bodies alone."""
+
 ALL = "all clips"
 
 
 def plan(
-    assets: Sequence[Path], recordings: Sequence[Path], *, pictures: bool, film: bool, rounds: int, version: str
+    assets: Sequence[Path],
+    recordings: Sequence[Path],
+    bodies: Sequence[Path] = (),
+    *,
+    pictures: bool,
+    film: bool,
+    rounds: int,
+    version: str,
 ) -> Plan:
     """Everything that is to be done.
 
     Parameters
     ----------
     assets, recordings : sequence of Path
-        Files, each with a motion. The figures take `throw` and `reach` among the assets.
+        Files, each with a motion. The figures take `throw` and `reach` among the assets. Whole bodies among the
+        recordings are studied as such as well.
+    bodies : sequence of Path
+        Files, each with a whole body.
     pictures, film : bool
         Whether to render them.
     rounds : int
@@ -96,9 +110,71 @@ def plan(
         tasks.append(
             _task("catching, a film", "film_catching", outputs, ("catching",), source=asset["throw"], weight=90.0)
         )
-    before = {task.name: tuple(task.outputs) for task in tasks if task.name not in measuring}
+    studied = _studying(recordings, bodies)
+    tasks += studied
+    before = {
+        task.name: tuple(task.outputs) for task in tasks if task.name not in measuring and task not in studied[:-1]
+    }
     tasks.append(_task("page", "write", (PAGE,), tuple(before), arguments={"files": before}, partial=True))
-    return Plan(tasks, version)
+    return _planned(tasks, version)
+
+
+def plan_bodies(recordings: Sequence[Path], bodies: Sequence[Path], *, version: str) -> Plan:
+    """What is to be done for the section on bodies alone; as in `plan`, of which it is a part but for the last task.
+
+    Raises
+    ------
+    ValueError
+        Where no file may hold a body.
+    """
+    tasks = _studying(recordings, bodies)
+    if not tasks:
+        raise ValueError("there is no whole body to study; give --bodies FILE_OR_FOLDER")
+    return _planned([*tasks, _task("section", "write_section", (SECTION,), (tasks[-1].name,))], version)
+
+
+def _planned(tasks: Sequence[Task], version: str) -> Plan:
+    # The key poses of a body take minutes: they are counted again where what they use has changed, and nothing else.
+    slow = {task.function for task in tasks if task.function.startswith(body_steps.__name__)}
+    return Plan(tasks, version, versions=step_versions(sorted(slow)))
+
+
+def _studying(recordings: Sequence[Path], wanted: Sequence[Path]) -> list[Task]:
+    """The tasks of a study of bodies, the last of which brings them together; none where there is no body."""
+    # A file that is given in both ways may be called differently.
+    given = {path.resolve(): path for path in [*recordings, *wanted] if path in wanted or bodies.may_hold_a_body(path)}
+    files = list(given.values())
+    if not files:
+        return []
+    names = folder_names(path.stem for path in files)
+    tasks = []
+    for name, path in zip(names, files, strict=True):
+        arguments = {"name": name}
+        outputs = tuple(f"bodies/{name}/{part}" for part in bodies.FILES if part != "bodies_needed.csv")
+        tasks += [
+            _task(
+                f"errors of {name}",
+                "measure_body",
+                outputs,
+                source=str(path),
+                arguments=arguments,
+                module=body_steps.__name__,
+                weight=5.0,
+            ),
+            _task(
+                f"key poses of {name}",
+                "count_key_poses",
+                (f"bodies/{name}/bodies_needed.csv",),
+                source=str(path),
+                arguments=arguments,
+                module=body_steps.__name__,
+                weight=60.0,
+            ),
+        ]
+    asked = [name for name, path in zip(names, files, strict=True) if path in wanted]
+    arguments = {"names": names, "asked": asked}
+    before = tuple(task.name for task in tasks)
+    return [*tasks, _task("bodies", "gather_bodies", tuple(bodies.FILES), before, arguments=arguments)]
 
 
 def _task(
@@ -109,12 +185,13 @@ def _task(
     *,
     source: str = "",
     arguments: dict[str, Any] | None = None,
+    module: str = __name__,
     **options: Any,
 ) -> Task:
-    """A task of this module, that may read a clip."""
+    """A task of this module, or of another, that may read a clip."""
     given = {"source": source} if source else {}
     inputs = (source,) if source else ()
-    return Task(name, f"{__name__}:{function}", given | (arguments or {}), inputs, outputs, after, **options)
+    return Task(name, f"{module}:{function}", given | (arguments or {}), inputs, outputs, after, **options)
 
 
 def _measuring(name: str, path: Path, of: str) -> Task:
@@ -184,6 +261,22 @@ def race(job: Job, *, source: str, rounds: int) -> None:
     write_rows(job.writes("timing.csv"), timing.Timing, results)
 
 
+# -- bodies ------------------------------------------------------------------------------------------------------------
+
+
+@step
+def gather_bodies(job: Job, *, names: list[str], asked: list[str]) -> None:
+    """Bring the bodies together. Recordings that are none are not spoken of, unless they were given for bodies."""
+    looked_at = {name: read_rows(job.reads(f"bodies/{name}/bodies.csv"), bodies.Body) for name in names}
+    kept = [name for name in names if name in asked or not looked_at[name][0].left_out]
+    for name in kept:
+        if looked_at[name][0].left_out:
+            job.note(f"{name} does not count among bodies: {looked_at[name][0].left_out}")
+    for part, kind in bodies.FILES.items():
+        rows = [row for name in kept for row in read_rows(job.reads(f"bodies/{name}/{part}"), kind)]
+        write_rows(job.writes(part), kind, rows)
+
+
 # -- the figures -------------------------------------------------------------------------------------------------------
 
 
@@ -244,6 +337,13 @@ def write(job: Job, *, files: dict[str, list[str]]) -> None:
     """The page, of the files that there are: those of each task before this one that is done."""
     there = [path for task, paths in files.items() if task in job.finished for path in paths]
     write_text(job.writes(PAGE), write_page(Results.read(job.output, there)))
+
+
+@step
+def write_section(job: Job) -> None:
+    """The section on bodies alone."""
+    found = bodies_section.BodyResults.read(job.output, bodies.FILES)
+    write_text(job.writes(SECTION), "\n".join([*bodies_section.bodies_section(found), ""]))
 
 
 def _asset(source: str) -> Clip:

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.paper.motions import RECORDINGS, REST, read_motion, recordings_in
-from scripts.trajectories import TrajectoryError
+from scripts.paper.motions import RECORDINGS, REST, read_motion, recordings_in, spread
+from scripts.trajectories import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS as FOLDER
+from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
 
 
 def write(path: Path, positions: np.ndarray) -> None:
@@ -44,6 +45,16 @@ def test_a_body_that_turns_on_the_spot_moves(tmp_path: Path):
     assert read_motion(str(tmp_path / "turns.csv"), "turns", RECORDINGS)[1] is not None
 
 
+def test_a_skeleton_is_represented_by_its_root(tmp_path: Path):
+    path = tmp_path / "walk.bvh"
+    path.write_text(seed("ZXY", 60), encoding="utf-8")
+    motion, clip = read_motion(str(path), "walk", RECORDINGS)
+    (root,) = read_trajectories(f"{path}:Hips").trajectories
+    assert (clip.figure, motion.samples) == (None, 60)
+    np.testing.assert_allclose(clip.poses.positions, root.poses.positions, atol=1e-12)
+    assert motion.spread_m == pytest.approx(spread(root.poses))
+
+
 def test_a_file_that_is_no_recording_is_left_out_and_says_why_without_its_folder(tmp_path: Path):
     (tmp_path / "notes.csv").write_text("dear diary\n", encoding="utf-8")
     motion, clip = read_motion(str(tmp_path / "notes.csv"), "notes", RECORDINGS)
@@ -63,3 +74,40 @@ def test_a_folder_without_recordings_is_refused(tmp_path: Path):
 def test_of_other_peoples_recordings_the_one_at_rest_is_left_out():
     left = [path.name for path in recordings_in(FOLDER) if read_motion(str(path), path.stem, RECORDINGS)[1] is None]
     assert left == ["optitrack_rigid_body.csv"]
+
+
+SWINGING_LEG = """HIERARCHY
+ROOT Hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Leg
+  {
+    OFFSET 0.1 0 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    JOINT Foot
+    {
+      OFFSET 0 -0.8 0
+      CHANNELS 3 Zrotation Xrotation Yrotation
+      End Site
+      {
+        OFFSET 0 0 0.1
+      }
+    }
+  }
+}
+MOTION
+Frames: 40
+Frame Time: 0.025
+"""
+
+
+def test_of_a_whole_body_it_is_the_root(tmp_path: Path):
+    rows = [f"{0.01 * i} 0.9 0 0 0 {i} 0 {3 * i} 0 0 0 0" for i in range(40)]
+    (tmp_path / "walks.bvh").write_text(SWINGING_LEG + "\n".join([*rows, ""]), encoding="utf-8")
+    motion, clip = read_motion(str(tmp_path / "walks.bvh"), "walks", RECORDINGS)
+    assert motion.left_out == ""
+    assert clip.figure is None
+    assert clip.poses.shape == (40,)
+    np.testing.assert_allclose(clip.poses.positions[:, 0], 0.01 * np.arange(40), atol=1e-12)
+    np.testing.assert_allclose(clip.poses.positions[:, 1], 0.9)
