@@ -13,9 +13,11 @@ from .packets import Packets, bandwidth
 from .packing import PACKINGS, Packing, smallest_three
 from .receiver import Playback, PlayOut, receive
 from .sender import send
+from .smooth import TWISTS
 
 __all__ = [
     "PACKINGS",
+    "TWISTS",
     "Event",
     "Link",
     "Packets",

@@ -22,10 +22,12 @@ SOONEST = 1e-3
 
 
 def is_sound(packets: Packets) -> np.ndarray:
-    """Which of n packets hold numbers that can be a time and a pose, shape (n,)."""
+    """Which of n packets are whole, and hold numbers that can be a time and a pose, shape (n,)."""
     poses, lengths = packets.poses, np.abs(packets.poses.quaternions).max(axis=-1, initial=0.0)
-    numbers = np.stack((np.abs(packets.stamps), np.abs(poses.positions).max(axis=-1, initial=0.0), lengths))
-    return (numbers < LARGEST).all(axis=0) & (lengths > 1.0 / LARGEST)
+    numbers = [np.abs(packets.sent), np.abs(poses.positions).max(axis=-1, initial=0.0), lengths]
+    if packets.twists is not None:
+        numbers.append(np.abs(packets.twists).max(axis=-1, initial=0.0))
+    return packets.are_whole & (np.stack(numbers) < LARGEST).all(axis=0) & (lengths > 1.0 / LARGEST)
 
 
 def admit(

@@ -12,8 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from addon.motion import MODES, Poses, in_betweens, twists
-from addon.motion.quaternions import multiply, rotate
+from addon.motion import Poses, in_betweens, twists
+
+from .smooth import TWISTS, Reach, between, moved, reach_of
 
 NONE = -1
 """In place of a key where there is none."""
@@ -40,6 +41,18 @@ class KnownKeys:
     carry: float
     """The time within which the motion beyond the newest key comes to rest: its speed falls as exp(-t / carry)."""
 
+    twists: np.ndarray | None = None
+    """Of the keys, where the mode is `TWISTS`, shape (n, 6)."""
+
+    @cached_property
+    def _reach(self) -> Reach:
+        return reach_of(self.mode)
+
+    @property
+    def _behind(self) -> int:
+        """The keys of a window before the two of its segment: at least 1, for going on beyond the newest key."""
+        return max(self._reach.behind, 1)
+
     @cached_property
     def _arrivals(self) -> tuple[np.ndarray, np.ndarray]:
         """The moments at which keys become known, rising, and the newest key after each."""
@@ -55,8 +68,7 @@ class KnownKeys:
             The keys behind the segment, its two, those ahead; `NONE` where none is known or needed. Two windows that
             are equal stand for the same motion. `behind` is at least 1, for going on beyond the newest key.
         """
-        mode = MODES[self.mode]
-        behind = max(mode.behind, 1)
+        mode, behind = self._reach, self._behind
         windows = np.full((len(moments), behind + 2 + mode.ahead), NONE)
         arrived, newest_after = self._arrivals
         newest = np.append(newest_after, NONE)[np.searchsorted(arrived, now, side="right") - 1]
@@ -76,7 +88,7 @@ class KnownKeys:
 
     def segments(self, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The two keys in the middle of windows (m, .), of which either may be `NONE`, shape (m,) each."""
-        behind = windows.shape[1] - 2 - MODES[self.mode].ahead
+        behind = self._behind
         return windows[:, behind], windows[:, behind + 1]
 
     def nearest(self, moments: np.ndarray, windows: np.ndarray) -> np.ndarray:
@@ -103,16 +115,19 @@ class KnownKeys:
         def fill(rows: np.ndarray, poses: Poses) -> None:
             positions[rows], quaternions[rows] = poses.positions, poses.quaternions
 
-        behind = windows.shape[1] - 2 - MODES[self.mode].ahead
+        behind = self._behind
         first, second = self.segments(windows)
-        between = (first != NONE) & (second != NONE)
+        between_keys = (first != NONE) & (second != NONE)
         resting, going_on = np.flatnonzero(first == NONE), np.flatnonzero(second == NONE)
         fill(resting, self.poses[second[resting]])
         fill(going_on, self._beyond(moments[going_on], windows[going_on, behind - 1], first[going_on]))
+        if self.mode == TWISTS:
+            fill(np.flatnonzero(between_keys), self._smooth(moments, first, second, between_keys))
+            return Poses(positions, quaternions)
         # Windows of one shape, and of those the ones that come one after another, are worked out together.
         shapes = np.count_nonzero(windows[:, :behind] != NONE, axis=1), np.count_nonzero(windows != NONE, axis=1)
-        for before, keys in {*zip(*(shape[between].tolist() for shape in shapes), strict=True)}:
-            rows = np.flatnonzero(between & (shapes[0] == before) & (shapes[1] == keys))
+        for before, keys in {*zip(*(shape[between_keys].tolist() for shape in shapes), strict=True)}:
+            rows = np.flatnonzero(between_keys & (shapes[0] == before) & (shapes[1] == keys))
             own = windows[rows, behind - before : behind - before + keys]
             runs = np.flatnonzero(np.append(True, (own[1:] != own[:-1]).any(axis=1)))
             own, lengths = own[runs], np.diff(np.append(runs, len(rows)))
@@ -123,18 +138,23 @@ class KnownKeys:
             fill(rows, in_betweens(self.stamps[own], self.poses[own], counts, progress, self.mode))
         return Poses(positions, quaternions)
 
+    def _smooth(self, moments: np.ndarray, first: np.ndarray, second: np.ndarray, rows: np.ndarray) -> Poses:
+        """Between keys that have twists, at those of the moments (m,) that are chosen by `rows`, bool of shape (m,)."""
+        first, second = first[rows], second[rows]
+        durations = self.stamps[second] - self.stamps[first]
+        progress = (moments[rows] - self.stamps[first]) / durations
+        return between(
+            self.poses[first], self.poses[second], self.twists[first], self.twists[second], durations, progress
+        )
+
     def _beyond(self, moments: np.ndarray, before: np.ndarray, last: np.ndarray) -> Poses:
         """How the motion goes on after the keys `last` (m,), where it comes from keys `before` or from `NONE`."""
-        start, origin = self.poses[last], self.poses[np.where(before == NONE, last, before)]
+        start, passed = self.poses[last], moments - self.stamps[last]
+        going = self.carry * -np.expm1(-passed / self.carry) if self.carry > 0.0 else np.zeros_like(passed)
+        if self.mode == TWISTS:
+            return moved(start, self.twists[last].T * going)
+        origin = self.poses[np.where(before == NONE, last, before)]
         way = twists.between(origin.positions, origin.quaternions, start.positions, start.quaternions)
         # Keys that come sooner than agreed are not taken for a faster motion.
         duration = np.maximum(self.stamps[last] - self.stamps[np.where(before == NONE, last, before)], self.interval)
-        passed = moments - self.stamps[last]
-        going = self.carry * -np.expm1(-passed / self.carry) if self.carry > 0.0 else np.zeros_like(passed)
         return moved(start, way * (going / duration))
-
-
-def moved(poses: Poses, ways: np.ndarray) -> Poses:
-    """Poses (n,) after the motions of twists (6, n), in the bodies' own axes."""
-    turns, advances = twists.exponential(ways)
-    return Poses(poses.positions + rotate(poses.quaternions, advances.T), multiply(poses.quaternions, turns.T))

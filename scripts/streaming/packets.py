@@ -1,12 +1,15 @@
 """Packets: a pose on its way, with a number and the moment it belongs to, and the bytes that takes.
 
-A packet is a header of 12 bytes, the sequence number (uint32) and the time stamp in seconds (float64), and then the
-pose in its packing, all little-endian. The paper counts the poses alone; here the two are told apart. What a
-protocol puts around a packet (28 bytes for UDP over IPv4) is not counted.
+A packet is a header of 26 bytes, the pose in its packing, and in some streams its twist, all little-endian. The header
+has a checksum of all that follows it, so that a flipped bit costs the packet and nothing else; the stream, for several
+may come to one address; the sequence number; the time stamp of the pose, in seconds by the sender's clock; how many
+seconds later it was sent; and what kind of packet it is, in which packing. The paper counts the poses alone; here the
+two are told apart. What a protocol puts around a packet (28 bytes for UDP over IPv4) is not counted.
 """
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,10 +18,29 @@ import numpy as np
 
 from addon.motion import Poses
 
-from .packing import Packing
+from .packing import PACKINGS, Packing
 
-HEADER = np.dtype([("sequence", "<u4"), ("stamp", "<f8")])
+HEADER = np.dtype(
+    [
+        ("check", "<u4"),
+        ("stream", "<u4"),
+        ("sequence", "<u4"),
+        ("stamp", "<f8"),
+        ("age", "<f4"),
+        ("kind", "u1"),
+        ("packing", "u1"),
+    ]
+)
 """What goes before the pose."""
+
+KEY = 1
+"""The kind of a packet that has a pose, and nothing else."""
+
+TWISTED = 0x80
+"""Added to the number of a packing where twists follow the poses."""
+
+FORMAT = zlib.crc32(b"Rigid Motion 1")
+"""Where checksums begin: packets of other programs, and of another format, do not have one that fits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,16 +48,45 @@ class Packets:
     """n packets of one stream, in the order in which they were sent."""
 
     data: np.ndarray
-    """uint8, shape (n, 12 + packing.size)."""
+    """uint8, shape (n, 26 + packing.size), and with twists `packing.twist_size` more."""
 
     packing: Packing
 
     interval: float
-    """Seconds from one packet to the next, as sender and receiver agreed beforehand."""
+    """Seconds from one packet to the next, as sender and receiver agreed beforehand. Where packets come when they are
+    needed, a measure for what is soon and what is late."""
+
+    twisted: bool = False
+    """Whether there are twists."""
 
     @classmethod
-    def of(cls, times: np.ndarray, poses: Poses, interval: float, packing: Packing) -> Packets:
-        """Poses (n,) at rising times (n,) as packets, numbered from 0.
+    def of(
+        cls,
+        times: np.ndarray,
+        poses: Poses,
+        interval: float,
+        packing: Packing,
+        *,
+        twists: np.ndarray | None = None,
+        ages: np.ndarray | float = 0.0,
+        first: int = 0,
+        stream: int = 0,
+    ) -> Packets:
+        """Poses (n,) at rising times (n,) as packets.
+
+        Parameters
+        ----------
+        times : array, shape (n,)
+        poses : Poses, shape (n,)
+        interval : float
+        packing : Packing
+        twists : array, shape (n, 6), optional
+            In radians and units of the positions a second, along the body's own axes; see `addon.motion.twists`.
+        ages : array, shape (n,), or float
+            How much later each is sent.
+        first : int
+            The number of the first of them.
+        stream : int
 
         Raises
         ------
@@ -49,17 +100,22 @@ class Packets:
             raise ValueError(f"an interval of {interval} s between packets is not a positive number")
         if not (np.isfinite(times).all() and np.all(np.diff(times) > 0.0)):
             raise ValueError("the times of a stream need to be finite, and each later than the one before")
-        header = np.empty(len(times), dtype=HEADER)
-        header["sequence"], header["stamp"] = np.arange(len(times)), times
-        front = header.view(np.uint8).reshape(len(times), HEADER.itemsize)
-        return cls(np.concatenate((front, packing.pack(poses)), axis=-1), packing, float(interval))
+        header = np.zeros(len(times), dtype=HEADER)
+        header["sequence"], header["stamp"], header["age"] = first + np.arange(len(times)), times, ages
+        header["stream"], header["kind"] = stream, KEY
+        header["packing"] = list(PACKINGS.values()).index(packing) if packing in PACKINGS.values() else len(PACKINGS)
+        parts = [header.view(np.uint8).reshape(len(times), HEADER.itemsize), packing.pack(poses)]
+        if twists is not None:
+            header["packing"] |= TWISTED
+            parts.append(packing.pack_twists(twists))
+        return cls(sealed(np.concatenate(parts, axis=-1)), packing, float(interval), twists is not None)
 
     def __len__(self) -> int:
         return len(self.data)
 
     def __getitem__(self, index: Any) -> Packets:
         """Some of the packets, by NumPy's rules: a slice, a mask, or indices, of which some may come again."""
-        return Packets(self.data[index], self.packing, self.interval)
+        return Packets(self.data[index], self.packing, self.interval, self.twisted)
 
     @cached_property
     def _headers(self) -> np.ndarray:
@@ -75,20 +131,51 @@ class Packets:
         """The moments that the poses belong to, by the sender's clock: seconds, shape (n,)."""
         return self._headers["stamp"].astype(np.float64)
 
+    @property
+    def sent(self) -> np.ndarray:
+        """When they were sent, by the sender's clock: seconds, shape (n,)."""
+        with np.errstate(invalid="ignore"):  # Bytes that nobody packed may be signalling NaNs.
+            return self.stamps + self._headers["age"].astype(np.float64)
+
     @cached_property
     def poses(self) -> Poses:
         """What the receiver reads from the bytes, shape (n,)."""
-        return self.packing.unpack(self.data[:, HEADER.itemsize :])
+        return self.packing.unpack(self.data[:, HEADER.itemsize :][:, : self.packing.size])
+
+    @cached_property
+    def twists(self) -> np.ndarray | None:
+        """The twists that it reads, shape (n, 6)."""
+        return self.packing.unpack_twists(self.data[:, HEADER.itemsize + self.packing.size :]) if self.twisted else None
+
+    @property
+    def are_whole(self) -> np.ndarray:
+        """Whether their checksums fit, shape (n,)."""
+        return checksums(self.data) == self._headers["check"]
 
     @property
     def pose_bytes(self) -> int:
-        """Bytes of the poses, headers not counted."""
-        return len(self) * self.packing.size
+        """Bytes of the poses and their twists, headers not counted."""
+        return self.data.size - self.header_bytes
 
     @property
     def header_bytes(self) -> int:
         """Bytes of the headers."""
-        return self.data.size - self.pose_bytes
+        return len(self) * HEADER.itemsize
+
+
+def checksums(data: np.ndarray) -> np.ndarray:
+    """The checksums that packets (n, bytes) need, uint32 of shape (n,)."""
+    bytes_, size = np.ascontiguousarray(data).tobytes(), data.shape[1]
+    begins = range(HEADER["check"].itemsize, len(bytes_), size)
+    rest = size - HEADER["check"].itemsize
+    return np.fromiter((zlib.crc32(bytes_[at : at + rest], FORMAT) for at in begins), np.uint32, len(data))
+
+
+def sealed(data: np.ndarray) -> np.ndarray:
+    """Packets (n, bytes) with the checksums that they need."""
+    data = np.ascontiguousarray(data).copy()
+    data[:, : HEADER["check"].itemsize] = checksums(data).astype("<u4")[:, None].view(np.uint8)
+    return data
 
 
 def bandwidth(packets: Packets, users: int = 1, *, headers: bool = False) -> float:

@@ -49,6 +49,26 @@ class Packing:
     bounds: Callable[[Poses], tuple[np.ndarray, np.ndarray]]
     """The largest error of each of n poses: of the position, a distance, and of the rotation, radians; (n,) each."""
 
+    twist_kind: str
+    """The six numbers of a twist, as NumPy calls them."""
+
+    @property
+    def twist_size(self) -> int:
+        """Bytes a twist."""
+        return 6 * np.dtype(self.twist_kind).itemsize
+
+    def pack_twists(self, twists: np.ndarray) -> np.ndarray:
+        """From twists (n, 6) to bytes, uint8 of shape (n, twist_size). Raises ValueError for the first too fast."""
+        twists = np.asarray(twists, dtype=np.float64)
+        largest = float(np.finfo(self.twist_kind).max)
+        _require(np.abs(twists).max(axis=-1, initial=0.0) <= largest, f"has a number beyond {largest:g}", "twist")
+        return np.ascontiguousarray(twists.astype(self.twist_kind)).view(np.uint8).reshape(len(twists), -1)
+
+    def unpack_twists(self, data: np.ndarray) -> np.ndarray:
+        """Back, from bytes (n, twist_size) to twists (n, 6)."""
+        with np.errstate(invalid="ignore"):
+            return np.ascontiguousarray(data).view(self.twist_kind).astype(np.float64).reshape(len(data), 6)
+
 
 def _floats(label: str, kind: str) -> Packing:
     """Seven floating-point numbers, x, y, z, w, x, y, z, as they are."""
@@ -75,7 +95,7 @@ def _floats(label: str, kind: str) -> Packing:
         distances = lost * np.linalg.norm(poses.positions, axis=-1) * (1.0 + ROUNDING) + least
         return distances, np.full(len(poses), 2.0 * np.arcsin(lost) * (1.0 + ROUNDING))
 
-    return Packing(label, 7 * number.itemsize, pack, unpack, bounds)
+    return Packing(label, 7 * number.itemsize, pack, unpack, bounds, kind)
 
 
 def smallest_three(low: ArrayLike, high: ArrayLike) -> Packing:
@@ -166,7 +186,7 @@ def smallest_three(low: ArrayLike, high: ArrayLike) -> Packing:
         angle = 2.0 * np.sqrt(3.0) * d / np.sqrt(0.25 - 3.0 * d - 3.0 * d * d) + ROUNDING
         return np.full(len(poses), distance), np.full(len(poses), angle)
 
-    return Packing("Smallest three", 14, pack, unpack, bounds)
+    return Packing("Smallest three", 14, pack, unpack, bounds, "<f2")
 
 
 PACKINGS: dict[str, Packing] = {
@@ -193,6 +213,6 @@ def _require_sendable(poses: Poses) -> None:
     _require(poses.quaternions.any(axis=-1), "has a quaternion of length zero")
 
 
-def _require(good: np.ndarray, complaint: str) -> None:
+def _require(good: np.ndarray, complaint: str, of: str = "pose") -> None:
     if not good.all():
-        raise ValueError(f"pose {np.flatnonzero(~good)[0]} {complaint}")
+        raise ValueError(f"{of} {np.flatnonzero(~good)[0]} {complaint}")

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from addon.motion import Poses
-from addon.motion.modes import mode_named
 from addon.motion.quaternions import align_signs, normalise
 
 from .admission import CLOCK, admit, is_sound, missing
@@ -25,6 +24,7 @@ from .events import Event, What
 from .fading import Jumps, fade
 from .known_keys import NONE, KnownKeys
 from .packets import Packets
+from .smooth import TWISTS, reach_of
 
 LONGEST_FADE = 2.0
 """Seconds that a difference fades at the most: after a long silence the picture is not to lag behind for as long again.
@@ -56,7 +56,7 @@ class PlayOut:
     looks ahead: as little as will do where nothing is ever late."""
 
     latency: float | None = None
-    """Seconds from a packet's stamp to its arrival that are counted on. None: what the first to arrive took."""
+    """Seconds from a packet being sent to its arrival that are counted on. None: what the first to arrive took."""
 
     carry: float = 0.3
     """Seconds within which a motion dies down that gets no more packets: how long a hand goes on as it goes, whatever
@@ -128,7 +128,8 @@ def receive(
     display_times : array-like, shape (m,)
         Of the frames, not falling.
     mode : str
-        A key of `addon.motion.MODES`: any, for only how far it looks behind and ahead makes a difference here.
+        A key of `addon.motion.MODES`: any, for only how far it looks behind and ahead makes a difference here. `TWISTS`
+        where the packets have twists.
     play_out : PlayOut
 
     Returns
@@ -142,9 +143,9 @@ def receive(
     ValueError
         For an unknown mode, shapes that do not fit, and times that are no numbers or fall.
     """
-    play_out, ahead = play_out or PlayOut(), mode_named(mode).ahead
+    play_out, ahead = play_out or PlayOut(), reach_of(mode).ahead
     arrivals, display_times = np.asarray(arrivals, np.float64), np.asarray(display_times, np.float64)
-    _check(packets, arrivals, display_times)
+    _check(packets, arrivals, display_times, mode)
     # What arrives after the last frame has no say in any.
     end = display_times.max(initial=-np.inf) + CLOCK
     order = np.argsort(arrivals, kind="stable")
@@ -164,6 +165,7 @@ def receive(
         mode,
         packets.interval,
         play_out.carry,
+        packets.twists[rows] if packets.twisted else None,
     )
     times = display_times[np.searchsorted(display_times, keys.known_from.min()) :]
     moments = times - delay
@@ -182,8 +184,11 @@ def receive(
     return Playback(times, Poses(poses.positions, align_signs(poses.quaternions)), delay, ran_out, tuple(events))
 
 
-def _check(packets: Packets, arrivals: np.ndarray, display_times: np.ndarray) -> None:
+def _check(packets: Packets, arrivals: np.ndarray, display_times: np.ndarray, mode: str) -> None:
     """Raise a ValueError that says what is wrong with what `receive` was given."""
+    if packets.twisted != (mode == TWISTS):
+        has = "have" if packets.twisted else "have no"
+        raise ValueError(f"these packets {has} twists, for which {mode} is not meant; {TWISTS} is what twists take")
     if arrivals.shape != (len(packets),):
         raise ValueError(f"arrivals of shape {arrivals.shape} do not fit {len(packets)} packets")
     if not (arrivals > -np.inf).all():
@@ -197,7 +202,7 @@ def _delay(packets: Packets, arrivals: np.ndarray, sound: np.ndarray, lead: floa
     if not sound.any():
         return np.inf
     first = np.argmax(sound)
-    latency = float(arrivals[first] - packets.stamps[first]) if play_out.latency is None else play_out.latency
+    latency = float(arrivals[first] - packets.sent[first]) if play_out.latency is None else play_out.latency
     return latency + (lead if play_out.wait is None else play_out.wait * packets.interval)
 
 
@@ -213,13 +218,17 @@ def _without_jumps(
     known_next = keys.windows(moments[:-1], times[1:])
     before = np.flatnonzero((known_next != windows[:-1]).any(axis=1))
     old, new = path[before], keys.poses_at(moments[before], known_next[before])
-    since = np.maximum(keys.nearest(moments[before], windows[before]), keys.interval)
-    durations = np.minimum(intervals * since, max(LONGEST_FADE, intervals * keys.interval))
+    durations = fade_durations(keys.nearest(moments[before], windows[before]), keys.interval, intervals)
     jumps = Jumps.between(times[before], durations, old, new)
     distances = np.linalg.norm(jumps.offsets, axis=-1)
     news = np.maximum(distances, jumps.half_angles) > SETTLED
     notes = (times[before + 1], np.max(keys.segments(windows[before + 1]), axis=0), distances)
     return fade(times, path, jumps), list(zip(*(note[news].tolist() for note in notes), strict=True))
+
+
+def fade_durations(nearest: np.ndarray, interval: float, intervals: float) -> np.ndarray:
+    """How long differences fade (c,), of a path that was so far from a key (c,): see `PlayOut.fade`."""
+    return np.minimum(intervals * np.maximum(nearest, interval), max(LONGEST_FADE, intervals * interval))
 
 
 def _runs(times: np.ndarray, flags: np.ndarray) -> list[tuple[float, int, float]]:

@@ -52,7 +52,7 @@ def test_lost_packets_never_arrive():
 
 
 def test_a_line_with_room_adds_the_time_of_the_bytes():
-    assert arrivals(rate_limit=68 / 0.01) == pytest.approx(SENT + 0.01)
+    assert arrivals(rate_limit=(26 + 56) / 0.01) == pytest.approx(SENT + 0.01)
 
 
 def test_a_line_without_room_lets_the_queue_grow():
@@ -74,7 +74,7 @@ def test_what_is_lost_was_on_the_line():
 
 def test_headers_take_room_on_the_line():
     packets = send(*swinging(), 20.0)
-    found = Link(rate_limit=68 / 0.01).carry(packets, np.random.default_rng(0))
+    found = Link(rate_limit=(26 + 56) / 0.01).carry(packets, np.random.default_rng(0))
     assert found == pytest.approx(packets.stamps + 0.01)
 
 

@@ -23,15 +23,15 @@ def test_twenty_poses_of_seven_doubles_are_1120_bytes():
     second = send(*swinging(seconds=1.0), 20.0)[1:]
     assert len(second) == 20
     assert second.pose_bytes == 1120
-    assert second.header_bytes == 240
-    assert second.data.nbytes == 1360
+    assert second.header_bytes == 520
+    assert second.data.nbytes == 1640
 
 
 @pytest.mark.parametrize(("packing", "size"), [("double", 56), ("single", 28), ("smallest_three", 14)])
 def test_headers_are_counted_apart(packing, size):
     packets = send(*swinging(), 20.0, PACKINGS[packing])
     assert bandwidth(packets) == pytest.approx(20.0 * size)
-    assert bandwidth(packets, headers=True) == pytest.approx(20.0 * (size + 12))
+    assert bandwidth(packets, headers=True) == pytest.approx(20.0 * (size + 26))
 
 
 def test_a_single_packet_has_no_bandwidth():

@@ -11,6 +11,7 @@ from addon.motion import MODES, Poses, interpolate, rms, shell_error
 from addon.motion.quaternions import angle_between
 from scripts.comparison.study.clips import Clip
 from scripts.streaming import PACKINGS, Link, Packets, Playback, PlayOut, What, receive, send
+from scripts.streaming.packets import HEADER, sealed
 from tests.scripts.streaming.motions import FRAME, SOURCES, clips, swinging
 from tests.thoroughness import sample, tried
 
@@ -338,12 +339,12 @@ def test_all_at_once_is_no_division_by_zero(mode):
 
 
 def spoiled(packets: Packets, row: int, change: dict[str, float]) -> Packets:
-    """The packets with other numbers in one of them."""
+    """The packets with other numbers in one of them, and checksums that fit."""
     data = packets.data.copy()
-    layout = np.dtype([("sequence", "<u4"), ("stamp", "<f8"), ("x", "<f8", 3), ("w", "<f8", 4)])
+    layout = np.dtype([*HEADER.descr, ("x", "<f8", 3), ("w", "<f8", 4)])
     for name, value in change.items():
         data[row].view(layout)[name] = value
-    return Packets(data, packets.packing, packets.interval)
+    return Packets(sealed(data), packets.packing, packets.interval)
 
 
 @every_mode
@@ -375,7 +376,7 @@ def test_bytes_that_nobody_packed_do_no_harm(seed, mode, packing):
     data = sound.data.copy()
     hit = random.random(len(data)) < 0.3
     data[hit] = random.integers(0, 256, (np.count_nonzero(hit), data.shape[1]), dtype=np.uint8)
-    playback = receive(Packets(data, sound.packing, sound.interval), sound.stamps, DISPLAY, mode)
+    playback = receive(Packets(sealed(data), sound.packing, sound.interval), sound.stamps, DISPLAY, mode)
     assert np.isfinite(playback.poses.positions).all()
     assert np.linalg.norm(playback.poses.quaternions, axis=-1) == pytest.approx(1.0)
 
