@@ -66,8 +66,12 @@ class PlayOut:
     """Update intervals, at least, in which a difference fades. Where the path has been further than one interval from
     a key that was known, so many times as long, but not more than `LONGEST_FADE`."""
 
+    lead: float | None = None
+    """Update intervals before the play-out gets to a packet: what arrives later than this is late. None: 1, and 1 more
+    for each key that the mode looks ahead. 0 where packets come when they are needed, and not at even intervals."""
+
     def __post_init__(self) -> None:
-        for name in ("wait", "carry", "fade"):
+        for name in ("wait", "carry", "fade", "lead"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value >= 0.0):
                 raise ValueError(f"play-out with a {name} of {value}: give a number from 0 on")
@@ -153,7 +157,8 @@ def receive(
     packets, arrivals, sound = packets[order], arrivals[order], is_sound(packets[order])
     lead = (1.0 + ahead) * packets.interval
     delay = _delay(packets, arrivals, sound, lead, play_out)
-    rows, events = admit(packets, arrivals, sound, delay, lead)
+    late = lead if play_out.lead is None else play_out.lead * packets.interval
+    rows, events = admit(packets, arrivals, sound, delay, late)
     if not len(rows):
         empty = Poses(np.empty((0, 3)), np.empty((0, 4)))
         return Playback(display_times[:0], empty, delay, np.empty(0, dtype=bool), tuple(events))

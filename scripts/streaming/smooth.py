@@ -18,7 +18,7 @@ from addon.motion.quaternions import multiply, rotate
 TWISTS = "motor_twists"
 """What fills in between keys that have twists, where a mode has a name."""
 
-LEAST = 4
+LEAST = 3
 """Samples that a parabola is put through by least squares, at least."""
 
 
