@@ -27,8 +27,8 @@ from scripts.command_line import own_arguments
 from scripts.files import write_text, written_beside
 from scripts.paper.bodies import body_files
 from scripts.paper.motions import recordings_in
-from scripts.paper.page import with_bodies
-from scripts.paper.steps import PAGE, SECTION, plan, plan_bodies
+from scripts.paper.page import with_section
+from scripts.paper.steps import PAGE, SECTIONS, plan, plan_bodies, plan_sending
 from scripts.paper.timing import ROUNDS
 from scripts.progress import Progress
 from scripts.trajectories import TrajectoryError
@@ -49,13 +49,15 @@ examples:
   python scripts/reproduce_paper.py --recordings ../recordings --docs
   python scripts/reproduce_paper.py --recordings ../recordings --bodies ../rigs run.fbx
   python scripts/reproduce_paper.py --bodies ../rigs --only-bodies --docs
+  python scripts/reproduce_paper.py --recordings ../recordings --only-sending --docs
   python scripts/reproduce_paper.py --no-video --output /tmp/paper
   blender --background --python scripts/reproduce_paper.py -- --no-pictures
 
 It writes OUTPUT/paper.md, the page, with its pictures in OUTPUT/paper/, and every number of it in OUTPUT/*.csv. What is
 done is not done again: after Ctrl-C, or with more recordings, the same call goes on. A second run gives the same
 numbers, those of timing.csv aside. With --only-bodies it writes the section on whole bodies alone, OUTPUT/bodies.md,
-which --docs puts into the page there; its other sections stay. The last line it prints is the path of the page.
+and with --only-sending that on live streams, OUTPUT/sending.md, which take the longest; --docs puts the section into
+the page there, and its other sections stay. The last line it prints is the path of the page.
 Exit code: 0 done, 1 a part of it failed (the page holds the others), 2 a wrong input or option, 130 stopped by Ctrl-C.
 """
 
@@ -72,7 +74,15 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them, to study"
     )
-    parser.add_argument("--only-bodies", action="store_true", help="the section on whole bodies, and nothing else")
+    alone = parser.add_mutually_exclusive_group()
+    for section, what in (("bodies", "whole bodies"), ("sending", "streams that are sent when needed")):
+        alone.add_argument(
+            f"--only-{section}",
+            dest="only",
+            action="store_const",
+            const=section,
+            help=f"the section on {what}, and nothing else",
+        )
     parser.add_argument(
         "--output", type=Path, default=ROOT / "renders" / "paper", help="folder to write to (renders/paper)"
     )
@@ -94,21 +104,21 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def main(arguments: list[str]) -> int:
     """Reproduce the paper, and return the exit code."""
     options = parse(arguments)
-    missing = None if options.no_pictures or options.only_bodies else missing_for_rendering()
+    missing = None if options.no_pictures or options.only else missing_for_rendering()
     if missing:
         print(f"reproduce_paper.py: {way_out(missing)}\nOr go without pictures: --no-pictures", file=sys.stderr)
         return 2
     try:
         work = _plan(options)
-        if options.only_bodies and options.docs and not (options.docs / PAGE).is_file():
+        if options.only and options.docs and not (options.docs / PAGE).is_file():
             raise ValueError(f"{options.docs / PAGE}: there is no page to put the section into; leave --docs out")
         with Workspace(options.output) as workspace, Progress() as progress, SerialExecutor() as executor:
             outcome = run(work, workspace, executor, force=options.force, progress=progress, title="Reproducing")
-        page = options.output / (SECTION if options.only_bodies else PAGE)
+        page = options.output / SECTIONS.get(options.only, PAGE)
         if options.docs and outcome.states[work.order[-1]].there:
-            if options.only_bodies:
+            if options.only:
                 section, whole = page.read_text(encoding="utf-8"), (options.docs / PAGE).read_text(encoding="utf-8")
-                write_text(options.docs / PAGE, with_bodies(whole, section))
+                write_text(options.docs / PAGE, with_section(whole, section))
             else:
                 copy_page(work, outcome, options.output, options.docs)
             page = options.docs / PAGE
@@ -141,10 +151,13 @@ def _plan(options: argparse.Namespace) -> Plan:
     recordings = recordings_in(options.recordings) if options.recordings else []
     bodies = body_files(options.bodies)
     version = f"{code_version(*CODE)} Blender {bpy.app.version_string} NumPy {np.__version__}"
-    if options.only_bodies:
+    own = sorted(assets.glob("*.csv"))
+    if options.only == "bodies":
         return plan_bodies(recordings, bodies, version=version)
+    if options.only == "sending":
+        return plan_sending(own, recordings, version=version)
     return plan(
-        sorted(assets.glob("*.csv")),
+        own,
         recordings,
         bodies,
         pictures=not options.no_pictures,

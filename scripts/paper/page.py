@@ -13,9 +13,8 @@ from addon.motion import MODES
 from scripts.comparison.report.findings import listed
 from scripts.comparison.study.modes import REFERENCE
 
-from . import claims, strips, triangle
+from . import bodies_section, claims, sending_section, strips, triangle
 from .bandwidths import Bandwidth
-from .bodies_section import HEADING, bodies_section
 from .bows import SCREW
 from .catching import LINK
 from .results import Results
@@ -28,8 +27,14 @@ BLEND = "pga_lerp"
 
 SPLINES = ("motor_spline", "motor_spline_causal")
 
-AFTER_BODIES = ("## Running time", "## Bytes", "## Files")
-"""Headings of sections that come after that on bodies."""
+LAST = ("## Running time", "## Bytes", "## Files")
+"""Headings of the sections that come last."""
+
+AFTER = {
+    sending_section.HEADING: ("## Why a screw wins here and loses there", bodies_section.HEADING, *LAST),
+    bodies_section.HEADING: LAST,
+}
+"""Of sections that may be written alone, the headings that may come after them."""
 
 WHAT_ASSETS_ARE = {
     "pivot": "a tool turned about its resting tip",
@@ -51,8 +56,9 @@ def write_page(found: Results) -> str:
         _table(found),
         _clip_by_clip(found),
         _look_ahead(found),
+        sending_section.sending_section(found.sending, found.sets),
         _bows(found),
-        bodies_section(found.of_bodies),
+        bodies_section.bodies_section(found.of_bodies),
         _running_time(found),
         _bandwidth(found),
         _files(found),
@@ -60,14 +66,15 @@ def write_page(found: Results) -> str:
     return "\n".join(line for section in sections if section for line in [*section, ""]).rstrip() + "\n"
 
 
-def with_bodies(page: str, section: str) -> str:
-    """A page with this section on bodies instead of its own, or where it belongs; the rest stays as it is."""
-    before, heading, after = f"\n{page}".partition(f"\n{HEADING}\n")
-    if heading:
+def with_section(page: str, section: str) -> str:
+    """A page with this section instead of its own of that heading, or where it belongs; the rest stays as it is."""
+    heading = section.partition("\n")[0]
+    before, found, after = f"\n{page}".partition(f"\n{heading}\n")
+    if found:
         _, following, rest = after.partition("\n## ")
         rest = following + rest
     else:
-        places = [place for name in AFTER_BODIES if (place := before.find(f"\n{name}\n")) >= 0]
+        places = [place for name in AFTER[heading] if (place := before.find(f"\n{name}\n")) >= 0]
         place = min(places, default=len(before))
         before, rest = before[:place], before[place:]
     return "\n\n".join(part.strip("\n") for part in (before, section, rest) if part.strip("\n")) + "\n"
@@ -126,6 +133,7 @@ def _in_short(found: Results) -> list[str]:
                 f"- `{mode}` with keys where it needs them, which takes the whole recording: {less(saved)}. "
                 f"{verdict(saved)}"
             )
+    lines += sending_section.in_short(found.sending, found.sets[0])
     blend = found.timing(FAST, EQUAL, BLEND)
     if blend:
         lines.append(

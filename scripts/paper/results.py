@@ -16,6 +16,7 @@ from .bodies_section import BodyResults
 from .bows import Bow
 from .catching import View
 from .motions import ASSETS, RECORDINGS, Motion
+from .sending import SentNeeded
 from .table import UNIFORM, YARDSTICKS, LookAhead, Needed
 from .timing import Timing
 
@@ -38,6 +39,7 @@ class Results:
     """Those that there are, as paths below the folder."""
 
     of_bodies: BodyResults = field(default_factory=BodyResults)
+    sending: list[SentNeeded] = field(default_factory=list)
 
     @classmethod
     def read(cls, folder: Path, there: Iterable[str]) -> Results:
@@ -60,6 +62,7 @@ class Results:
             instants=rows("strips.csv", strips.Instant),
             pictures=frozenset(name for name in files if name.endswith((".png", ".svg", ".mp4"))),
             of_bodies=BodyResults.read(folder, files),
+            sending=rows("sending.csv", SentNeeded),
         )
 
     @property

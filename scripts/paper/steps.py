@@ -24,7 +24,21 @@ from scripts.files import write_text
 from scripts.rows import read_rows, write_rows
 from scripts.workplan import Job, Plan, Task, step
 
-from . import bodies, bodies_section, body_steps, bows, catching, engines, strips, table, timing, triangle
+from . import (
+    bodies,
+    bodies_section,
+    body_steps,
+    bows,
+    catching,
+    engines,
+    sending,
+    sending_section,
+    sending_steps,
+    strips,
+    table,
+    timing,
+    triangle,
+)
 from .bandwidths import Bandwidth, bandwidths
 from .motions import ASSETS, RECORDINGS, Motion, read_motion
 from .page import write_page
@@ -35,8 +49,8 @@ ADAPTIVE = (REFERENCE, "motor_spline")
 
 PAGE = "paper.md"
 
-SECTION = "bodies.md"
-"""The section on bodies alone."""
+SECTIONS = {"bodies": "bodies.md", "sending": "sending.md"}
+"""The sections that may be written alone, and the files that they are written to."""
 
 ALL = "all clips"
 
@@ -76,8 +90,7 @@ def plan(
     for wanted in ("reach", "throw"):
         if wanted not in asset:
             raise ValueError(f"{wanted}.csv is not among the assets; python assets/make_assets.py makes it")
-    files = [(path, ASSETS) for path in assets] + [(path, RECORDINGS) for path in recordings]
-    names = folder_names(path.stem for path, _ in files)
+    files, names = _clips(assets, recordings)
     tasks = [_measuring(name, path, of) for name, (path, of) in zip(names, files, strict=True)]
     measuring = tuple(task.name for task in tasks)
     tables = ("table.csv", "errors.csv", "bows.csv", "look_ahead.csv", "clips.csv", "run.json")
@@ -110,11 +123,10 @@ def plan(
         tasks.append(
             _task("catching, a film", "film_catching", outputs, ("catching",), source=asset["throw"], weight=90.0)
         )
-    studied = _studying(recordings, bodies)
-    tasks += studied
-    before = {
-        task.name: tuple(task.outputs) for task in tasks if task.name not in measuring and task not in studied[:-1]
-    }
+    studied, sent = _studying(recordings, bodies), _sending(assets, recordings)
+    tasks += [*sent, *studied]
+    partly = [*sent[:-1], *studied[:-1]]
+    before = {task.name: tuple(task.outputs) for task in tasks if task.name not in measuring and task not in partly}
     tasks.append(_task("page", "write", (PAGE,), tuple(before), arguments={"files": before}, partial=True))
     return _planned(tasks, version)
 
@@ -130,13 +142,53 @@ def plan_bodies(recordings: Sequence[Path], bodies: Sequence[Path], *, version: 
     tasks = _studying(recordings, bodies)
     if not tasks:
         raise ValueError("there is no whole body to study; give --bodies FILE_OR_FOLDER")
-    return _planned([*tasks, _task("section", "write_section", (SECTION,), (tasks[-1].name,))], version)
+    return _planned([*tasks, _writing("bodies", tasks[-1])], version)
+
+
+def plan_sending(assets: Sequence[Path], recordings: Sequence[Path], *, version: str) -> Plan:
+    """What is to be done for the section on streams that are sent when needed alone; as in `plan`."""
+    tasks = _sending(assets, recordings)
+    return _planned([*tasks, _writing("sending", tasks[-1])], version)
+
+
+def _writing(section: str, after: Task) -> Task:
+    return _task("section", "write_section", (SECTIONS[section],), (after.name,), arguments={"section": section})
 
 
 def _planned(tasks: Sequence[Task], version: str) -> Plan:
-    # The key poses of a body take minutes: they are counted again where what they use has changed, and nothing else.
-    slow = {task.function for task in tasks if task.function.startswith(body_steps.__name__)}
+    # These take minutes: they are done again where what they use has changed, and nothing else.
+    modules = (body_steps.__name__, sending_steps.__name__)
+    slow = {task.function for task in tasks if task.function.startswith(modules)}
     return Plan(tasks, version, versions=step_versions(sorted(slow)))
+
+
+def _clips(assets: Sequence[Path], recordings: Sequence[Path]) -> tuple[list[tuple[Path, str]], list[str]]:
+    """All files with the sets that they are of, and the names of their clips."""
+    files = [(path, ASSETS) for path in assets] + [(path, RECORDINGS) for path in recordings]
+    return files, folder_names(path.stem for path, _ in files)
+
+
+def _sending(assets: Sequence[Path], recordings: Sequence[Path]) -> list[Task]:
+    """The tasks of a study of streams that are sent when needed, the last of which brings them together."""
+    files, names = _clips(assets, recordings)
+    tasks = [
+        _task(
+            f"sending {name}",
+            "measure_sending",
+            tuple(f"sending/{name}/{part}" for part in ("clip.csv", "even.csv", "sent.csv")),
+            source=str(path),
+            arguments={"name": name, "of": of},
+            module=sending_steps.__name__,
+            weight=1.0 + path.stat().st_size / 1000.0,
+        )
+        for name, (path, of) in zip(names, files, strict=True)
+    ]
+    before = tuple(task.name for task in tasks)
+    outputs = ("sent.csv", "sending.csv")
+    gathering = _task(
+        "sending", "gather_sending", outputs, before, arguments={"names": names}, module=sending_steps.__name__
+    )
+    return [*tasks, gathering]
 
 
 def _studying(recordings: Sequence[Path], wanted: Sequence[Path]) -> list[Task]:
@@ -340,10 +392,15 @@ def write(job: Job, *, files: dict[str, list[str]]) -> None:
 
 
 @step
-def write_section(job: Job) -> None:
-    """The section on bodies alone."""
-    found = bodies_section.BodyResults.read(job.output, bodies.FILES)
-    write_text(job.writes(SECTION), "\n".join([*bodies_section.bodies_section(found), ""]))
+def write_section(job: Job, *, section: str) -> None:
+    """A section alone."""
+    if section == "bodies":
+        lines = bodies_section.bodies_section(bodies_section.BodyResults.read(job.output, bodies.FILES))
+    else:
+        lines = sending_section.sending_section(
+            read_rows(job.reads("sending.csv"), sending.SentNeeded), (RECORDINGS, ASSETS)
+        )
+    write_text(job.writes(SECTIONS[section]), "\n".join([*lines, ""]))
 
 
 def _asset(source: str) -> Clip:

@@ -120,9 +120,11 @@ class KnownKeys:
         between_keys = (first != NONE) & (second != NONE)
         resting, going_on = np.flatnonzero(first == NONE), np.flatnonzero(second == NONE)
         fill(resting, self.poses[second[resting]])
-        fill(going_on, self._beyond(moments[going_on], windows[going_on, behind - 1], first[going_on]))
+        if len(going_on):
+            fill(going_on, self._beyond(moments[going_on], windows[going_on, behind - 1], first[going_on]))
         if self.mode == TWISTS:
-            fill(np.flatnonzero(between_keys), self._smooth(moments, first, second, between_keys))
+            if between_keys.any():
+                fill(np.flatnonzero(between_keys), self._smooth(moments, first, second, between_keys))
             return Poses(positions, quaternions)
         # Windows of one shape, and of those the ones that come one after another, are worked out together.
         shapes = np.count_nonzero(windows[:, :behind] != NONE, axis=1), np.count_nonzero(windows != NONE, axis=1)

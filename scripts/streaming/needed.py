@@ -34,6 +34,9 @@ is no need to be slow about it."""
 AROUND = 0.25
 """A twist is that of the samples within this part of the delay: see `smooth.fitted`."""
 
+FIRST = 12
+"""So many samples are tried first; then those between the furthest that will do and the next of them."""
+
 LOOKED_AT = 64
 """Samples that are looked at together for the first that is off."""
 
@@ -56,6 +59,23 @@ class Key:
 
     sent: float
     """When it is sent."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """A key that may be sent next."""
+
+    sample: int
+    """Whose moment it has."""
+
+    pose: Poses
+    """Shape (1,)."""
+
+    twist: np.ndarray | None
+    """Shape (1, 6)."""
+
+    jump: Jumps
+    """What fades at the receiver when it gets there: one."""
 
 
 class NeededSender:
@@ -174,10 +194,25 @@ class NeededSender:
     def _needed(self, here: int, now: float) -> Key:
         """Send the key that carries furthest, now that the play-out is at a sample after which it is off."""
         last = int(np.searchsorted(self._times, now + SAME * self._delay, side="right")) - 1
-        choices = np.arange(here + 1, last + 1)
-        poses, twists = self._as_read(*fitted(self._times, self._poses, choices, choices[-1], AROUND * self._delay))
-        # Of every choice, the samples up to it from the last that is shown without it.
+        # The last sample that is shown without it.
         before = max(here - 1, int(np.searchsorted(self._times, self._known.stamps[-1])), 0)
+        apart = max((last - here) // FIRST, 1)
+        few = np.arange(last, here, -apart)[::-1]
+        best = self._furthest(before, few, last)
+        nearer, further = (best.sample + 1, best.sample + apart) if best else (here + 1, int(few[0]))
+        best = self._furthest(before, np.arange(nearer, min(further, last + 1)), last) or best
+        # Where the body itself jumps none will do, and the next sample is as good as can be.
+        best = best or self._furthest(before, np.array([here + 1]), last, within=np.inf)
+        self._jumps = _joined(self._still_fading(before), best.jump)
+        self._shown = best.sample + 1
+        return self._send(float(self._times[best.sample]), best.pose, best.twist, now)
+
+    def _furthest(self, before: int, choices: np.ndarray, last: int, within: float | None = None) -> _Choice | None:
+        """Of samples (c,) that could be the next key, the last with which all after `before` are shown well enough."""
+        if not len(choices):
+            return None
+        poses, twists = self._as_read(*fitted(self._times, self._poses, choices, last, AROUND * self._delay))
+        # Of every choice the samples up to it, and the one before as what is shown goes on from there.
         counts = choices - before + 1
         choice = np.repeat(np.arange(len(choices)), counts)
         begins = np.cumsum(counts) - counts
@@ -188,17 +223,11 @@ class NeededSender:
         jumps = self._jumps_to(before, path[begins])
         shown = _faded_each(self._times[rows], path, choice, jumps, self._still_fading(before))
         off = np.where(rows == before, 0.0, self._errors(shown, rows))
-        within = np.flatnonzero(np.maximum.reduceat(off, begins) <= self._tolerance)
-        # Where the body itself jumps none will do.
-        best = int(within[-1]) if len(within) else 0
-        self._jumps = _joined(self._still_fading(before), _some(jumps, [best]))
-        self._shown = int(choices[best]) + 1
-        return self._send(
-            float(self._times[choices[best]]),
-            poses[[best]],
-            None if twists is None else twists[[best]],
-            now,
-        )
+        good = np.maximum.reduceat(off, begins) <= (self._tolerance if within is None else within)
+        if not good.any():
+            return None
+        best = [int(np.flatnonzero(good)[-1])]
+        return _Choice(int(choices[best[0]]), poses[best], None if twists is None else twists[best], _some(jumps, best))
 
     def _send(self, stamp: float, pose: Poses, twist: np.ndarray | None, sent: float) -> Key:
         """Count a key among those that the receivers know."""

@@ -10,7 +10,8 @@ import pytest
 
 from addon.motion import MODES
 from scripts import reproduce_paper
-from scripts.paper import steps, table, timing
+from scripts.paper import sending, steps, table, timing
+from scripts.streaming import TWISTS
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
@@ -40,6 +41,9 @@ def make_small(root: Path, patch: pytest.MonkeyPatch) -> None:
     patch.setattr(reproduce_paper, "ROOT", root)
     patch.setattr(table, "STEP", 1.3)
     patch.setattr(table, "TOLERANCES", (0.5, 2.0, 2))
+    patch.setattr(sending, "DELAYS", (2.0,))
+    patch.setattr(sending, "MODES_SENT", (TWISTS,))
+    patch.setattr(sending, "TOLERANCES", (1.0, 2.5))
     patch.setattr(timing, "USERS", 2)
     patch.setattr(timing, "SINGLES", 4)
 

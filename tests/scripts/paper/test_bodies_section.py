@@ -10,7 +10,7 @@ import pytest
 
 from scripts.paper.bodies import ALONE, BODY, IN_PARENTS, LIMBS, MODES, Apart, Body, ErrorOfBody, KeysOfBody, Limb
 from scripts.paper.bodies_section import FILES, HEADING, BodyResults, bodies_section, quoted
-from scripts.paper.page import with_bodies, write_page
+from scripts.paper.page import with_section, write_page
 from scripts.paper.results import Results
 from scripts.rows import write_rows
 
@@ -269,19 +269,19 @@ PAGE = "# Paper\n\nWords.\n\n## Why\n\nBows.\n\n## Running time\n\nns\n\n## File
 
 
 def test_the_section_goes_where_it_belongs_and_the_rest_stays():
-    text = with_bodies(PAGE, f"{HEADING}\n\nNew.\n")
+    text = with_section(PAGE, f"{HEADING}\n\nNew.\n")
     assert text == PAGE.replace("## Running", f"{HEADING}\n\nNew.\n\n## Running")
 
 
 def test_a_section_is_replaced_by_a_later_one():
-    first = with_bodies(PAGE, f"{HEADING}\n\nOld.\n\n**Table**\n\n| b |\n")
-    assert with_bodies(first, f"{HEADING}\n\nNew.\n") == with_bodies(PAGE, f"{HEADING}\n\nNew.\n")
+    first = with_section(PAGE, f"{HEADING}\n\nOld.\n\n**Table**\n\n| b |\n")
+    assert with_section(first, f"{HEADING}\n\nNew.\n") == with_section(PAGE, f"{HEADING}\n\nNew.\n")
 
 
 def test_at_the_end_of_a_page_there_is_room_too():
-    first = with_bodies("# Paper\n", f"{HEADING}\n\nOld.\n")
+    first = with_section("# Paper\n", f"{HEADING}\n\nOld.\n")
     assert first == f"# Paper\n\n{HEADING}\n\nOld.\n"
-    assert with_bodies(first, f"{HEADING}\n\nNew.\n") == f"# Paper\n\n{HEADING}\n\nNew.\n"
+    assert with_section(first, f"{HEADING}\n\nNew.\n") == f"# Paper\n\n{HEADING}\n\nNew.\n"
 
 
 def test_it_is_where_the_page_has_it():
@@ -289,7 +289,7 @@ def test_it_is_where_the_page_has_it():
         Results({"NumPy": "9"}, [], [], [], [], [], [], [], [], [], frozenset()), of_bodies=BodyResults(**ROWS)
     )
     whole = write_page(results)
-    assert with_bodies(write_page(replace(results, of_bodies=BodyResults())), section()) == whole
+    assert with_section(write_page(replace(results, of_bodies=BodyResults())), section()) == whole
 
 
 def test_kinds_of_limbs_are_those_of_the_study():

@@ -1,0 +1,129 @@
+"""The section of the page on live streams that are sent when they are needed. Markdown, written from `sending.csv`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scripts.comparison.report.findings import listed
+from scripts.comparison.study.modes import REFERENCE
+from scripts.streaming import TWISTS
+
+from . import claims
+from .sending import AROUND_A_PACKET, DELAYS, HEARTBEAT, MODES_SENT, SentNeeded, at_delay, packet_bytes
+from .table import YARDSTICKS
+from .wording import grid, number, percent, verdict
+
+HEADING = "## Sending when needed"
+
+
+def sending_section(found: Sequence[SentNeeded], sets: Sequence[str]) -> list[str]:
+    """The section, for these sets of clips; nothing where there is nothing."""
+    there = [one for one in sets if any(cell.clips == one for cell in found)]
+    if not there:
+        return []
+    first = next(iter(YARDSTICKS))
+    lines = [
+        HEADING,
+        "",
+        "The same question for a live stream: a sender that knows every pose, and what the receiver shows, sends a "
+        "key when what is shown would be off by more than a tolerance, and chooses the one that carries furthest. The "
+        "play-out may be behind by more than the one interval of the even stream: the delays are multiples of that "
+        f"interval, and nothing else is looked ahead. `{TWISTS}` sends how the body moves along with where it is, 13 "
+        "numbers instead of 7. In a cell: updates a second that are as good as the even stream of the state of the "
+        f"art at its rate, and how many fewer. Heartbeats, the newest key again after {HEARTBEAT:g} s of silence, are "
+        "counted among the updates.",
+        "",
+    ]
+    for one in there:
+        for yardstick, name in YARDSTICKS.items():
+            lines += [f"**{name[0].upper()}{name[1:]}, {one}**", "", *_grid(found, one, yardstick), ""]
+    lines += [*_verdicts(found, there[0], first), "", *_bytes(found, there[0], first), ""]
+    lines += _costs()
+    return lines
+
+
+def in_short(found: Sequence[SentNeeded], clips: str) -> list[str]:
+    """A line on these streams, for the beginning of the page."""
+    rows = at_delay(found, clips, TWISTS, 2.0, next(iter(YARDSTICKS)))
+    if len(rows) != len(claims.TABLE):
+        return []
+    shares = [cell.saved for cell in rows]
+    return [
+        f"- `{TWISTS}`, sent when needed by a live sender, at a delay of 2 intervals instead of 1: "
+        f"{listed([number(100.0 * share, 0) for share in shares])} % fewer updates, "
+        f"{listed([number(100.0 * cell.saved_bytes, 0) for cell in rows])} % fewer bytes. {verdict(shares)}"
+    ]
+
+
+def _grid(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]:
+    head = ["sent when needed", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
+    rows = [["*the paper*", *(f"*{row.multivectors} ({row.saved:.0%})*" for row in claims.TABLE)]]
+    for mode in MODES_SENT:
+        for delay in DELAYS:
+            cells = {cell.updates: cell for cell in at_delay(found, clips, mode, delay, yardstick)}
+            texts = [_cell(cells.get(row.state_of_the_art)) for row in claims.TABLE]
+            rows.append([f"`{mode}`, {delay:g} intervals", *texts])
+    return grid(head, rows)
+
+
+def _cell(cell: SentNeeded | None) -> str:
+    if cell is None or not np.isfinite(cell.needed):
+        return "-"
+    part = "" if cell.reached == cell.asked else f"; {cell.reached} of {cell.asked} clips"
+    return f"{cell.needed:.1f} ({percent(cell.saved)}{part})"
+
+
+def _verdicts(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]:
+    """Which of the paper's savings there are, at which delay."""
+    paper = listed([f"{row.saved:.0%}" for row in claims.TABLE])
+    lines = [f"Of the paper's {paper}, on the {clips}, by the {YARDSTICKS[yardstick]}:", ""]
+    for mode in MODES_SENT:
+        told = []
+        for delay in DELAYS:
+            cells = {cell.updates: cell.saved for cell in at_delay(found, clips, mode, delay, yardstick)}
+            shares = [cells.get(row.state_of_the_art, float("nan")) for row in claims.TABLE]
+            told.append(f"at {delay:g} intervals, {_held(shares)}")
+        lines.append(f"- `{mode}`: {'; '.join(told)}.")
+    return lines
+
+
+def _held(shares: Sequence[float]) -> str:
+    held = [f"{row.saved:.0%}" for row, share in zip(claims.TABLE, shares, strict=True) if share >= row.saved - 0.005]
+    if len(held) == len(claims.TABLE):
+        return "all hold"
+    return f"{listed(held)} {'hold' if len(held) > 1 else 'holds'}" if held else "none holds"
+
+
+def _bytes(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]:
+    head = ["bytes saved", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
+    rows = []
+    for mode in (REFERENCE, TWISTS):
+        for delay in DELAYS:
+            cells = {cell.updates: cell for cell in at_delay(found, clips, mode, delay, yardstick)}
+            texts = [
+                "-" if cell is None else f"{percent(cell.saved_bytes)}; {percent(cell.saved_small)}"
+                for cell in (cells.get(row.state_of_the_art) for row in claims.TABLE)
+            ]
+            rows.append([f"`{mode}`, {delay:g} intervals", *texts])
+    sizes = [
+        f"{packet_bytes(packing, REFERENCE)} bytes, with a twist {packet_bytes(packing, TWISTS)}"
+        for packing in ("double", "smallest_three")
+    ]
+    return [
+        f"In bytes, with the header of a packet and the {AROUND_A_PACKET} of UDP over IPv4, by the "
+        f"{YARDSTICKS[yardstick]}: an update in doubles has {sizes[0]}; in the smallest packing {sizes[1]}. In a cell: "
+        "what is saved in doubles and in the smallest packing.",
+        "",
+        *grid(head, rows),
+    ]
+
+
+def _costs() -> list[str]:
+    head = ["delay", *(f"{row.state_of_the_art}/s" for row in claims.TABLE)]
+    rows = [
+        [f"{delay:g} intervals", *(f"{1e3 * delay / row.state_of_the_art:.0f} ms" for row in claims.TABLE)]
+        for delay in (1.0, *DELAYS)
+    ]
+    return ["What each delay costs, the link not counted; the even stream has 1 interval:", "", *grid(head, rows)]
