@@ -29,7 +29,9 @@ def run(folder: Path, files: dict[str, str], *options: str) -> subprocess.Comple
     for name, content in {"conftest.py": "from tests.conftest import *", **files}.items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(content, encoding="utf-8")
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--rootdir", folder, *options, folder]
+    # Nothing of these asserts, so no module has to be made ready for that.
+    options = ("-p", "no:cacheprovider", "--assert", "plain", *options)
+    command = [sys.executable, "-m", "pytest", "--rootdir", folder, *options, folder]
     environment = os.environ | {EVERY_TEST: "1", "PYTHONPATH": str(ROOT)}
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
 

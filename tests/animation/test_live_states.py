@@ -31,7 +31,7 @@ from tests.animation.oracle import (
     unit,
 )
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
-from tests.thoroughness import tried
+from tests.thoroughness import THOROUGH
 
 
 class EditingObjects(Editing):
@@ -404,7 +404,7 @@ class EditingObjects(Editing):
 
 
 EditingObjects.TestCase.settings = settings(
-    max_examples=tried(40),
+    max_examples=40 if THOROUGH else 6,
     stateful_step_count=25,
     deadline=None,
     derandomize=True,

@@ -18,6 +18,7 @@ from addon.motion import KEYFRAME_MODES
 from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.oracle import Own, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
+from tests.thoroughness import sample
 
 PLAYED = np.arange(-2.0, 44.0)
 """From before the first key until after the last."""
@@ -67,7 +68,7 @@ def test_every_mode_plays_alike_in_a_blender_without_the_extension(live_file, tm
     assert np.mean(differing) > 0.7, "in most of these the modes are to be seen, or this test says nothing"
 
 
-@pytest.mark.parametrize("frame", [7.0, 17.25, 400.0])
+@pytest.mark.parametrize("frame", sample([17.25, 7.0, 400.0]))
 def test_a_file_opens_as_it_was_to_be_seen_on_the_frame_it_was_saved_on(live_file, tmp_path, frame):
     obj = key(new_object())
     own = give_own_deltas(obj)
@@ -79,8 +80,9 @@ def test_a_file_opens_as_it_was_to_be_seen_on_the_frame_it_was_saved_on(live_fil
     assert_same(played, [expected_worlds(obj, PLAYED, {"Tool": own})], 1e-5)
 
 
-@pytest.mark.parametrize("own", [False, True], ids=["plain", "own deltas"])
-@pytest.mark.parametrize("order", ["QUATERNION", "ZXY"])
+@pytest.mark.parametrize(
+    ("order", "own"), sample([(order, own) for order in ("ZXY", "QUATERNION") for own in (True, False)])
+)
 def test_what_a_farm_saves_again_comes_back_whole(live_file, tmp_path, order, own):
     obj = new_object("Tool", order)
     owns = {"Tool": give_own_deltas(obj)} if own else {}

@@ -28,9 +28,10 @@ RADIUS = 0.1
 
 def errors_by_segments(times, poses, keys, modes) -> np.ndarray:
     """The shell error of a mixed motion at all samples from the first key to the last, by matrices."""
+    errors = {mode: shell_errors(times, poses, keys, mode) for mode in set(modes)}
     return np.concatenate(
         [
-            shell_errors(times, poses, keys, mode)[first : last + (last == keys[-1])]
+            errors[mode][first : last + (last == keys[-1])]
             for first, last, mode in zip(keys[:-1], keys[1:], modes, strict=True)
         ]
     )

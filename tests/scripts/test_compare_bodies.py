@@ -20,6 +20,7 @@ from tests.scripts.comparison.study.test_body_metrics import HEADER
 from tests.scripts.test_compare import COLUMNS
 from tests.scripts.trajectories.skeletons import body, export
 from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
+from tests.thoroughness import sample
 
 MODES = ("lerp_slerp", "dq_sclerp")
 
@@ -236,7 +237,7 @@ def lines_about(said: str, path: Path) -> list[str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals end no processes there")
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", sample([2, 1]))
 def test_a_body_that_ends_a_worker_is_told_and_the_others_go_on(
     deadly: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], jobs: int
 ) -> None:

@@ -121,7 +121,8 @@ def compared(folder: Path, write: Callable[[Path, Sequence[str]], list[str]], na
     sources.mkdir(parents=True)
     given = write(sources, names)
     before = set(sources.iterdir())
-    assert compare.main(["--jobs", "0", *given, "--no-video", "--rates", "20", "--output", str(output)]) == 0
+    asked = ["--no-video", "--rates", "20", "--modes", "lerp_slerp,dq_sclerp", "--output", str(output)]
+    assert compare.main(["--jobs", "0", *given, *asked]) == 0
     assert set(sources.iterdir()) == before
     assert set(folder.iterdir()) == {sources, output}
     return output

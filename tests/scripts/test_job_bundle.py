@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from scripts import job_bundle
+from scripts import compare, job_bundle
 from scripts.workplan import Plan, Task
 from tests.scripts.comparing import outputs, write_toss
 
 ROOT = Path(__file__).resolve().parents[2]
 
-OPTIONS = ("--rates", "5", "--resolution", "64x36", "--fps", "10")
+OPTIONS = ("--rates", "5", "--modes", "lerp_slerp,motor_spline", "--resolution", "64x36", "--fps", "10")
 
 
 def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProcess:
@@ -77,9 +77,7 @@ def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(clip: Path, tmp_
     ran = run(sys.executable, "-m", *command, "--path-mapping-rules", rules, cwd=tmp_path)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert "Tasks: 7 done, 0 not done." in ran.stdout
-    compare = (sys.executable, ROOT / "scripts" / "compare.py", there / clip.name, *OPTIONS, "--jobs", "1")
-    compared = run(*compare, "--output", tmp_path / "here")
-    assert compared.returncode == 0, compared.stderr
+    assert compare.main([str(there / clip.name), *OPTIONS, "--jobs", "0", "--output", str(tmp_path / "here")]) == 0
     assert "toss/5/comparison.mp4" in outputs(tmp_path / "out")
     assert outputs(tmp_path / "out") == outputs(tmp_path / "here")
     assert not (tmp_path / "out" / ".workplan").exists()

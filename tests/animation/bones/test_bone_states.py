@@ -31,7 +31,7 @@ from tests.animation.oracle import (
     transform_paths,
 )
 from tests.animation.scenes import key, push_down, random_values, tweak
-from tests.thoroughness import tried
+from tests.thoroughness import THOROUGH
 
 
 class EditingBones(RigEditing):
@@ -393,7 +393,7 @@ class EditingBones(RigEditing):
 
 
 EditingBones.TestCase.settings = settings(
-    max_examples=tried(40),
+    max_examples=40 if THOROUGH else 6,
     stateful_step_count=25,
     deadline=None,
     derandomize=True,

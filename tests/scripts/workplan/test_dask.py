@@ -15,11 +15,13 @@ from pathlib import Path
 
 import pytest
 
+from scripts import compare
 from scripts.workplan import ExecutorError, Plan, Workspace, run
 from scripts.workplan.dask_executor import DaskExecutor
 from scripts.workplan.running import order_for
 from tests.scripts.comparing import outputs, write_toss
 from tests.scripts.workplan.plans import STEPS, contents, done, joining, run_in, states, task
+from tests.thoroughness import THOROUGH
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -195,10 +197,10 @@ def test_a_wrong_address_is_said_to_be_one_within_seconds(tmp_path: Path, addres
 
 
 COMPARE = (sys.executable, ROOT / "scripts" / "compare.py")
-OPTIONS = ("--rates", "5", "--resolution", "64x36", "--fps", "10")
+OPTIONS = ("--rates", "5", "--modes", "lerp_slerp,motor_spline", "--resolution", "64x36", "--fps", "10")
 
-MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "2"))
-"""How many times a run is killed, half of them the program and half of them a Dask worker."""
+MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "2" if THOROUGH else "1"))
+"""How many times a run is killed, in turn the program and a Dask worker."""
 
 
 def start(clip: Path, output: Path, *who: str) -> subprocess.Popen:
@@ -221,7 +223,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def wanted(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """What comes out on one machine."""
     folder = tmp_path_factory.mktemp("here")
-    assert_well_ended(start(clip, folder, "--jobs", "1"))
+    assert compare.main([str(clip), *OPTIONS, "--jobs", "0", "--output", str(folder)]) == 0
     assert "toss/5/comparison.mp4" in outputs(folder)
     return outputs(folder)
 
