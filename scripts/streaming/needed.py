@@ -100,8 +100,8 @@ class NeededSender:
 
     Notes
     -----
-    Where nothing is lost or late, no sample is shown further off than the tolerance, but where the body itself goes
-    further from one sample to the next than the picture may. Frames of a display lie between the samples.
+    Where nothing is lost or late, no sample is shown further off than the tolerance, as long as the body itself goes
+    no further than that from one sample to the next. Frames of a display lie between the samples.
     """
 
     def __init__(
@@ -194,21 +194,25 @@ class NeededSender:
     def _needed(self, here: int, now: float) -> Key:
         """Send the key that carries furthest, now that the play-out is at a sample after which it is off."""
         last = int(np.searchsorted(self._times, now + SAME * self._delay, side="right")) - 1
-        # The last sample that is shown without it.
+        # The last sample that is shown without it, and the first that it may be at.
         before = max(here - 1, int(np.searchsorted(self._times, self._known.stamps[-1])), 0)
-        apart = max((last - here) // FIRST, 1)
-        few = np.arange(last, here, -apart)[::-1]
+        first = here if before < here else here + 1
+        apart = max((last - first) // FIRST, 1)
+        few = np.arange(last, first - 1, -apart)[::-1]
         best = self._furthest(before, few, last)
-        nearer, further = (best.sample + 1, best.sample + apart) if best else (here + 1, int(few[0]))
+        nearer, further = (best.sample + 1, best.sample + apart) if best else (first, int(few[0]))
         best = self._furthest(before, np.arange(nearer, min(further, last + 1)), last) or best
-        # Where the body itself jumps none will do, and the next sample is as good as can be.
-        best = best or self._furthest(before, np.array([here + 1]), last, within=np.inf)
+        # Where the body itself jumps none will do, and the nearest have to be as good as they are.
+        best = best or self._furthest(before, np.arange(first, here + 2), last, at_any_rate=True)
         self._jumps = _joined(self._still_fading(before), best.jump)
         self._shown = best.sample + 1
         return self._send(float(self._times[best.sample]), best.pose, best.twist, now)
 
-    def _furthest(self, before: int, choices: np.ndarray, last: int, within: float | None = None) -> _Choice | None:
-        """Of samples (c,) that could be the next key, the last with which all after `before` are shown well enough."""
+    def _furthest(self, before: int, choices: np.ndarray, last: int, at_any_rate: bool = False) -> _Choice | None:
+        """Of samples (c,) that could be the next key, the last with which all after `before` are shown well enough.
+
+        Where there is none, at any rate the one with which they are shown best.
+        """
         if not len(choices):
             return None
         poses, twists = self._as_read(*fitted(self._times, self._poses, choices, last, AROUND * self._delay))
@@ -223,10 +227,11 @@ class NeededSender:
         jumps = self._jumps_to(before, path[begins])
         shown = _faded_each(self._times[rows], path, choice, jumps, self._still_fading(before))
         off = np.where(rows == before, 0.0, self._errors(shown, rows))
-        good = np.maximum.reduceat(off, begins) <= (self._tolerance if within is None else within)
-        if not good.any():
+        worst = np.maximum.reduceat(off, begins)
+        good = np.flatnonzero(worst <= self._tolerance)
+        if not (len(good) or at_any_rate):
             return None
-        best = [int(np.flatnonzero(good)[-1])]
+        best = [int(good[-1] if len(good) else np.argmin(worst))]
         return _Choice(int(choices[best[0]]), poses[best], None if twists is None else twists[best], _some(jumps, best))
 
     def _send(self, stamp: float, pose: Poses, twist: np.ndarray | None, sent: float) -> Key:

@@ -62,7 +62,7 @@ class Packing:
         twists = np.asarray(twists, dtype=np.float64)
         largest = float(np.finfo(self.twist_kind).max)
         _require(np.abs(twists).max(axis=-1, initial=0.0) <= largest, f"has a number beyond {largest:g}", "twist")
-        return np.ascontiguousarray(twists.astype(self.twist_kind)).view(np.uint8).reshape(len(twists), -1)
+        return np.ascontiguousarray(twists.astype(self.twist_kind)).view(np.uint8).reshape(len(twists), self.twist_size)
 
     def unpack_twists(self, data: np.ndarray) -> np.ndarray:
         """Back, from bytes (n, twist_size) to twists (n, 6)."""

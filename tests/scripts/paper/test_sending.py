@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,7 +25,7 @@ def clip(monkeypatch: pytest.MonkeyPatch) -> Clip:
     monkeypatch.setattr(sending, "DELAYS", (2.0,))
     monkeypatch.setattr(sending, "TOLERANCES", (1.0, 2.5))
     times, poses = swinging(2)
-    return Clip("swing", times, poses)
+    return Clip("swing", "swing.csv", "blender", times, poses, ())
 
 
 def cell(
@@ -55,7 +57,7 @@ def test_a_stream_is_as_the_receiver_shows_it(clip: Clip) -> None:
 
 
 def test_silence_costs_heartbeats(clip: Clip) -> None:
-    still = Clip("still", clip.times, clip.poses[[3] * len(clip.times)])
+    still = replace(clip, poses=clip.poses[[3] * len(clip.times)])
     one = sending.stream(still, TWISTS, 20, 2.0, 0.004)
     assert one.keys_per_s == pytest.approx(6 / 3.0)
     assert one.rms_shell_m < 1e-9

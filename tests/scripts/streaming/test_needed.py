@@ -61,17 +61,17 @@ def test_no_sample_is_shown_further_off_than_the_tolerance(mode, packing):
 @given(
     seed=st.integers(0, 10_000),
     mode=st.sampled_from(STREAMED),
-    tolerance=st.floats(0.0005, 0.05),
+    share=st.floats(1.0, 8.0),
     delay=st.floats(0.015, 0.4),
     start=st.sampled_from([0.0, -1e4, 1.7e9]),
 )
-def test_the_tolerance_holds_whatever_it_is_and_wherever_times_begin(seed, mode, tolerance, delay, start):
+def test_the_tolerance_holds_if_no_sample_is_further_from_the_one_before(seed, mode, share, delay, start):
     times, poses = swinging(seed, seconds=1.5)
-    times = times + start
-    packets, play_out = send_when_needed(times, poses, tolerance, delay, mode, RADIUS)
-    playback = shown(times, packets, play_out, mode, delay)
-    # Clocks that count from 1970 tell no less than 0.2 microseconds apart, in which these bodies move as many.
-    assert errors(times, poses, playback).max() <= tolerance * (1.0 + 1e-6) + (2e-5 if abs(start) > 1e6 else 1e-8)
+    tolerance = share * float(shell_error(poses[1:], poses[:-1], RADIUS).max())
+    packets, play_out = send_when_needed(times + start, poses, tolerance, delay, mode, RADIUS)
+    playback = shown(times + start, packets, play_out, mode, delay)
+    # Clocks that count from 1970 tell no less than 0.2 microseconds apart.
+    assert errors(times, poses, playback).max() <= tolerance * (1.0 + 1e-4)
 
 
 @settings(max_examples=tried(40))
@@ -106,7 +106,7 @@ def test_keys_are_sent_in_order_and_before_the_play_out_gets_to_them(mode):
     keys = [*(sender := NeededSender(0.003, DELAY, mode)).push(times, poses), *sender.finish()]
     stamps, sent = np.array([(key.stamp, key.sent) for key in keys]).T
     assert np.all(np.diff(stamps) > 0.0)
-    assert np.all(np.diff(sent) > 0.0)
+    assert np.all(np.diff(sent) >= 0.0)
     assert np.all(stamps <= sent + 1e-9)
     assert np.all(sent - DELAY <= stamps + 1e-9)
 
