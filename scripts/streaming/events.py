@@ -25,7 +25,15 @@ class What(StrEnum):
     """A packet came again, and was dropped. 1."""
 
     DAMAGED = "damaged"
-    """A packet held numbers that are no pose, or a time that contradicts its number, and was dropped. 1."""
+    """A packet held numbers that are no pose, or a time or number that contradicts the keys, and was put aside. It is
+    used after all where more come that agree with it, and keys are withdrawn. 1."""
+
+    WITHDRAWN = "withdrawn"
+    """Packets in a row that agree among themselves contradicted keys, of which this was the first. These were withdrawn
+    and those are believed. How many keys."""
+
+    DELAYED = "delayed"
+    """Packets in a row agreed on another latency than the one that was believed. Seconds by which the delay grew."""
 
     RAN_OUT = "ran out"
     """The play-out passed the newest key, this one, and the motion went on slower and slower. Seconds until a frame
@@ -35,7 +43,7 @@ class What(StrEnum):
     """The path changed under what was shown, now that this key is known. The distance that began to fade."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Event:
     """One thing that happened."""
 

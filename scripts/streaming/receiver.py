@@ -4,13 +4,14 @@ The play-out runs behind the sender by a fixed delay, and goes through the poses
 paper's receiver interpolates from the state it shows to the state that arrives; where updates come at even intervals
 the two are one motion, since the state shown is then the update before. Where a packet is missing the motion goes on:
 over the gap where a later one is there, and else the way it was going, slower and slower. Where a packet changes the
-path that is already being shown, the difference fades, and the picture never jumps. Seconds throughout; the sender's
-clock may be another than the receiver's.
+path that is already being shown, the difference fades, and the picture never jumps; so it does where packets turn out
+to have lied, and keys are withdrawn. Seconds throughout; the sender's clock may be another than the receiver's.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike
 from addon.motion import Poses
 from addon.motion.quaternions import align_signs, normalise
 
-from .admission import CLOCK, admit, is_sound, missing
+from .admission import CLOCK, ENOUGH, Admitted, admit, is_sound
 from .events import Event, What
 from .fading import Jumps, fade
 from .known_keys import NONE, KnownKeys
@@ -56,7 +57,8 @@ class PlayOut:
     looks ahead: as little as will do where nothing is ever late."""
 
     latency: float | None = None
-    """Seconds from a packet being sent to its arrival that are counted on. None: what the first to arrive took."""
+    """Seconds from a packet being sent to its arrival that are counted on, whatever packets say. None: what the first
+    to arrive took, until `admission.ENOUGH` in a row agree on another."""
 
     carry: float = 0.3
     """Seconds within which a motion dies down that gets no more packets: how long a hand goes on as it goes, whatever
@@ -91,8 +93,8 @@ class Playback:
     poses: Poses
     """Shape (k,), signs aligned. Until the play-out gets to the first pose that arrived, that pose, at rest."""
 
-    delay: float
-    """Seconds by which the play-out is behind the sender: the latency and the wait. Infinite where nothing arrived."""
+    delays: np.ndarray
+    """Seconds by which the play-out is behind the sender at each frame, the latency and the wait, shape (k,)."""
 
     ran_out: np.ndarray
     """Whether a frame is beyond the newest key, bool of shape (k,)."""
@@ -103,7 +105,12 @@ class Playback:
     @property
     def moments(self) -> np.ndarray:
         """The moments of the sender's motion that belong to the frames, shape (k,)."""
-        return self.times - self.delay
+        return self.times - self.delays
+
+    @property
+    def delay(self) -> float:
+        """The delay at the last frame, which is that at all of them unless packets lied. Infinite: nothing arrived."""
+        return float(self.delays[-1]) if len(self.delays) else np.inf
 
     @property
     def counts(self) -> dict[What, int]:
@@ -156,37 +163,26 @@ def receive(
     order = order[arrivals[order] <= end]
     packets, arrivals, sound = packets[order], arrivals[order], is_sound(packets[order])
     lead = (1.0 + ahead) * packets.interval
-    delay = _delay(packets, arrivals, sound, lead, play_out)
+    wait = lead if play_out.wait is None else play_out.wait * packets.interval
     late = lead if play_out.lead is None else play_out.lead * packets.interval
-    rows, events = admit(packets, arrivals, sound, delay, late)
-    if not len(rows):
-        empty = Poses(np.empty((0, 3)), np.empty((0, 4)))
-        return Playback(display_times[:0], empty, delay, np.empty(0, dtype=bool), tuple(events))
+    admitted, events = admit(packets, arrivals, sound, wait, late, play_out.latency)
+    if not len(admitted.rows):
+        nothing = np.empty(0)
+        return Playback(nothing, Poses(np.empty((0, 3)), np.empty((0, 4))), nothing, nothing > 0.0, tuple(events))
 
-    keys = KnownKeys(
-        packets.stamps[rows],
-        Poses(packets.poses.positions[rows], normalise(packets.poses.quaternions[rows])),
-        arrivals[rows] - CLOCK,
-        mode,
-        packets.interval,
-        play_out.carry,
-        packets.twists[rows] if packets.twisted else None,
-    )
-    times = display_times[np.searchsorted(display_times, keys.known_from.min()) :]
-    moments = times - delay
-    windows = keys.windows(moments, times)
-    poses, caught_up = _without_jumps(keys, times, moments, windows, play_out.fade)
-    last, following = keys.segments(windows)
-    ran_out = (following == NONE) & (moments > keys.stamps[last] + CLOCK)
-
-    sequences = packets.sequences[rows]
-    events += missing(packets.sequences, sequences, keys.stamps + delay)
-    events += [Event(time, What.CAUGHT_UP, int(sequences[key]), distance) for time, key, distance in caught_up]
+    times = display_times[np.searchsorted(display_times, admitted.known_from[0] - CLOCK) :]
+    path = _path(packets, admitted, times, mode, play_out)
+    sequences = packets.sequences
+    events += [Event(time, What.CAUGHT_UP, int(sequences[row]), distance) for time, row, distance in path.news()]
     events += [
-        Event(time, What.RAN_OUT, int(sequences[last[frame]]), long) for time, frame, long in _runs(times, ran_out)
+        Event(time, What.RAN_OUT, int(sequences[path.newest[frame]]), long)
+        for time, frame, long in _runs(times, path.ran_out)
     ]
     events = sorted((event for event in events if event.time <= end), key=lambda event: event.time)
-    return Playback(times, Poses(poses.positions, align_signs(poses.quaternions)), delay, ran_out, tuple(events))
+    poses = fade(times, path.poses, path.jumps)
+    return Playback(
+        times, Poses(poses.positions, align_signs(poses.quaternions)), path.delays, path.ran_out, tuple(events)
+    )
 
 
 def _check(packets: Packets, arrivals: np.ndarray, display_times: np.ndarray, mode: str) -> None:
@@ -202,33 +198,107 @@ def _check(packets: Packets, arrivals: np.ndarray, display_times: np.ndarray, mo
         raise ValueError("the times of display frames need to be a row of finite numbers that do not fall")
 
 
-def _delay(packets: Packets, arrivals: np.ndarray, sound: np.ndarray, lead: float, play_out: PlayOut) -> float:
-    """Seconds by which the play-out is behind the sender; infinite where no packet is any good."""
-    if not sound.any():
-        return np.inf
-    first = np.argmax(sound)
-    latency = float(arrivals[first] - packets.sent[first]) if play_out.latency is None else play_out.latency
-    return latency + (lead if play_out.wait is None else play_out.wait * packets.interval)
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """What the keys that are known make of k frames, jumps and all."""
+
+    poses: Poses
+    """Shape (k,)."""
+
+    delays: np.ndarray
+    """Shape (k,)."""
+
+    newest: np.ndarray
+    """The packet of the last key at or before each frame, where there is one, int of shape (k,)."""
+
+    ran_out: np.ndarray
+    """Whether a frame is beyond the newest key, bool of shape (k,)."""
+
+    jumps: Jumps
+    """From each frame to the next, where what is known at the next makes another motion at the moment of the one
+    before, c of them."""
+
+    after: np.ndarray
+    """The times of the frames after the jumps, shape (c,)."""
+
+    aimed_at: np.ndarray
+    """The packets of the keys that are aimed at then, int of shape (c,)."""
+
+    def news(self) -> list[tuple[float, int, float]]:
+        """Of every jump that is no rounding the time, the packet that is now aimed at, and the distance."""
+        distances = np.linalg.norm(self.jumps.offsets, axis=-1)
+        news = np.maximum(distances, self.jumps.half_angles) > SETTLED
+        return list(zip(*(note[news].tolist() for note in (self.after, self.aimed_at, distances)), strict=True))
 
 
-def _without_jumps(
-    keys: KnownKeys, times: np.ndarray, moments: np.ndarray, windows: np.ndarray, intervals: float
-) -> tuple[Poses, list[tuple[float, int, float]]]:
-    """The poses at k frames, and of every jump that was avoided the time, the key that is now aimed at, the distance.
+def _path(packets: Packets, admitted: Admitted, times: np.ndarray, mode: str, play_out: PlayOut) -> _Path:
+    """The path at frames (k,), epoch by epoch."""
+    count = len(times)
+    positions, quaternions, delays = np.empty((count, 3)), np.empty((count, 4)), np.empty(count)
+    newest, ran_out, nearest = np.empty(count, np.int64), np.empty(count, bool), np.empty(count)
+    changes: list[tuple[np.ndarray, ...]] = []
+    for begin, end, delay, rows, known_from in _epochs(packets, admitted, times, reach_of(mode).behind):
+        keys = _known(packets, rows, known_from, mode, play_out.carry)
+        now, frames = times[begin:end], slice(begin, end)
+        moments = now - delay
+        windows = keys.windows(moments, now)
+        path = keys.poses_at(moments, windows)
+        positions[frames], quaternions[frames], delays[frames] = path.positions, path.quaternions, delay
+        last, following = keys.segments(windows)
+        newest[frames] = rows[last]
+        ran_out[frames] = (following == NONE) & (moments > keys.stamps[last] + CLOCK)
+        nearest[frames] = keys.nearest(moments, windows)
+        # At the moment of the frame before, which in the epoch's first frame was in another epoch.
+        start = max(begin, 1)
+        before = times[start - 1 : end - 1] - delay
+        known_next = keys.windows(before, times[start:end])
+        changed = np.ones(len(before), dtype=bool)
+        changed[begin + 1 - start :] = (known_next[begin + 1 - start :] != windows[:-1]).any(axis=1)
+        after = np.flatnonzero(changed) + start
+        aimed_at = rows[np.max(keys.segments(windows[after - begin]), axis=0)]
+        new = keys.poses_at(before[changed], known_next[changed])
+        changes.append((after, aimed_at, new.positions, new.quaternions))
+    after, aimed_at, *new = (np.concatenate(column) for column in zip(*changes, strict=True))
+    poses = Poses(positions, quaternions)
+    durations = fade_durations(nearest[after - 1], packets.interval, play_out.fade)
+    jumps = Jumps.between(times[after - 1], durations, poses[after - 1], Poses(*new))
+    return _Path(poses, delays, newest, ran_out, jumps, times[after], aimed_at)
 
-    A jump is where what is known at a frame makes another motion at the moment of the frame before than what was known
-    then.
+
+def _epochs(
+    packets: Packets, admitted: Admitted, times: np.ndarray, behind: int
+) -> Iterator[tuple[int, int, float, np.ndarray, np.ndarray]]:
+    """Of each epoch that has frames, the first of them, the one after the last, the delay, and its keys.
+
+    Those are packets in the order of their stamps, and when each is known. Not those that no frame can come to any
+    more: otherwise many epochs of a long stream would take the square of its length.
     """
-    path = keys.poses_at(moments, windows)
-    known_next = keys.windows(moments[:-1], times[1:])
-    before = np.flatnonzero((known_next != windows[:-1]).any(axis=1))
-    old, new = path[before], keys.poses_at(moments[before], known_next[before])
-    durations = fade_durations(keys.nearest(moments[before], windows[before]), keys.interval, intervals)
-    jumps = Jumps.between(times[before], durations, old, new)
-    distances = np.linalg.norm(jumps.offsets, axis=-1)
-    news = np.maximum(distances, jumps.half_angles) > SETTLED
-    notes = (times[before + 1], np.max(keys.segments(windows[before + 1]), axis=0), distances)
-    return fade(times, path, jumps), list(zip(*(note[news].tolist() for note in notes), strict=True))
+    spare = behind + 3 + ENOUGH
+    epochs = np.searchsorted(admitted.begins - CLOCK, times, side="right")
+    # The earliest moment that is asked for from each frame on, by any delay that is yet to come.
+    moments = times - admitted.delays[epochs]
+    moments[1:] = np.minimum(moments[1:], times[:-1] - admitted.delays[epochs[1:]])
+    earliest = np.minimum.accumulate(moments[::-1])[::-1]
+    stamps, known_from = packets.stamps[admitted.rows], admitted.known_from - CLOCK
+    keys, entered = np.empty(0, dtype=np.int64), 0
+    for begin in np.flatnonzero(np.diff(epochs, prepend=-1)).tolist():
+        epoch, end = epochs[begin], int(np.searchsorted(epochs, epochs[begin], side="right"))
+        until = int(np.searchsorted(admitted.entered, epoch, side="right"))
+        keys = np.concatenate((keys, np.arange(entered, until)))
+        entered = until
+        keys = keys[admitted.left[keys] > epoch]
+        keys = keys[np.argsort(stamps[keys], kind="stable")]
+        passed = np.flatnonzero((known_from[keys] <= times[begin]) & (stamps[keys] <= earliest[begin]))
+        if len(passed) > spare:
+            keys = keys[passed[-spare] :]
+        yield begin, end, float(admitted.delays[epoch]), admitted.rows[keys], known_from[keys]
+
+
+def _known(packets: Packets, rows: np.ndarray, known_from: np.ndarray, mode: str, carry: float) -> KnownKeys:
+    """The keys of some packets."""
+    packets = packets[rows]
+    poses = Poses(packets.poses.positions, normalise(packets.poses.quaternions))
+    return KnownKeys(packets.stamps, poses, known_from, mode, packets.interval, carry, packets.twists)
 
 
 def fade_durations(nearest: np.ndarray, interval: float, intervals: float) -> np.ndarray:
