@@ -31,7 +31,7 @@ class Bandwidth:
     """For each user, of the poses, as the paper counts."""
 
     with_headers_per_s: float
-    """For each user, with the number and the time stamp of every packet."""
+    """For each user, with the headers of the packets."""
 
 
 def bandwidths(clip: Clip) -> list[Bandwidth]:

@@ -12,6 +12,7 @@ import numpy as np
 from addon.motion import MODES
 from scripts.comparison.report.findings import listed
 from scripts.comparison.study.modes import REFERENCE
+from scripts.streaming.packets import HEADER
 
 from . import bodies_section, claims, sending_section, strips, triangle
 from .bandwidths import Bandwidth
@@ -520,7 +521,7 @@ def _bandwidth(found: Results) -> list[str]:
         "",
         f"The example of the text: {listed(example)}. Counted from packets that were packed: "
         f"{listed([f'{count:.0f} n' for count in doubles])}, {'the same' if same else 'not the same'}. With the "
-        "number and the time stamp that a receiver needs besides:",
+        f"header of {HEADER.itemsize} bytes that a receiver needs besides (checksum, stream, number, time stamp, age):",
         "",
         *grid(
             [
