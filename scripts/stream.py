@@ -282,12 +282,16 @@ def relay(options: argparse.Namespace, stopped: list[int]) -> None:
     room = Relay()
     with Endpoint(_hosts(options.bind, []), options.port) as endpoint, Progress() as progress:
         _say(f"Relaying on {', '.join(map(shown, endpoint.addresses))}")
-        started = time.monotonic()
+        started, there = time.monotonic(), set()
         with _stage(progress, "Relaying", options.seconds) as stage:
             while not stopped and (now := time.monotonic() - started) < (options.seconds or float("inf")):
                 for datagram, address in endpoint.receive(LOOK):
                     _send_all(endpoint, room.accept(datagram, address, time.monotonic() - started))
                 room.forget(now)
+                if (users := set(room.users)) != there:
+                    _say(*(f"{shown(user)} is in the room" for user in users - there))
+                    _say(*(f"{shown(user)} has left" for user in there - users))
+                    there = users
                 if stage:
                     stage.reach(now, f"{len(room.users)} users, {room.streams} streams")
             if stage and stopped:
@@ -451,7 +455,8 @@ def _hosts(bind: str | None, others: list[Address]) -> list[str]:
 
 
 def _say(*lines: str) -> None:
-    print(*lines, sep="\n", flush=True)
+    for line in lines:
+        print(line, flush=True)
 
 
 # Options

@@ -33,7 +33,7 @@ COMMAND = (sys.executable, str(Path(__file__).resolve().parents[2] / "scripts" /
 PATIENCE = 120.0
 """Seconds that nothing takes, however busy the machine is."""
 
-MARGIN = ("--margin", "1.5")
+MARGIN = ("--margin", "3")
 """So that a busy machine is in time: a second more is no error."""
 
 
@@ -51,10 +51,20 @@ LOOPBACKS = ["127.0.0.1", *["::1"] * has_ipv6()]
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    """A short motion, as a logger would write it."""
-    times, poses = swinging(3, 2.0)
+    """A motion of two seconds."""
+    return write(tmp_path / "hand.csv", 2.0)
+
+
+@pytest.fixture
+def long_recording(tmp_path: Path) -> Path:
+    """One that has not ended before a busy machine has got to it."""
+    return write(tmp_path / "long.csv", PATIENCE)
+
+
+def write(path: Path, seconds: float) -> Path:
+    """Write a motion as a logger would."""
+    times, poses = swinging(3, seconds)
     rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
-    path = tmp_path / "hand.csv"
     path.write_text("\n".join(["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]))
     return path
 
@@ -152,6 +162,8 @@ def test_three_users_hear_one_another_through_a_relay(tmp_path, recording):
         try:
             for receiver in receivers:
                 receiver.address()
+            for _ in receivers:
+                assert "is in the room" in relay.process.stdout.readline()
             senders = [Running("send", recording, "--to", room, "--heartbeat", 0.2) for _ in outputs]
             streams = {sender.process.stdout.readline().split()[1] for sender in senders}
             assert all(number(sender.done(), "updates") > 1 for sender in senders)
@@ -162,9 +174,9 @@ def test_three_users_hear_one_another_through_a_relay(tmp_path, recording):
                 one.process.communicate()
         relay.process.send_signal(signal.SIGINT)
         said = relay.done(130)
-    # A receiver that begins late on a busy machine may find that some have ended.
     for printed, output in zip(shown, outputs, strict=True):
         heard = set(re.findall(r"stream-(\w+) from", printed))
+        # One that begins late on a busy machine may find that all others have ended.
         assert heard
         assert heard <= streams
         devices = {line.split(",")[0] for line in output.read_text().splitlines()[1:]}
@@ -173,9 +185,9 @@ def test_three_users_hear_one_another_through_a_relay(tmp_path, recording):
     assert number(said, "out") > number(said, "in") > 0
 
 
-def test_who_asks_a_sender_hears_it_and_gets_its_state_at_once(tmp_path, recording):
+def test_who_asks_a_sender_hears_it_and_gets_its_state_at_once(long_recording):
     with (
-        running("send", recording, "--port", free_port(), "--heartbeat", 5) as sender,
+        running("send", long_recording, "--port", free_port(), "--heartbeat", 5) as sender,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own,
     ):
         host, _, port = sender.address().rpartition(":")
@@ -186,7 +198,6 @@ def test_who_asks_a_sender_hears_it_and_gets_its_state_at_once(tmp_path, recordi
         own.sendto(hello(asked.cookie), (host, int(port)))
         state = read(own.recv(2000))
         assert (state.kind, state.terms.mode) == (BEAT, TWISTS)
-        sender.done()
 
 
 def free_port() -> int:
@@ -236,17 +247,18 @@ def test_over_a_proxy_that_loses_some_the_heartbeats_mend_what_can_be(tmp_path, 
 
 
 @pytest.mark.parametrize(("stopped_by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_receiver_that_is_stopped_keeps_what_was_shown(tmp_path, recording, stopped_by, code):
+def test_a_receiver_that_is_stopped_keeps_what_was_shown(tmp_path, long_recording, stopped_by, code):
     output = tmp_path / "shown.csv"
     with (
         running("receive", "--port", 0, "--output", output) as receiver,
-        running("send", recording, "--to", receiver.address()) as sender,
+        running("send", long_recording, "--to", receiver.address()) as sender,
     ):
         until(lambda: any(path.stat().st_size > 100 for path in tmp_path.glob(".*.csv")))
         receiver.process.send_signal(stopped_by)
         shown = receiver.done(code)
-        sender.done()
-    assert number(shown, "updates") > 0
+        sender.process.send_signal(stopped_by)
+        sent = sender.done(code)
+    assert number(sent, "updates") >= number(shown, "updates") > 0
     assert len(read_clips([str(output)], None)[0][0].times) == number(shown, "frames")
 
 

@@ -20,7 +20,10 @@ from tests.thoroughness import THOROUGH, sample, tried
 
 FPS = 72.0
 
-BAD = Link(latency=0.05, jitter=0.1, loss=0.2)
+LATENCY = 0.0517
+"""With which nothing arrives at the very moment of a frame."""
+
+BAD = Link(latency=LATENCY, jitter=0.1, loss=0.2)
 
 MODES_OF_STREAMS = (*MODES, TWISTS)
 
@@ -130,7 +133,7 @@ def run(
     wait=st.sampled_from([0.5, 2.0, 5.0]),
 )
 def test_what_is_shown_is_what_one_call_for_all_of_the_run_shows(mode, seed, loss, jitter, again, step, wait):
-    link = Link(latency=0.05, jitter=jitter, loss=loss)
+    link = Link(latency=LATENCY, jitter=jitter, loss=loss)
     parts, whole, _ = run(seed, mode, link, 6.0, again=again, step=step, wait=wait)
     assert_same(parts, whole)
 
