@@ -6,6 +6,7 @@
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
+    python scripts/bootstrap.py stream --help               a recording over a network, in real time
     python scripts/bootstrap.py dask scheduler              many machines: Dask's own commands
     python scripts/bootstrap.py bundle hand.csv             a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    such a job, on this machine
@@ -36,6 +37,7 @@ COMMANDS = {
     "test": (["-m", "pytest"], ("test", "farm")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
+    "stream": ([ROOT / "scripts" / "stream.py"], ()),
     "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
