@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from addon.motion import MODES
@@ -193,6 +193,8 @@ def test_nothing_is_left_of_a_liar_whatever_it_said(mode, row, lie):
 def test_a_liar_that_is_far_off_is_found_out_within_a_few_packets_the_first_one_as_well(mode, row, sequence, far, age):
     lie = {"sequence": sequence, "stamp": None if far is None else row * INTERVAL + far, "age": age}
     lie = {name: value for name, value in lie.items() if value is not None}
+    # A pose that is a metre off, at its own moment, is a motion and no lie.
+    assume(lie)
     found, playback = compared(mode, row, lie, recovery(mode, near=False))
     assert found < 1e-9
     assert_no_jump(playback)
