@@ -30,7 +30,7 @@ from scripts.comparison.study.metrics import lines_of_poses
 from scripts.comparison.study.reading import read_clips
 from scripts.files import replacing
 from scripts.progress import Progress, Stage
-from scripts.streaming import PACKINGS, TWISTS
+from scripts.streaming import PACKINGS, TWISTS, Playback
 from scripts.streaming.endpoints import (
     LOOPBACK,
     Address,
@@ -41,7 +41,6 @@ from scripts.streaming.endpoints import (
     shown,
 )
 from scripts.streaming.hearing import Heard, Hearing, Truth, lines_of, lines_of_bytes
-from scripts.streaming.live import Shown
 from scripts.streaming.needed import NeededSender
 from scripts.streaming.playing import HEARTBEAT, Playing
 from scripts.streaming.relay import Outgoing, Relay
@@ -399,7 +398,7 @@ def _hear(
         endpoint.send(hearing.goodbye(), asked)
 
 
-def _write(file: TextIO, number: int, frames: Shown) -> None:
+def _write(file: TextIO, number: int, frames: Playback) -> None:
     columns = [frames.moments, *frames.poses.positions.T, *frames.poses.quaternions.T]
     for _, lines in lines_of_poses(columns):
         file.write("".join(f"stream-{number:08x},{line}\n" for line in lines))

@@ -17,8 +17,9 @@ from addon.motion import Poses, interpolate, shell_error
 from .endpoints import Address
 from .events import What
 from .limits import QUIET, SILENCE, STREAMS, Gate
-from .live import LiveReceiver, Shown
+from .live import LiveReceiver
 from .packets import KEY
+from .receiver import Playback
 from .wire import BEAT, BYE, CHALLENGE, NO_COOKIE, bye, hello, read
 
 ASK_AGAIN = 0.5
@@ -40,7 +41,7 @@ class Truth:
 
     radius: float = 0.1
 
-    def errors(self, shown: Shown) -> np.ndarray:
+    def errors(self, shown: Playback) -> np.ndarray:
         """The shell errors of the frames that stand for a moment of the recording, shape (k,)."""
         moments = shown.moments
         within = (moments >= self.times[0]) & (moments <= self.times[-1])
@@ -65,7 +66,7 @@ class Heard:
 
     frames: int = 0
     counts: Counter = field(default_factory=Counter)
-    """Of what happened, as `Shown.counts` has it."""
+    """Of what happened, as `Playback.counts` has it."""
 
     measured: int = 0
     squares: float = 0.0
@@ -95,7 +96,7 @@ class Hearing:
 
     def __init__(
         self,
-        write: Callable[[int, Shown], None],
+        write: Callable[[int, Playback], None],
         left: Callable[[Heard], None],
         fps: float = 72.0,
         margin: float = 0.0,
@@ -207,7 +208,7 @@ class Hearing:
             del self._ended[next(iter(self._ended))]
         self._left(stream)
 
-    def _took(self, number: int, shown: Shown) -> None:
+    def _took(self, number: int, shown: Playback) -> None:
         stream = self._streams[number]
         stream.frames += len(shown.times)
         self.shown += len(shown.times)

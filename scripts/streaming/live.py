@@ -17,7 +17,7 @@ from addon.motion import Poses
 from addon.motion.quaternions import align_signs
 
 from .admission import CLOCK
-from .events import Event, What
+from .events import What
 from .packets import KEY, Packets
 from .receiver import LONGEST_FADE, Playback, PlayOut, receive
 from .smooth import reach_of
@@ -34,33 +34,6 @@ FASTER = 1.0
 
 REJECTED = {What.DUPLICATE, What.DAMAGED, What.TOO_LATE}
 """What happens to packets that become no keys."""
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """k frames that follow one another, and what has been settled meanwhile: see `Playback`."""
-
-    times: np.ndarray
-    """Of the frames, shape (k,)."""
-
-    moments: np.ndarray
-    """Of the sender's motion that they stand for, shape (k,)."""
-
-    poses: Poses
-    """Shape (k,), signs aligned, from call to call as well."""
-
-    ran_out: np.ndarray
-    """Whether a frame is beyond the newest key, bool of shape (k,)."""
-
-    events: tuple[Event, ...]
-
-    @property
-    def counts(self) -> dict[What, int]:
-        """How many packets were late, lost and so on."""
-        counted = Counter(dict.fromkeys(What, 0))
-        for event in self.events:
-            counted[event.what] += int(event.amount) if event.what is What.LOST else 1
-        return dict(counted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +125,7 @@ class LiveReceiver:
             self._remember(list(self._packets)[-MOST_PACKETS * 3 // 4 :])
         return True
 
-    def show(self, until: float) -> Shown:
+    def show(self, until: float) -> Playback:
         """The frames since the last call up to a time, of which the last may be, with the events that are settled.
 
         Until the first packet is there that is any good, there are none. Events are told when nothing can come that
@@ -160,7 +133,7 @@ class LiveReceiver:
         """
         return self._show(until, last=False)
 
-    def finish(self, until: float) -> Shown:
+    def finish(self, until: float) -> Playback:
         """The same, with all events: no more frames are to come."""
         return self._show(until, last=True)
 
@@ -171,14 +144,14 @@ class LiveReceiver:
         same = message.stream == self.stream and message.layout == self._layout
         return same and message.terms in (None, self.terms)
 
-    def _show(self, until: float, last: bool) -> Shown:
+    def _show(self, until: float, last: bool) -> Playback:
         end = math.floor(until * self.fps + CLOCK) + 1 if self.terms else self._next
         parts = [self._part(first, min(first + AT_ONCE, end)) for first in range(self._next, end, AT_ONCE)]
         if last and self.terms and np.isfinite(self.delay):
             parts.append(self._part(self._next, self._next, last=True))
         return _joined(parts)
 
-    def _part(self, first: int, end: int, last: bool = False) -> Shown:
+    def _part(self, first: int, end: int, last: bool = False) -> Playback:
         """Show the frames from one number to before another."""
         new = np.arange(first, end) / self.fps
         self._next = end
@@ -198,7 +171,7 @@ class LiveReceiver:
             quaternions = align_signs(np.concatenate((self._shown, quaternions)))[1:]
         self._shown = quaternions[-1:] if len(quaternions) else self._shown
         poses = Poses(playback.poses.positions[begin:], quaternions)
-        return Shown(playback.times[begin:], playback.moments[begin:], poses, playback.ran_out[begin:], events)
+        return Playback(playback.times[begin:], poses, playback.delays[begin:], playback.ran_out[begin:], events)
 
     def _receive(self, times: np.ndarray, play_out: PlayOut) -> Playback:
         """What the packets that are remembered make of the frames at these times."""
@@ -251,20 +224,20 @@ class LiveReceiver:
         self._held = {packet.sequence: self._held[packet.sequence] for packet in self._packets}
 
 
-NOTHING = Shown(np.empty(0), np.empty(0), Poses(np.empty((0, 3)), np.empty((0, 4))), np.empty(0, dtype=bool), ())
+NOTHING = Playback(np.empty(0), Poses(np.empty((0, 3)), np.empty((0, 4))), np.empty(0), np.empty(0, dtype=bool), ())
 
 
-def _joined(parts: list[Shown]) -> Shown:
+def _joined(parts: list[Playback]) -> Playback:
     """Frames that follow one another."""
-    times, moments, positions, quaternions, ran_out = (
+    times, delays, positions, quaternions, ran_out = (
         np.concatenate(column)
         for column in zip(
             *(
-                (part.times, part.moments, part.poses.positions, part.poses.quaternions, part.ran_out)
+                (part.times, part.delays, part.poses.positions, part.poses.quaternions, part.ran_out)
                 for part in (NOTHING, *parts)
             ),
             strict=True,
         )
     )
     events = tuple(event for part in parts for event in part.events)
-    return Shown(times, moments, Poses(positions, quaternions), ran_out, events)
+    return Playback(times, Poses(positions, quaternions), delays, ran_out, events)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from addon.motion import MODES
 from addon.motion.quaternions import angle_between
 from scripts.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive, send
-from scripts.streaming.live import MOST_PACKETS, LiveReceiver, Shown
+from scripts.streaming.live import MOST_PACKETS, LiveReceiver
 from scripts.streaming.packets import HEADER, sealed
 from scripts.streaming.wire import Terms, beat, changed
 from tests.scripts.streaming.motions import swinging
@@ -44,7 +44,7 @@ def terms_of(packets: Packets, mode: str, wait: float = 2.0, **play_out: float) 
 
 def play(
     receiver: LiveReceiver, arrivals: list[tuple[float, bytes]], until: float, step: float = 0.25
-) -> tuple[list[Shown], int]:
+) -> tuple[list[Playback], int]:
     """All that a receiver shows of datagrams that arrive at these times, and the most packets that it remembered."""
     parts, most, now = [], 0, step
     for moment, datagram in sorted(arrivals, key=lambda arrival: arrival[0]):
@@ -68,7 +68,7 @@ def first_of_each(arrivals: list[tuple[float, bytes]], size: int) -> tuple[np.nd
     return data, np.array([moment for moment, _ in came.values()])
 
 
-def assert_same(parts: list[Shown], whole: Playback, tolerance: float = 1e-9) -> None:
+def assert_same(parts: list[Playback], whole: Playback, tolerance: float = 1e-9) -> None:
     times = np.concatenate([part.times for part in parts])
     assert times == pytest.approx(whole.times, abs=1e-12)
     positions = np.concatenate([part.poses.positions for part in parts])
@@ -79,7 +79,7 @@ def assert_same(parts: list[Shown], whole: Playback, tolerance: float = 1e-9) ->
     assert np.array_equal(np.concatenate([part.ran_out for part in parts]), whole.ran_out)
 
 
-def counts(parts: list[Shown]) -> dict[What, int]:
+def counts(parts: list[Playback]) -> dict[What, int]:
     return {what: sum(part.counts[what] for part in parts) for what in What}
 
 
@@ -93,7 +93,7 @@ def run(
     again: float = 0.0,
     step: float = 0.25,
     **play_out: float,
-) -> tuple[list[Shown], Playback, int]:
+) -> tuple[list[Playback], Playback, int]:
     """What a live receiver shows of a stream over a link, what `receive` does, and the most that was remembered."""
     random = np.random.default_rng(seed)
     packets = packets_of(seed, seconds, mode)
