@@ -574,6 +574,7 @@ def _files(found: Results) -> list[str]:
         "| `timing.csv` | the races |",
         "| `catching.csv`, `triangle.csv`, `strips.csv` | the figures in numbers |",
         "| `bandwidth.csv` | bytes |",
+        "| `sending.csv`, `sent.csv` | streams that are sent when needed: every cell, and every stream behind it |",
     ]
 
 
