@@ -362,7 +362,7 @@ def source_of(clip: Clip, options: argparse.Namespace, stream: int) -> Source:
     if options.rate:
         return EvenSource(clip.times, poses, options.rate, packing, stream, options.mode or "dq_sclerp", options.delay)
     mode = options.mode or TWISTS
-    sender = NeededSender(options.tolerance.tolerance(clip), options.delay or DELAY, mode)
+    sender = NeededSender(options.tolerance.tolerance(clip), options.delay or DELAY, mode, packing=packing)
     return NeededSource(clip.times, poses, sender, packing, stream, mode)
 
 

@@ -124,6 +124,8 @@ class NeededSender:
         """The interval that sender and receiver agree on."""
         self.play_out = PlayOut(wait=INTERVALS, fade=FADE, lead=0.0)
         """How the receiver deals with time."""
+        self.next = np.inf
+        """When the next key is due by all samples so far; infinite where none is needed yet."""
         self._tolerance, self._delay, self._mode, self._radius = tolerance, delay, mode, radius
         self._packing = packing
         self._times = np.empty(0)
@@ -166,7 +168,7 @@ class NeededSender:
         return self._due(np.inf)
 
     def _due(self, now: float | None) -> list[Key]:
-        due = []
+        due, self.next = [], np.inf
         if self._known is None and len(self._times):
             pose, still = self._as_read(self._poses[:1], np.zeros((1, 6)))
             due.append(self._send(float(self._times[0]), pose, still, float(self._times[0])))
@@ -175,6 +177,7 @@ class NeededSender:
             here = self._shown - 1
             when = max(self._times[here] + self._delay, self._times[here + 1])
             if when > now:
+                self.next = float(when)
                 break
             due.append(self._needed(here, float(when)))
         self._forget()

@@ -113,12 +113,10 @@ class NeededSource:
         self._samples = self._count = 0
 
     def due(self, until: float) -> list[bytes]:
-        first, end = self._samples, int(np.searchsorted(self._times, until, side="right"))
-        if end <= first:
-            return []
-        self._samples = end
-        keys = self._sender.push(self._times[first:end], self._poses[first:end])
-        if end == len(self._times):
+        first = self._samples
+        self._samples = end = max(first, int(np.searchsorted(self._times, until, side="right")))
+        keys = self._sender.push(self._times[first:end], self._poses[first:end], until)
+        if first < end == len(self._times):
             keys = [*keys, *self._sender.finish()]
         datagrams = []
         for key in keys:
@@ -138,4 +136,5 @@ class NeededSource:
         return datagrams
 
     def next(self) -> float:
-        return float(self._times[self._samples]) if self._samples < len(self._times) else np.inf
+        sample = float(self._times[self._samples]) if self._samples < len(self._times) else np.inf
+        return min(sample, self._sender.next)
