@@ -26,6 +26,7 @@ import shutil
 import subprocess
 import sys
 import venv
+from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,7 +74,19 @@ def main(arguments: list[str]) -> int:
         return 1
     # Paths that a user gives count from where the user is; those of pytest from where its configuration is. Dask has to
     # find this program as well.
-    return subprocess.call([python, *run, *rest], cwd=ROOT if command in ("test", "dask") else None)
+    folder = ROOT if command in ("test", "dask") else None
+    return subprocess.call([python, *run, *rest], cwd=folder, env=environment(os.environ))
+
+
+def environment(environ: Mapping[str, str]) -> dict[str, str]:
+    """What programs run in: as here, but where Python is to leave no bytecode in folders, it goes into .venv/.
+
+    Without any, every process compiles all of the program again, and pytest all that it asserts with.
+    """
+    ours = dict(environ)
+    if ours.pop("PYTHONDONTWRITEBYTECODE", ""):
+        ours.setdefault("PYTHONPYCACHEPREFIX", str(ROOT / ".venv" / "bytecode"))
+    return ours
 
 
 def install(blender: str, requirements: list[str]) -> Path | None:

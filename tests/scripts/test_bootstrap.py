@@ -79,3 +79,11 @@ def test_a_missing_bpy_is_told_from_a_missing_library():
 
 def test_this_machine_can_render():
     assert missing_for_rendering() is None
+
+
+def test_bytecode_is_kept_out_of_the_checkout_where_it_is_not_wanted_there():
+    kept = bootstrap.environment({"PYTHONDONTWRITEBYTECODE": "1", "PATH": "/bin"})
+    assert kept == {"PATH": "/bin", "PYTHONPYCACHEPREFIX": str(bootstrap.ROOT / ".venv" / "bytecode")}
+    chosen = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPYCACHEPREFIX": "/elsewhere"}
+    assert bootstrap.environment(chosen) == {"PYTHONPYCACHEPREFIX": "/elsewhere"}
+    assert bootstrap.environment({"PATH": "/bin"}) == {"PATH": "/bin"}
