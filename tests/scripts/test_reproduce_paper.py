@@ -209,3 +209,25 @@ def test_a_recording_that_cannot_be_read_does_not_stop_the_others(
     assert "- Left out: `broken`" in text
     assert "- Recordings: `reach-2`" in text
     assert str(tmp_path) not in text
+
+
+def test_the_section_on_streams_alone_is_written_and_put_into_a_page(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "paper.md").write_text("# Paper\n\nWords.\n\n## Bytes\n\nb\n", encoding="utf-8")
+    arguments = ["--only-sending", "--output", str(tmp_path / "out"), "--docs", str(tmp_path / "docs")]
+    assert reproduce_paper.main(arguments) == 0
+    page = (tmp_path / "docs" / "paper.md").read_text(encoding="utf-8")
+    assert page.startswith("# Paper\n\nWords.\n\n## Sending when needed\n")
+    assert page.endswith("\n\n## Bytes\n\nb\n")
+    assert "**RMS shell error, assets**" in page
+    assert capfd.readouterr().out.splitlines()[-1] == str((tmp_path / "docs" / "paper.md").resolve())
+    written = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
+    assert written == {"sending.md", "sending.csv", "sent.csv", "manifest.json"}
+    assert reproduce_paper.main(arguments) == 0
+    assert "up to date" in capfd.readouterr().err
+
+
+def test_one_section_alone_is_enough(capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit):
+        reproduce_paper.main(["--only-sending", "--only-bodies"])
+    assert "not allowed with argument" in capsys.readouterr().err
