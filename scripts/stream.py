@@ -242,10 +242,11 @@ def send(options: argparse.Namespace, stopped: list[int]) -> None:
                 _send_all(endpoint, playing.goodbye(min(stop, end)))
             if stopped:
                 stage.total = max(stage.done, 1e-9)
+        count = len(playing.receivers)
         _say(
             f"updates: {playing.updates}",
             f"heartbeats: {playing.heartbeats}",
-            f"datagrams: {playing.datagrams}, to {len(playing.receivers)} receivers",
+            f"datagrams: {playing.datagrams}, to {count} receiver{'s' * (count != 1)}",
             *lines_of_bytes(playing.bytes, playing.pose_bytes, max(seconds, 1e-9)),
         )
         if endpoint.unsent:
