@@ -267,15 +267,19 @@ def test_few_old_numbers_throw_no_good_key_away(count):
 # Several
 
 
-@settings(max_examples=tried(200))
+@settings(max_examples=tried(100))
 @given(
     mode=modes,
     told=st.dictionaries(st.integers(0, 20), lies, max_size=12),
     seed=st.integers(0, 2**32 - 1),
     jitter=st.sampled_from([0.0, 0.02, 0.3]),
 )
+@example(mode="lerp_slerp", told={0: {"age": 3.0}, 1: {"sequence": 89, "age": 0.0, "stamp": 5.0}}, seed=0, jitter=0.0)
 def test_of_several_liars_among_duplicates_that_overtake_one_another_nothing_is_left(mode, told, seed, jitter):
-    """All that goes wrong has gone wrong by 2 s. The delay may be that of another packet than the first."""
+    """All that goes wrong has gone wrong by 2 s. The delay may be that of another packet than the first.
+
+    A first packet that lies about the clock vouches for one that lies by `FAR` more.
+    """
     random = np.random.default_rng(seed)
     packets, sent = STREAMS[mode], STREAMS[mode].stamps
     way = LATENCY + np.where(sent < 1.1, np.minimum(random.exponential(jitter, COUNT), 0.4), 0.0)
@@ -285,7 +289,7 @@ def test_of_several_liars_among_duplicates_that_overtake_one_another_nothing_is_
     playback = receive(with_lies(packets, told)[rows], arrivals, DISPLAY, mode)
     assert_shown(playback)
     assert playback.delay <= LATENCY + FAR + 0.4 + 2.0 * lead(mode)
-    begin = 2.0 + recovery(mode, near=True) + max(playback.delay, 0.0)
+    begin = 2.0 + FAR + recovery(mode, near=True) + max(playback.delay, 0.0)
     assert apart(playback, undisturbed(mode, playback.delay), begin) < 1e-9
 
 
