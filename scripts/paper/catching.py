@@ -26,6 +26,7 @@ from scripts.comparison.stage.subject import load_subject
 from scripts.comparison.study.clips import Clip
 from scripts.comparison.study.modes import label_of
 from scripts.streaming import Link, Playback, receive, send
+from scripts.streaming.smooth import joined
 
 from .picture import FAINT, INK, RULE, Sheet
 from .table import PHASES
@@ -116,11 +117,11 @@ def bodies(clip: Clip) -> tuple[np.ndarray, dict[str, Poses]]:
     return times, {
         "tool": tool,
         "thrower": interpolate(
-            [*times[throwing], withdrawn, END], _joined(held[throwing], held[[0, 0]]), times, "motor_spline"
+            [*times[throwing], withdrawn, END], joined((held[throwing], held[[0, 0]])), times, "motor_spline"
         ),
         "catcher": interpolate(
             [times[0] - 1.0, times[catching][0] - WITHDRAWN, *times[catching]],
-            _joined(ready[[0, 0]], held[catching]),
+            joined((ready[[0, 0]], held[catching])),
             times,
             "motor_spline",
         ),
@@ -300,10 +301,3 @@ def _apart(tool: Poses, hand: Poses) -> np.ndarray:
     """Between the tool's origin and where the hand holds it, shape (n,)."""
     holds = hand.positions - rotate(hand.quaternions, np.broadcast_to(GRIP, hand.positions.shape))
     return np.linalg.norm(holds - tool.positions, axis=-1)
-
-
-def _joined(first: Poses, second: Poses) -> Poses:
-    """One after the other."""
-    return Poses(
-        np.concatenate((first.positions, second.positions)), np.concatenate((first.quaternions, second.quaternions))
-    )

@@ -19,9 +19,22 @@ from .bandwidths import Bandwidth
 from .bows import SCREW
 from .catching import LINK
 from .results import Results
-from .table import ADAPTIVE, UNIFORM, YARDSTICKS, Needed
+from .table import ADAPTIVE, UNIFORM, YARDSTICKS
 from .timing import ALGEBRA, AS_GOOD, CONFIDENCE, EQUAL, FAST, FRAMES_PER_S, PAPER, SINGLE, USERS, Timing
-from .wording import changed, doubt, grid, less, number, percent, percents, timed, verdict
+from .wording import (
+    changed,
+    doubt,
+    grid,
+    heads,
+    less,
+    needed_cell,
+    number,
+    papers_row,
+    percent,
+    percents,
+    timed,
+    verdict,
+)
 
 BLEND = "pga_lerp"
 """The multivectors of the paper."""
@@ -268,19 +281,18 @@ def _table(found: Results) -> list[str]:
 
 
 def _needed_grid(found: Results, clips: str, yardstick: str) -> list[str]:
-    head = ["", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
-    rows = [["*the paper*", *(f"*{row.multivectors} ({row.saved:.0%})*" for row in claims.TABLE)]]
+    rows = [papers_row()]
     cells: dict[tuple[str, ...], list[str]] = {}
     for decimation in (UNIFORM, ADAPTIVE):
         for mode in dict.fromkeys(one.mode for one in found.needed if one.decimation == decimation):
             texts = [
-                _needed_cell(found.cell(clips, row.state_of_the_art, mode, decimation, yardstick))
+                needed_cell(found.cell(clips, row.state_of_the_art, mode, decimation, yardstick))
                 for row in claims.TABLE
             ]
             keys = ", keys where needed" if decimation == ADAPTIVE else ""
             cells.setdefault((keys, *texts), []).append(f"`{mode}`")
     rows += [[" = ".join(modes) + keys, *texts] for (keys, *texts), modes in cells.items()]
-    return grid(head, rows)
+    return grid(heads(""), rows)
 
 
 def _clips_counted(found: Results) -> str:
@@ -296,13 +308,6 @@ def _check(found: Results) -> float:
     """How far the state of the art is from needing what it has, at most."""
     cells = [one for one in found.needed if one.clips in found.sets and one.mode == REFERENCE]
     return max(abs(one.saved) for one in cells if one.decimation == UNIFORM)
-
-
-def _needed_cell(cell: Needed | None) -> str:
-    if cell is None or not np.isfinite(cell.needed):
-        return "-"
-    part = "" if cell.reached == cell.asked else f"; {cell.reached} of {cell.asked} clips"
-    return f"{cell.needed:.1f} ({percent(cell.saved)}{part})"
 
 
 def _clip_by_clip(found: Results) -> list[str]:

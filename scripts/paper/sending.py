@@ -15,14 +15,15 @@ import numpy as np
 
 from addon.motion import measure, rms
 from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.metrics import NOTHING, geometric_mean
+from scripts.comparison.study.metrics import NOTHING
 from scripts.comparison.study.modes import REFERENCE
 from scripts.streaming import PACKINGS, TWISTS, receive
 from scripts.streaming.needed import send_when_needed
-from scripts.streaming.packets import HEADER
+from scripts.streaming.playing import HEARTBEAT
+from scripts.streaming.wire import Layout
 
 from . import claims
-from .table import RADIUS, UNIFORM, UPDATES, YARDSTICKS, Point, lowest, point, rates_for, senders
+from .table import RADIUS, UNIFORM, UPDATES, YARDSTICKS, Point, lowest, mean_rates, point, rates_for, senders
 
 DELAYS = (1.5, 2.0, 3.0, 4.0)
 """Intervals of the even stream."""
@@ -31,9 +32,6 @@ MODES_SENT = (REFERENCE, TWISTS)
 
 TOLERANCES = (1.0, 1.6, 2.4, 3.6, 5.2)
 """Multiples of the RMS shell error of the even stream."""
-
-HEARTBEAT = 0.5
-"""Seconds of silence after which the newest key is sent again."""
 
 AROUND_A_PACKET = 28
 """Bytes that UDP over IPv4 adds."""
@@ -102,7 +100,7 @@ def measure_sending(clip: Clip, advance: Callable[[], object] = lambda: None) ->
         Called as often as there are `steps_of` the clip.
     """
     even, sent = [], []
-    for rate in (rate for rate in UPDATES if rate in rates_for(clip)):
+    for rate in _even_rates(clip):
         reference = point(clip, REFERENCE, UNIFORM, rate, senders(clip, rate))
         even.append(reference)
         for delay in DELAYS:
@@ -116,7 +114,13 @@ def measure_sending(clip: Clip, advance: Callable[[], object] = lambda: None) ->
 
 def steps_of(clip: Clip) -> int:
     """How often `measure_sending` advances."""
-    return sum(rate in rates_for(clip) for rate in UPDATES) * len(DELAYS) * len(MODES_SENT)
+    return len(_even_rates(clip)) * len(DELAYS) * len(MODES_SENT)
+
+
+def _even_rates(clip: Clip) -> list[int]:
+    """The rates of the paper's rows that the clip has samples enough for."""
+    rates = rates_for(clip)
+    return [rate for rate in UPDATES if rate in rates]
 
 
 def stream(clip: Clip, mode: str, even: int, delay: float, tolerance: float) -> Sent:
@@ -144,8 +148,7 @@ def stream(clip: Clip, mode: str, even: int, delay: float, tolerance: float) -> 
 
 def packet_bytes(packing: str, mode: str) -> int:
     """Bytes of an update with everything around it."""
-    size = PACKINGS[packing].size + (PACKINGS[packing].twist_size if mode == TWISTS else 0)
-    return AROUND_A_PACKET + HEADER.itemsize + size
+    return AROUND_A_PACKET + Layout(PACKINGS[packing], mode == TWISTS).size
 
 
 def sending_needed(even: Iterable[Point], sent: Iterable[Sent]) -> list[SentNeeded]:
@@ -166,18 +169,12 @@ def sending_needed(even: Iterable[Point], sent: Iterable[Sent]) -> list[SentNeed
 
 def mean_sending(cells: Iterable[SentNeeded], name: str, clips: Iterable[str]) -> list[SentNeeded]:
     """Geometric means over some clips, of those on which the error was reached."""
-    members = set(clips)
-    of_kind: dict[tuple[int, str, float, str], list[SentNeeded]] = {}
-    for cell in cells:
-        if cell.clips in members:
-            of_kind.setdefault((cell.updates, cell.mode, cell.delay, cell.yardstick), []).append(cell)
-    means = []
-    for (updates, mode, delay, yardstick), found in of_kind.items():
-        shares = np.array([cell.needed for cell in found]) / updates
-        there = int(np.isfinite(shares).sum())
-        share = float(geometric_mean(shares)) if there else float("inf")
-        means.append(_cell(name, updates, mode, delay, yardstick, share, there, len(found)))
-    return means
+    return [
+        _cell(name, updates, mode, delay, yardstick, rate / updates, there, asked)
+        for (updates, mode, delay, yardstick), rate, there, asked in mean_rates(
+            cells, clips, lambda cell: (cell.updates, cell.mode, cell.delay, cell.yardstick)
+        )
+    ]
 
 
 def _cell(
@@ -190,11 +187,13 @@ def _cell(
     return SentNeeded(clips, updates, mode, delay, yardstick, share * updates, 1.0 - share, *saved, reached, asked)
 
 
-def at_delay(cells: Sequence[SentNeeded], clips: str, mode: str, delay: float, yardstick: str) -> list[SentNeeded]:
-    """A row of the table: the cells that there are, in the order of the paper's rows."""
+def at_delay(
+    cells: Sequence[SentNeeded], clips: str, mode: str, delay: float, yardstick: str
+) -> list[SentNeeded | None]:
+    """A row of the table, in the order of the paper's; None where there is no cell."""
     row = {
         cell.updates: cell
         for cell in cells
         if (cell.clips, cell.mode, cell.delay, cell.yardstick) == (clips, mode, delay, yardstick)
     }
-    return [row[one.state_of_the_art] for one in claims.TABLE if one.state_of_the_art in row]
+    return [row.get(one.state_of_the_art) for one in claims.TABLE]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from scripts.comparison.report.findings import listed
 from scripts.comparison.study.modes import REFERENCE
 from scripts.streaming import TWISTS
@@ -13,7 +11,7 @@ from scripts.streaming import TWISTS
 from . import claims
 from .sending import AROUND_A_PACKET, DELAYS, HEARTBEAT, MODES_SENT, SentNeeded, at_delay, packet_bytes
 from .table import YARDSTICKS
-from .wording import grid, percent, percents, verdict
+from .wording import grid, heads, holding, needed_cell, papers_row, percent, percents, verdict
 
 HEADING = "## Sending when needed"
 
@@ -47,7 +45,7 @@ def sending_section(found: Sequence[SentNeeded], sets: Sequence[str]) -> list[st
 def in_short(found: Sequence[SentNeeded], clips: str) -> list[str]:
     """A line on these streams, for the beginning of the page."""
     rows = at_delay(found, clips, TWISTS, 2.0, next(iter(YARDSTICKS)))
-    if len(rows) != len(claims.TABLE):
+    if None in rows:
         return []
     updates, numbers = [cell.saved for cell in rows], [_of_numbers(cell) for cell in rows]
     packed, small = [cell.saved_bytes for cell in rows], [cell.saved_small for cell in rows]
@@ -70,21 +68,12 @@ def _of_numbers(cell: SentNeeded) -> float:
 
 
 def _grid(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]:
-    head = ["sent when needed", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
-    rows = [["*the paper*", *(f"*{row.multivectors} ({row.saved:.0%})*" for row in claims.TABLE)]]
-    for mode in MODES_SENT:
-        for delay in DELAYS:
-            cells = {cell.updates: cell for cell in at_delay(found, clips, mode, delay, yardstick)}
-            texts = [_cell(cells.get(row.state_of_the_art)) for row in claims.TABLE]
-            rows.append([f"`{mode}`, {delay:g} intervals", *texts])
-    return grid(head, rows)
-
-
-def _cell(cell: SentNeeded | None) -> str:
-    if cell is None or not np.isfinite(cell.needed):
-        return "-"
-    part = "" if cell.reached == cell.asked else f"; {cell.reached} of {cell.asked} clips"
-    return f"{cell.needed:.1f} ({percent(cell.saved)}{part})"
+    rows = [
+        [f"`{mode}`, {delay:g} intervals", *map(needed_cell, at_delay(found, clips, mode, delay, yardstick))]
+        for mode in MODES_SENT
+        for delay in DELAYS
+    ]
+    return grid(heads("sent when needed"), [papers_row(), *rows])
 
 
 def _verdicts(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]:
@@ -94,31 +83,29 @@ def _verdicts(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[s
     for mode in MODES_SENT:
         told = []
         for delay in DELAYS:
-            cells = {cell.updates: cell.saved for cell in at_delay(found, clips, mode, delay, yardstick)}
-            shares = [cells.get(row.state_of_the_art, float("nan")) for row in claims.TABLE]
+            cells = at_delay(found, clips, mode, delay, yardstick)
+            shares = [cell.saved if cell else float("nan") for cell in cells]
             told.append(f"at {delay:g} intervals, {_held(shares)}")
         lines.append(f"- `{mode}`: {'; '.join(told)}.")
     return lines
 
 
 def _held(shares: Sequence[float]) -> str:
-    held = [f"{row.saved:.0%}" for row, share in zip(claims.TABLE, shares, strict=True) if share >= row.saved - 0.005]
+    held = [f"{row.saved:.0%}" for row in holding(shares)]
     if len(held) == len(claims.TABLE):
         return "all hold"
     return f"{listed(held)} {'hold' if len(held) > 1 else 'holds'}" if held else "none holds"
 
 
 def _bytes(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]:
-    head = ["bytes saved", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
     rows = []
     for mode in (REFERENCE, TWISTS):
         for delay in DELAYS:
-            cells = {cell.updates: cell for cell in at_delay(found, clips, mode, delay, yardstick)}
             texts = [
                 "-"
                 if cell is None
                 else f"{percent(_of_numbers(cell))}; {percent(cell.saved_bytes)}; {percent(cell.saved_small)}"
-                for cell in (cells.get(row.state_of_the_art) for row in claims.TABLE)
+                for cell in at_delay(found, clips, mode, delay, yardstick)
             ]
             rows.append([f"`{mode}`, {delay:g} intervals", *texts])
     sizes = [
@@ -130,7 +117,7 @@ def _bytes(found: Sequence[SentNeeded], clips: str, yardstick: str) -> list[str]
         f"{YARDSTICKS[yardstick]}: an update in doubles has {sizes[0]}; in the smallest packing {sizes[1]}. In a cell: "
         "what is saved of the numbers alone, as the paper counts; of bytes in doubles; and in the smallest packing.",
         "",
-        *grid(head, rows),
+        *grid(heads("bytes saved"), rows),
     ]
 
 

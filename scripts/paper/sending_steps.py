@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scripts.rows import read_rows, write_rows
+from scripts.rows import read_all_rows, write_rows
 from scripts.workplan import Job, step
 
 from . import sending, table
@@ -30,7 +30,7 @@ def gather_sending(job: Job, *, names: list[str]) -> None:
     """Bring the clips together, and find what each needs."""
 
     def gathered(part: str, kind: type) -> list:
-        return [row for name in names for row in read_rows(job.reads(f"sending/{name}/{part}"), kind)]
+        return read_all_rows((job.reads(f"sending/{name}/{part}") for name in names), kind)
 
     motions, even = gathered("clip.csv", Motion), gathered("even.csv", table.Point)
     sent = gathered("sent.csv", sending.Sent)

@@ -21,7 +21,7 @@ from scripts.comparison.study.modes import REFERENCE
 from scripts.comparison.study.reading import folder_names, read_clips
 from scripts.comparison.version import step_versions
 from scripts.files import write_text
-from scripts.rows import read_rows, write_rows
+from scripts.rows import read_all_rows, read_rows, write_rows
 from scripts.workplan import Job, Plan, Task, step
 
 from . import (
@@ -279,7 +279,7 @@ def tabulate(job: Job, *, names: list[str]) -> None:
     """Bring the clips together, and find what each mode needs."""
 
     def gathered(part: str, kind: type) -> list:
-        return [row for name in names for row in read_rows(job.reads(f"clips/{name}/{part}"), kind)]
+        return read_all_rows((job.reads(f"clips/{name}/{part}") for name in names), kind)
 
     motions, points = gathered("clip.csv", Motion), gathered("errors.csv", table.Point)
     cells = table.needed_by(points)
@@ -325,8 +325,7 @@ def gather_bodies(job: Job, *, names: list[str], asked: list[str]) -> None:
         if looked_at[name][0].left_out:
             job.note(f"{name} does not count among bodies: {looked_at[name][0].left_out}")
     for part, kind in bodies.FILES.items():
-        rows = [row for name in kept for row in read_rows(job.reads(f"bodies/{name}/{part}"), kind)]
-        write_rows(job.writes(part), kind, rows)
+        write_rows(job.writes(part), kind, read_all_rows((job.reads(f"bodies/{name}/{part}") for name in kept), kind))
 
 
 # -- the figures -------------------------------------------------------------------------------------------------------

@@ -11,8 +11,9 @@ curves are smooth enough for the other two.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -117,6 +118,10 @@ class Needed:
 
     asked: int
     """Of how many."""
+
+
+Cell = TypeVar("Cell")
+"""With `clips` and `needed`."""
 
 
 def rates_for(clip: Clip) -> np.ndarray:
@@ -259,16 +264,27 @@ def look_ahead(cells: Iterable[Needed], clips: str) -> list[LookAhead]:
 
 def mean_over(cells: Iterable[Needed], name: str, clips: Iterable[str]) -> list[Needed]:
     """Geometric means over some clips, of those on which the error was reached."""
+    return [
+        Needed(name, updates, mode, decimation, yardstick, rate, 1.0 - rate / updates, there, asked)
+        for (updates, mode, decimation, yardstick), rate, there, asked in mean_rates(
+            cells, clips, lambda cell: (cell.updates, cell.mode, cell.decimation, cell.yardstick)
+        )
+    ]
+
+
+def mean_rates(
+    cells: Iterable[Cell], clips: Iterable[str], kind: Callable[[Cell], tuple]
+) -> Iterator[tuple[tuple, float, int, int]]:
+    """Of each kind of cell the geometric mean over some clips of what is needed, on how many it was found, of how many.
+
+    Infinite where it was on none.
+    """
     members = set(clips)
-    of_kind: dict[tuple[int, str, str, str], list[Needed]] = {}
+    of_kind: dict[tuple, list[float]] = {}
     for cell in cells:
         if cell.clips in members:
-            of_kind.setdefault((cell.updates, cell.mode, cell.decimation, cell.yardstick), []).append(cell)
-    means = []
-    for (updates, mode, decimation, yardstick), found in of_kind.items():
-        rates = np.array([cell.needed for cell in found])
+            of_kind.setdefault(kind(cell), []).append(cell.needed)
+    for one, found in of_kind.items():
+        rates = np.array(found)
         there = int(np.isfinite(rates).sum())
-        rate = float(geometric_mean(rates)) if there else float("inf")
-        saved = 1.0 - rate / updates
-        means.append(Needed(name, updates, mode, decimation, yardstick, rate, saved, there, len(found)))
-    return means
+        yield one, float(geometric_mean(rates)) if there else float("inf"), there, len(found)

@@ -10,6 +10,8 @@ from scripts.comparison.report.findings import listed
 from scripts.comparison.study.modes import REFERENCE
 
 from . import claims
+from .sending import SentNeeded
+from .table import Needed
 from .timing import Timing
 
 
@@ -25,10 +27,33 @@ def less(saved: Sequence[float]) -> str:
 
 def verdict(saved: Sequence[float]) -> str:
     """Whether the paper's saving is there."""
-    good = [row.quality.lower() for row, share in zip(claims.TABLE, saved, strict=True) if share >= row.saved - 0.005]
+    good = [row.quality.lower() for row in holding(saved)]
     if len(good) == len(claims.TABLE):
         return "That is the paper's saving in every row."
     return f"The paper's saving is there for {listed(good)}." if good else "The paper's saving is in no row."
+
+
+def holding(saved: Sequence[float]) -> list[claims.Row]:
+    """The rows of the paper's table whose saving is there, to the percent."""
+    return [row for row, share in zip(claims.TABLE, saved, strict=True) if share >= row.saved - 0.005]
+
+
+def needed_cell(cell: Needed | SentNeeded | None) -> str:
+    """A cell of a table of what is needed: updates a second, what is saved, and on how many clips if not on all."""
+    if cell is None or not np.isfinite(cell.needed):
+        return "-"
+    part = "" if cell.reached == cell.asked else f"; {cell.reached} of {cell.asked} clips"
+    return f"{cell.needed:.1f} ({percent(cell.saved)}{part})"
+
+
+def heads(first: str) -> list[str]:
+    """The heads of a table whose columns are the rows of the paper's."""
+    return [first, *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
+
+
+def papers_row() -> list[str]:
+    """What the paper says, as a row of such a table."""
+    return ["*the paper*", *(f"*{row.multivectors} ({row.saved:.0%})*" for row in claims.TABLE)]
 
 
 def changed(relative: float) -> str:

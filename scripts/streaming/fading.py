@@ -11,7 +11,8 @@ Source of the idea: Bollo, "Inertialization: High-Performance Animation Transiti
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,15 @@ class Jumps:
         sines = np.linalg.norm(turns[:, 1:], axis=-1)
         axes = turns[:, 1:] / np.maximum(sines, SMALLEST_SINE)[:, None]
         return cls(times, durations, old.positions - new.positions, np.arctan2(sines, turns[:, 0]), axes)
+
+    def __getitem__(self, index: Any) -> Jumps:
+        """Some of the changes, by NumPy's rules: a slice, a mask, or indices, of which some may come again."""
+        return Jumps(*(getattr(self, field.name)[index] for field in fields(self)))
+
+    def then(self, others: Jumps) -> Jumps:
+        """These changes, and others after them."""
+        both = ((getattr(self, field.name), getattr(others, field.name)) for field in fields(self))
+        return Jumps(*map(np.concatenate, both))
 
 
 def fade(times: np.ndarray, path: Poses, jumps: Jumps) -> Poses:

@@ -50,8 +50,8 @@ class KnownKeys:
 
     @property
     def _behind(self) -> int:
-        """The keys of a window before the two of its segment: at least 1, for going on beyond the newest key."""
-        return max(self._reach.behind, 1)
+        """The keys of a window before the two of its segment."""
+        return self._reach.before
 
     @cached_property
     def _arrivals(self) -> tuple[np.ndarray, np.ndarray]:

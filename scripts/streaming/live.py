@@ -20,7 +20,7 @@ from .admission import CLOCK
 from .events import What
 from .packets import KEY, Packets
 from .receiver import LONGEST_FADE, Playback, PlayOut, receive
-from .smooth import reach_of
+from .smooth import NO_POSES, joined, reach_of
 from .wire import BEAT, Layout, Message, Terms, key_of, pose_bytes, read
 
 MOST_PACKETS = 4096
@@ -214,7 +214,7 @@ class LiveReceiver:
             elif packet.arrival > oldest - self.terms.delay - self.margin - self.reach:
                 kept.append(place)  # It is still to be shown. If that takes longer, its stamp lies.
         # Of keys that have been shown, and were known then, those that a segment may look back to.
-        few = max(reach_of(self.terms.mode).behind, 1) + 2
+        few = reach_of(self.terms.mode).before + 2
         kept += sorted(passed, key=lambda place: self._packets[place].stamp)[-few:]
         if len(kept) < len(self._packets):
             self._remember([self._packets[place] for place in sorted(kept)])
@@ -224,20 +224,14 @@ class LiveReceiver:
         self._held = {packet.sequence: self._held[packet.sequence] for packet in self._packets}
 
 
-NOTHING = Playback(np.empty(0), Poses(np.empty((0, 3)), np.empty((0, 4))), np.empty(0), np.empty(0, dtype=bool), ())
+NOTHING = Playback(np.empty(0), NO_POSES, np.empty(0), np.empty(0, dtype=bool), ())
 
 
 def _joined(parts: list[Playback]) -> Playback:
     """Frames that follow one another."""
-    times, delays, positions, quaternions, ran_out = (
-        np.concatenate(column)
-        for column in zip(
-            *(
-                (part.times, part.delays, part.poses.positions, part.poses.quaternions, part.ran_out)
-                for part in (NOTHING, *parts)
-            ),
-            strict=True,
-        )
+    parts = [NOTHING, *parts]
+    times, delays, ran_out = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("times", "delays", "ran_out")
     )
     events = tuple(event for part in parts for event in part.events)
-    return Playback(times, Poses(positions, quaternions), delays, ran_out, events)
+    return Playback(times, joined(part.poses for part in parts), delays, ran_out, events)

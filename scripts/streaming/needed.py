@@ -10,7 +10,7 @@ Source of the idea: dead reckoning, as in IEEE 1278.1 (Distributed Interactive S
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from .known_keys import NONE, KnownKeys
 from .packets import Packets
 from .packing import PACKINGS, Packing
 from .receiver import PlayOut, fade_durations
-from .smooth import LEAST, TWISTS, fitted, reach_of
+from .smooth import LEAST, NO_POSES, TWISTS, fitted, joined, reach_of
 
 INTERVALS = 2.0
 """Into so many intervals the delay is divided: by them the receiver counts how long differences fade."""
@@ -32,7 +32,7 @@ FADE = 0.5
 is no need to be slow about it."""
 
 AROUND = 0.25
-"""A twist is that of the samples within this part of the delay: see `smooth.fitted`."""
+"""A key is fitted to the samples within this part of the delay, its twist as well: see `smooth.fitted`."""
 
 FIRST = 12
 """So many samples are tried first; then those between the furthest that will do and the next of them."""
@@ -129,7 +129,7 @@ class NeededSender:
         self._tolerance, self._delay, self._mode, self._radius = tolerance, delay, mode, radius
         self._packing = packing
         self._times = np.empty(0)
-        self._poses = Poses(np.empty((0, 3)), np.empty((0, 4)))
+        self._poses = NO_POSES
         self._shown = 0
         """So many of the samples are known to be shown within the tolerance."""
         self._known: KnownKeys | None = None
@@ -158,9 +158,8 @@ class NeededSender:
         if not np.isfinite(times).all() or np.any(np.diff(whole) <= 0.0):
             raise ValueError("the times of a stream need to be finite, and each later than the one before")
         self._packing.pack(poses)
-        quaternions = np.concatenate((self._poses.quaternions, normalise(poses.quaternions)))
-        self._times = whole
-        self._poses = Poses(np.concatenate((self._poses.positions, poses.positions)), align_signs(quaternions))
+        every = joined((self._poses, Poses(poses.positions, normalise(poses.quaternions))))
+        self._times, self._poses = whole, Poses(every.positions, align_signs(every.quaternions))
         return self._due(float(whole[-1]) if now is None and len(whole) else now)
 
     def finish(self) -> list[Key]:
@@ -207,7 +206,7 @@ class NeededSender:
         best = self._furthest(before, np.arange(nearer, min(further, last + 1)), last) or best
         # Where the body itself jumps none will do, and the nearest have to be as good as they are.
         best = best or self._furthest(before, np.arange(first, here + 2), last, at_any_rate=True)
-        self._jumps = _joined(self._still_fading(before), best.jump)
+        self._jumps = self._still_fading(before).then(best.jump)
         self._shown = best.sample + 1
         return self._send(float(self._times[best.sample]), best.pose, best.twist, now)
 
@@ -235,12 +234,12 @@ class NeededSender:
         if not (len(good) or at_any_rate):
             return None
         best = [int(good[-1] if len(good) else np.argmin(worst))]
-        return _Choice(int(choices[best[0]]), poses[best], None if twists is None else twists[best], _some(jumps, best))
+        return _Choice(int(choices[best[0]]), poses[best], None if twists is None else twists[best], jumps[best])
 
     def _send(self, stamp: float, pose: Poses, twist: np.ndarray | None, sent: float) -> Key:
         """Count a key among those that the receivers know."""
-        known, few = self._with(np.array([stamp]), pose, twist), max(reach_of(self._mode).behind, 1) + 1
-        newest = slice(-few, None)
+        known = self._with(np.array([stamp]), pose, twist)
+        newest = slice(-reach_of(self._mode).before - 1, None)
         twists = None if known.twists is None else known.twists[newest]
         self._known = replace(known, stamps=known.stamps[newest], poses=known.poses[newest], twists=twists)
         return Key(stamp, pose, None if twist is None else twist[0], sent)
@@ -250,14 +249,14 @@ class NeededSender:
         known = self._known
         if known is not None:
             stamps = np.concatenate((known.stamps, stamps))
-            poses = Poses(*(np.concatenate(both) for both in zip(_arrays(known.poses), _arrays(poses), strict=True)))
+            poses = joined((known.poses, poses))
             twists = None if twists is None else np.concatenate((known.twists, twists))
         return KnownKeys(stamps, poses, np.zeros(len(stamps)), self._mode, self.interval, self.play_out.carry, twists)
 
     def _windows(self, count: int, following: np.ndarray | int = NONE) -> np.ndarray:
         """The windows of moments after the last key that was sent, with the key that follows (count,) or none."""
         reach, sent = reach_of(self._mode), len(self._known.stamps)
-        behind = max(reach.behind, 1)
+        behind = reach.before
         windows = np.full((count, behind + 2), NONE)
         windows[:, behind], windows[:, behind + 1] = sent - 1, following
         # Beyond the last key the one before says where the motion was going.
@@ -274,7 +273,7 @@ class NeededSender:
         return Jumps.between(np.repeat(time, len(new)), np.repeat(duration, len(new)), old, new)
 
     def _still_fading(self, here: int) -> Jumps:
-        return _some(self._jumps, self._jumps.times + self._jumps.durations > self._times[here])
+        return self._jumps[self._jumps.times + self._jumps.durations > self._times[here]]
 
     def _as_read(self, poses: Poses, twists: np.ndarray) -> tuple[Poses, np.ndarray | None]:
         """Keys (c,) and their twists (c, 6) as the receiver reads them; twists where the mode has a use for them."""
@@ -321,26 +320,9 @@ def send_when_needed(
     sender = NeededSender(tolerance, delay, mode, radius, packing)
     keys = [*sender.push(times, poses), *sender.finish()]
     stamps, sent = np.array([key.stamp for key in keys]), np.array([key.sent for key in keys])
-    packed = Poses(
-        *(
-            np.concatenate([_arrays(key.pose)[part] for key in keys] or [empty])
-            for part, empty in enumerate(_arrays(poses[:0]))
-        )
-    )
+    packed = joined((NO_POSES, *(key.pose for key in keys)))
     twists = np.array([key.twist for key in keys]).reshape(-1, 6) if mode == TWISTS else None
     return Packets.of(stamps, packed, sender.interval, packing, twists=twists, ages=sent - stamps), sender.play_out
-
-
-def _arrays(poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-    return poses.positions, poses.quaternions
-
-
-def _some(jumps: Jumps, which: np.ndarray) -> Jumps:
-    return Jumps(*(getattr(jumps, field.name)[which] for field in fields(jumps)))
-
-
-def _joined(first: Jumps, second: Jumps) -> Jumps:
-    return Jumps(*(np.concatenate((getattr(first, one.name), getattr(second, one.name))) for one in fields(first)))
 
 
 def _faded_each(times: np.ndarray, path: Poses, choice: np.ndarray, jumps: Jumps, earlier: Jumps) -> Poses:
@@ -356,11 +338,11 @@ def _faded_each(times: np.ndarray, path: Poses, choice: np.ndarray, jumps: Jumps
     earlier : Jumps
         Those that are still fading, whichever path it is.
     """
-    every = _joined(earlier, jumps)
+    every = earlier.then(jumps)
     begin, count, before = every.times[0], len(jumps.times), len(earlier.times)
     # One after the other, so far apart that nothing of one is left when the next begins.
     apart = 2.0 * (float(times.max()) - begin + float(every.durations.max()))
     order = np.concatenate((np.tile(np.arange(before), (count, 1)), before + np.arange(count)[:, None]), axis=1).ravel()
-    line = _some(every, order)
+    line = every[order]
     line = replace(line, times=line.times - begin + apart * np.repeat(np.arange(count), before + 1))
     return fade(times - begin + apart * choice, path, line)

@@ -163,12 +163,15 @@ class Packets:
         return len(self) * HEADER.itemsize
 
 
+def checksum(packet: bytes) -> int:
+    """The checksum that a packet needs."""
+    return zlib.crc32(packet[HEADER["check"].itemsize :], FORMAT)
+
+
 def checksums(data: np.ndarray) -> np.ndarray:
     """The checksums that packets (n, bytes) need, uint32 of shape (n,)."""
-    bytes_, size = np.ascontiguousarray(data).tobytes(), data.shape[1]
-    begins = range(HEADER["check"].itemsize, len(bytes_), size)
-    rest = size - HEADER["check"].itemsize
-    return np.fromiter((zlib.crc32(bytes_[at : at + rest], FORMAT) for at in begins), np.uint32, len(data))
+    whole, size = np.ascontiguousarray(data).tobytes(), data.shape[1]
+    return np.fromiter((checksum(whole[at : at + size]) for at in range(0, len(whole), size)), np.uint32, len(data))
 
 
 def sealed(data: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from .events import Event, What
 from .fading import Jumps, fade
 from .known_keys import NONE, KnownKeys
 from .packets import Packets
-from .smooth import TWISTS, reach_of
+from .smooth import NO_POSES, TWISTS, reach_of
 
 LONGEST_FADE = 2.0
 """Seconds that a difference fades at the most: after a long silence the picture is not to lag behind for as long again.
@@ -154,7 +154,7 @@ def receive(
     ValueError
         For an unknown mode, shapes that do not fit, and times that are no numbers or fall.
     """
-    play_out, ahead = play_out or PlayOut(), reach_of(mode).ahead
+    play_out, reach = play_out or PlayOut(), reach_of(mode)
     arrivals, display_times = np.asarray(arrivals, np.float64), np.asarray(display_times, np.float64)
     _check(packets, arrivals, display_times, mode)
     # What arrives after the last frame has no say in any.
@@ -162,13 +162,13 @@ def receive(
     order = np.argsort(arrivals, kind="stable")
     order = order[arrivals[order] <= end]
     packets, arrivals, sound = packets[order], arrivals[order], is_sound(packets[order])
-    lead = (1.0 + ahead) * packets.interval
+    lead = reach.lead * packets.interval
     wait = lead if play_out.wait is None else play_out.wait * packets.interval
     late = lead if play_out.lead is None else play_out.lead * packets.interval
     admitted, events = admit(packets, arrivals, sound, wait, late, play_out.latency)
     if not len(admitted.rows):
         nothing = np.empty(0)
-        return Playback(nothing, Poses(np.empty((0, 3)), np.empty((0, 4))), nothing, nothing > 0.0, tuple(events))
+        return Playback(nothing, NO_POSES, nothing, nothing > 0.0, tuple(events))
 
     times = display_times[np.searchsorted(display_times, admitted.known_from[0] - CLOCK) :]
     path = _path(packets, admitted, times, mode, play_out)

@@ -7,6 +7,7 @@ throughout; a twist has the angular velocity and the velocity of the origin alon
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,16 @@ class Reach:
     behind: int
     ahead: int
 
+    @property
+    def before(self) -> int:
+        """The keys that are looked at before the two: at least 1, for going on beyond the newest key."""
+        return max(self.behind, 1)
+
+    @property
+    def lead(self) -> float:
+        """Update intervals before the play-out gets to a key by which it has to be there: as little as will do."""
+        return 1.0 + self.ahead
+
 
 def reach_of(mode: str) -> Reach:
     """How far a mode of a stream looks: one of `addon.motion.MODES`, or `TWISTS`. Raises ValueError for another."""
@@ -37,6 +48,17 @@ def reach_of(mode: str) -> Reach:
     if mode not in MODES:
         raise ValueError(no_such_mode(mode, (*MODES, TWISTS)))
     return Reach(MODES[mode].behind, MODES[mode].ahead)
+
+
+NO_POSES = Poses(np.empty((0, 3)), np.empty((0, 4)))
+
+
+def joined(parts: Iterable[Poses]) -> Poses:
+    """Poses without scales, one after the other."""
+    parts = list(parts)
+    return Poses(
+        np.concatenate([part.positions for part in parts]), np.concatenate([part.quaternions for part in parts])
+    )
 
 
 def moved(poses: Poses, ways: np.ndarray) -> Poses:

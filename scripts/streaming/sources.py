@@ -69,7 +69,7 @@ class EvenSource:
         if mode == TWISTS:
             raise ValueError(f"an even stream has no twists, which {TWISTS} takes; choose another mode, or a tolerance")
         packets = send(times, poses, rate, packing)
-        least = (1.0 + reach_of(mode).ahead) * packets.interval
+        least = reach_of(mode).lead * packets.interval
         if delay is not None and delay < least * (1.0 - 1e-9):
             raise ValueError(f"a delay of {delay:g} s is too short: at this rate {mode} needs {least:g} s")
         wait = (least if delay is None else delay) / packets.interval

@@ -13,14 +13,13 @@ A BEAT mends the loss of the newest key, serves who comes later, and tells a sil
 from __future__ import annotations
 
 import math
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
 
 from addon.motion import MODES
 
-from .packets import FORMAT, HEADER, KEY, TWISTED
+from .packets import HEADER, KEY, TWISTED, checksum
 from .packing import PACKINGS, Packing
 from .receiver import PlayOut
 from .smooth import TWISTS, reach_of
@@ -78,8 +77,7 @@ class Terms:
     """As `PlayOut` has it."""
 
     def __post_init__(self) -> None:
-        if self.mode not in NUMBERS:
-            raise ValueError(f"there is no mode {self.mode!r}; the modes are {', '.join(NUMBERS)}")
+        reach_of(self.mode)
         for name, least in (("delay", 0.0), ("interval", 1e-4), ("carry", 0.0)):
             if not least <= getattr(self, name) <= LONGEST:
                 raise ValueError(f"a {name} of {getattr(self, name):g} s is not within {least:g} and {LONGEST:g} s")
@@ -91,7 +89,7 @@ class Terms:
     @classmethod
     def of(cls, mode: str, interval: float, play_out: PlayOut) -> Terms:
         """Those of a play-out whose wait is known, in the numbers that the wire has for them."""
-        lead = 1.0 + reach_of(mode).ahead if play_out.lead is None else play_out.lead
+        lead = reach_of(mode).lead if play_out.lead is None else play_out.lead
         numbers = (play_out.wait * interval, interval, play_out.carry, play_out.fade, lead)
         return cls(mode, *(float(np.float32(number)) for number in numbers))
 
@@ -162,7 +160,7 @@ def read(datagram: bytes) -> Message | None:
     if not HEADER.itemsize <= len(datagram) <= LARGEST:
         return None
     check, stream, sequence, stamp, age, kind, packing = np.frombuffer(datagram, HEADER, 1)[0].item()
-    if check != _checksum(datagram) or not (math.isfinite(stamp) and math.isfinite(age)):
+    if check != checksum(datagram) or not (math.isfinite(stamp) and math.isfinite(age)):
         return None
     said = (kind, stream, sequence, stamp, age)
     body = len(datagram) - HEADER.itemsize
@@ -227,8 +225,4 @@ def _made(kind: int, stream: int = 0, sequence: int = 0, stamp: float = 0.0, bod
 
 def _sealed(datagram: bytes) -> bytes:
     size = HEADER["check"].itemsize
-    return _checksum(datagram).to_bytes(size, "little") + datagram[size:]
-
-
-def _checksum(datagram: bytes) -> int:
-    return zlib.crc32(datagram[HEADER["check"].itemsize :], FORMAT)
+    return checksum(datagram).to_bytes(size, "little") + datagram[size:]
