@@ -1,20 +1,22 @@
 """Rigid Motion: in-betweens that move an object as one rigid body.
 
-`motion` is the mathematics, in NumPy alone; `animation` is Blender's data; `ui` is what an animator sees. Imports go
-down only: `ui` knows `animation`, `animation` knows `motion`, and `motion` knows neither.
+`motion` is the mathematics, in NumPy alone; `animation` is Blender's data; `ui` is what an animator sees, and
+`translations` is that in other languages. Imports go down only: each knows those before it, and `motion` none.
 """
 
 
 def register() -> None:
     # Not on top: importing `motion` needs no Blender.
-    from . import animation, ui
+    from . import animation, translations, ui
 
+    translations.register()
     animation.register()
     ui.register()
 
 
 def unregister() -> None:
-    from . import animation, ui
+    from . import animation, translations, ui
 
     ui.unregister()
     animation.unregister()
+    translations.unregister()

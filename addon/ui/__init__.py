@@ -6,14 +6,14 @@ menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
 look         how they look                              wording      labels and texts
-preferences  of the extension
+preferences  of the extension                           manual       where the documentation is
 """
 
 from __future__ import annotations
 
 import bpy
 
-from . import keymap, menus, operators, overlay, panels, preferences, shown
+from . import keymap, manual, menus, operators, overlay, panels, preferences, shown
 
 CLASSES = (*preferences.CLASSES, *operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
 
@@ -25,10 +25,12 @@ def register() -> None:
         bpy.utils.register_class(cls)
     menus.register()
     keymap.register()
+    manual.register()
     preferences.apply()
 
 
 def unregister() -> None:
+    manual.unregister()
     keymap.unregister()
     menus.unregister()
     for cls in reversed(CLASSES):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 import rna_keymap_ui
+from bpy.app.translations import contexts
 
 from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_object, RIGID_MOTION_MT_pie_pose
 
@@ -46,5 +47,5 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
             if item.idname == OPERATOR and item.properties.name == menu:
                 row = layout.column()
                 row.context_pointer_set("keymap", keymap)
-                row.label(text=name)
+                row.label(text=name, text_ctxt=contexts.id_windowmanager)
                 rna_keymap_ui.draw_kmi([], configuration, keymap, item, row, 0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS
@@ -25,7 +26,8 @@ def _draw_modes(
     for mode in modes:
         # One tick where all is one; dots where modes are mixed.
         icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
-        properties = layout.operator("rigid_motion.set_mode", text=LABELS[mode], icon=icon)
+        text = iface_(LABELS[mode])
+        properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
         properties.mode, properties.on = mode, scope
 
 
@@ -84,7 +86,8 @@ class RIGID_MOTION_MT_keys(bpy.types.Menu):
         _draw_modes(context, layout, SELECTED)
         layout.separator()
         posing = is_posing(context)
-        layout.menu(RIGID_MOTION_MT_whole.__name__, text="Whole Bone" if posing else "Whole Object")
+        text = iface_("Whole Bone") if posing else iface_("Whole Object")
+        layout.menu(RIGID_MOTION_MT_whole.__name__, text=text, translate=False)
         _draw_rest(layout, RIGID_MOTION_MT_pie_keys.__name__, posing=posing)
 
 

@@ -11,15 +11,25 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import bpy
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
 
 from ..animation import Refused
 from ..animation.transforms import Transform
 from .targets import each_target, is_key_editor, is_posing
 from .wording import kind_of, names_of, spoken_of
 
-NO_TARGETS = "Select an object with keys first"
-NO_BONES = "Select bones first"
-NOTHING_SHOWN = "No keys of location, rotation or scale are shown here"
+NO_TARGETS = n_("Select an object with keys first")
+NO_BONES = n_("Select bones first")
+NOTHING_SHOWN = n_("No keys of location, rotation or scale are shown here")
+
+BUT = {
+    "objects": n_("{done} of {count} objects: {summary}. But"),
+    "bones": n_("{done} of {count} bones: {summary}. But"),
+    "objects and bones": n_("{done} of {count} objects and bones: {summary}. But"),
+}
+"""What comes before refusals where something was done."""
 
 MOST_REFUSALS = 8
 """Refusals that a report has room for."""
@@ -59,14 +69,14 @@ class OnTargets:
 
     @classmethod
     def reason(cls, targets: list[Transform], context: bpy.types.Context) -> str:
-        """Why the operator is greyed out."""
+        """Why the operator is greyed out, in the user's language."""
         if targets:
-            return spoken_of(cls.nothing_to_do, kind_of(targets))
-        return NOTHING_SHOWN if is_key_editor(context) else NO_BONES if is_posing(context) else NO_TARGETS
+            return tip_(spoken_of(cls.nothing_to_do, kind_of(targets)))
+        return tip_(NOTHING_SHOWN if is_key_editor(context) else NO_BONES if is_posing(context) else NO_TARGETS)
 
     @classmethod
     def description(cls, context: bpy.types.Context, _properties: bpy.types.OperatorProperties) -> str:
-        return spoken_of(cls.bl_description, "bones" if is_posing(context) else "objects")
+        return tip_(spoken_of(cls.bl_description, "bones" if is_posing(context) else "objects"))
 
     def act(self, targets: Sequence[Transform], verb: Callable[[list[Refused]], str]) -> set[str]:
         """Do something to all targets at once, and report it.
@@ -87,14 +97,15 @@ class OnTargets:
         reasons = list(dict.fromkeys(map(str, refused)))
         refusals = reasons[:MOST_REFUSALS]
         if len(reasons) > MOST_REFUSALS:
-            refusals.append(f"and {len(reasons) - MOST_REFUSALS} more")
+            refusals.append(rpt_("and {count} more").format(count=len(reasons) - MOST_REFUSALS))
         if not summary or len(refused) >= len(targets):
             self.report({"ERROR"}, "\n".join(refusals))
             return {"CANCELLED"}
         if refused:
-            done = len(targets) - len(refused)
-            of_all = f"{done} of {len(targets)} {kind_of(targets)}"
-            self.report({"WARNING"}, "\n".join([f"{of_all}: {summary}. But", *refusals]))
+            but = rpt_(BUT[kind_of(targets)]).format(
+                done=len(targets) - len(refused), count=len(targets), summary=summary
+            )
+            self.report({"WARNING"}, "\n".join([but, *refusals]))
         else:
             self.report({"INFO"}, f"{names_of(targets)}: {summary}")
         return {"FINISHED"}

@@ -7,12 +7,15 @@ from contextlib import nullcontext
 from typing import ClassVar
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.app.translations import pgettext_tip as tip_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
 from ..animation.baking.copies import BAKED, REDUCED, entries_of
-from ..animation.baking.originals import WAYS_BACK
 from ..animation.baking.sizes import metres_per_unit
 from ..animation.inbetweens.live import paused
 from ..animation.inbetweens.mending import with_troubles
@@ -46,6 +49,19 @@ from .wording import (
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
+LATER = {
+    BAKED: n_("These keys were baked since: Un-Bake first"),
+    REDUCED: n_("These keys were reduced since: Restore Keys first"),
+}
+"""Why what was done before cannot be taken back yet, by what was done last."""
+
+REFRESHED = (
+    n_("All up to date"),
+    n_("In-betweens of {count} Action refreshed"),
+    n_("In-betweens of {count} Actions refreshed"),
+)
+"""What was refreshed, by the number of Actions."""
+
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
 
@@ -66,7 +82,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
     on: EnumProperty(
-        name="On",
+        name="Segments",
         description="Which segments get the mode",
         items=SCOPES,
         default=WHOLE,
@@ -77,8 +93,9 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
         if not properties.is_property_set("mode"):
             return super().description(context, properties)
-        what = spoken_of(DESCRIPTIONS[properties.mode], "bones" if is_posing(context) else "objects")
-        return f"{what}.\nOn: {SCOPE_NAMES[properties.on]}"
+        what = tip_(spoken_of(DESCRIPTIONS[properties.mode], "bones" if is_posing(context) else "objects"))
+        on = tip_("On: {segments}").format(segments=tip_(SCOPE_NAMES[properties.on]))
+        return f"{what}.\n{on}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self.properties.is_property_set("mode"):
@@ -101,11 +118,12 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
                 animation.set_mode(group, self.mode, frames, refused=refused)
         if len(groups) > 1:
             animation.refresh(targets)
-        label = LABELS[self.mode]
+        label = rpt_(LABELS[self.mode])
         if list(groups) == [None]:
             return label
         frames = sorted({frame for group in groups for frame in group})
-        return f"{label} from frame{'s' * (len(frames) > 1)} {listed([f'{frame:g}' for frame in frames])}"
+        text = rpt_("{mode} from frames {frames}") if len(frames) > 1 else rpt_("{mode} from frame {frames}")
+        return text.format(mode=label, frames=listed([f"{frame:g}" for frame in frames]))
 
 
 class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
@@ -115,7 +133,7 @@ class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
         "Give the objects Blender's own in-betweens again, and remove the keys of their modes. "
         "Keys of location, rotation and scale stay"
     )
-    nothing_to_do = "These objects have Blender's own in-betweens already"
+    nothing_to_do = n_("These objects have Blender's own in-betweens already")
 
     @classmethod
     def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
@@ -126,7 +144,7 @@ class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
 
         def clear(refused: list[Refused]) -> str:
             animation.set_mode(targets, "BLENDER", refused=refused)
-            return "Blender's own in-betweens"
+            return rpt_("Blender's own in-betweens")
 
         return self.act(targets, clear)
 
@@ -139,7 +157,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         "for hand-over to programs that read keys only. Un-Bake gives the original back"
     )
 
-    nothing_to_do = "There are no rigid in-betweens to bake: choose a mode for keys of these objects first"
+    nothing_to_do = n_("There are no rigid in-betweens to bake: choose a mode for keys of these objects first")
 
     step: FloatProperty(
         name="Step",
@@ -189,13 +207,14 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         else:
             first, last = _range_of(context.scene) if self.frames == "SCENE" else (self.first, self.last)
             if first > last:
-                self.report({"ERROR"}, f"The range to bake ends on frame {last:g}, before its start, {first:g}")
+                text = rpt_("The range to bake ends on frame {last:g}, before its start, {first:g}")
+                self.report({"ERROR"}, text.format(last=last, first=first))
                 return {"CANCELLED"}
         targets = targets_of(context)
 
         def bake(refused: list[Refused]) -> str:
             begin, end = animation.bake(targets, step=self.step, first=first, last=last, refused=refused)
-            return f"baked from frame {begin:g} to {end:g}"
+            return rpt_("baked from frame {first:g} to {last:g}").format(first=begin, last=end)
 
         return self.act(targets, bake)
 
@@ -231,7 +250,7 @@ class _OnChanged(OnTargets):
         reason = cls.reason(targets, context)
         for target, later in changes.items():
             if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
-                reason = f"These keys were {later.lower()} since: {WAYS_BACK[later]} first"
+                reason = tip_(LATER[later])
         cls.poll_message_set(reason)
         return False
 
@@ -240,7 +259,7 @@ class _OnChanged(OnTargets):
 
         def go_back(refused: list[Refused]) -> str:
             type(self).verb(targets, refused=refused)
-            return self.summary
+            return rpt_(self.summary)
 
         return self.act(targets, go_back)
 
@@ -258,9 +277,9 @@ class RIGID_MOTION_OT_unbake(_OnChanged, bpy.types.Operator):
     bl_label = "Un-Bake"
     bl_description = "Give baked objects the Actions back that they had before, with their own keys and modes"
     kind = BAKED
-    nothing_to_do = "None of these objects is baked"
+    nothing_to_do = n_("None of these objects is baked")
     verb = staticmethod(animation.unbake)
-    summary = "back to the keys from before baking"
+    summary = n_("back to the keys from before baking")
 
 
 class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
@@ -271,7 +290,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         "for imported motion capture, baked simulations and solved cameras. Restore Keys gives all of them back"
     )
 
-    nothing_to_do = (
+    nothing_to_do = n_(
         "None of these objects has more than two keys. Constraints, drivers and simulations are turned into keys first "
         "(Object > Animation > Bake Action, with Visual Keying)"
     )
@@ -341,13 +360,13 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         for target in targets[:MOST_LISTED]:
             if (reduction := animation.reduction_of(target)) is not None:
                 error = length(context.scene, reduction.largest_error, precision=3)
-                labelled(layout, target.name).label(
-                    text=f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}, {error} off"
-                )
+                became = f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"
+                text = iface_("{keys}, {error} off").format(keys=became, error=error)
+                labelled(layout, target.name).label(text=text, translate=False)
                 if self.best_of:
                     column = layout.column(align=True)
                     for line in counted_modes(reduction.segments):
-                        labelled(column).label(text=line)
+                        labelled(column).label(text=line, translate=False)
 
     def _draw_rigs(self, scene: bpy.types.Scene, targets: list[Transform]) -> None:
         reduction = animation.total_reduction(targets)
@@ -355,7 +374,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             return
         column = self.layout.column(align=True)
         for label, text in reduction_rows(scene, reduction):
-            labelled(column, label).label(text=text)
+            labelled(column, label).label(text=text, translate=False)
 
     @classmethod
     def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
@@ -405,9 +424,9 @@ class RIGID_MOTION_OT_restore_keys(_OfRigsToo, _OnChanged, bpy.types.Operator):
     bl_label = "Restore Keys"
     bl_description = "Give reduced objects all the keys back that they had before, to the last handle"
     kind = REDUCED
-    nothing_to_do = "The keys of these objects are not reduced"
+    nothing_to_do = n_("The keys of these objects are not reduced")
     verb = staticmethod(animation.restore_keys)
-    summary = "back to the keys from before they were reduced"
+    summary = n_("back to the keys from before they were reduced")
 
 
 class RIGID_MOTION_OT_discard_dense_keys(_OfRigsToo, _OnChanged, bpy.types.Operator):
@@ -418,9 +437,9 @@ class RIGID_MOTION_OT_discard_dense_keys(_OfRigsToo, _OnChanged, bpy.types.Opera
         "The reduced keys stay as they are"
     )
     kind = REDUCED
-    nothing_to_do = "The keys of these objects are not reduced"
+    nothing_to_do = n_("The keys of these objects are not reduced")
     verb = staticmethod(animation.discard_dense_keys)
-    summary = "the keys from before they were reduced are removed from the file"
+    summary = n_("the keys from before they were reduced are removed from the file")
 
 
 class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
@@ -430,7 +449,7 @@ class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
         'Put the constraint "Rigid Motion" back on the selected bones, which shows their in-betweens: '
         "first in the stack, unmuted, with full influence"
     )
-    nothing_to_do = "None of these objects lacks its constraint"
+    nothing_to_do = n_("None of these objects lacks its constraint")
 
     @classmethod
     def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
@@ -441,7 +460,7 @@ class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
 
         def mend(refused: list[Refused]) -> str:
             animation.mend(targets, refused=refused)
-            return "constraint restored"
+            return rpt_("constraint restored")
 
         return self.act(targets, mend)
 
@@ -457,9 +476,7 @@ class RIGID_MOTION_OT_refresh(bpy.types.Operator):
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         stale = animation.refresh()
-        self.report(
-            {"INFO"}, f"In-betweens of {stale} Action{'s' * (stale != 1)} refreshed" if stale else "All up to date"
-        )
+        self.report({"INFO"}, rpt_(REFRESHED[min(stale, 2)]).format(count=stale))
         return {"FINISHED"}
 
 

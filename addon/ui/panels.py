@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
 from ..animation.inbetweens.describing import SegmentFacts, parts_with_in_betweens
@@ -16,7 +17,7 @@ from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
-from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length, reduction_rows
+from .wording import LABELS, NARROW, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length, reduction_rows
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
@@ -40,8 +41,10 @@ class _Main:
             return
         segment, notes = facts_and_notes(target, context.scene.frame_current_final)
         if is_key_editor(context):
-            _draw_mode_menu(labelled(layout, "Selected"), SELECTED, modes_meant(context, target, SELECTED))
-        label = "Bone" if isinstance(target, BoneTransform) else "Object"
+            _draw_mode_menu(
+                labelled(layout, iface_("Selected", NARROW)), SELECTED, modes_meant(context, target, SELECTED)
+            )
+        label = iface_("Bone", NARROW) if isinstance(target, BoneTransform) else iface_("Object", NARROW)
         mode_path, _ = target.mode_channel
         if any(fcurve.data_path == mode_path for fcurve in fcurves_of(target.animated)):
             _draw_mode_menu(labelled(layout, label), WHOLE, modes_meant(context, target, WHOLE))
@@ -113,42 +116,46 @@ class _Delta:
         layout.use_property_decorate = False
         is_quaternion = target.carrier.rotation_mode == "QUATERNION"
         rotation = "delta_rotation_quaternion" if is_quaternion else "delta_rotation_euler"
-        for path, label in (("delta_location", "Location"), (rotation, "Rotation"), ("delta_scale", "Scale")):
+        parts = ("delta_location", iface_("Location")), (rotation, iface_("Rotation")), ("delta_scale", iface_("Scale"))
+        for path, label in parts:
             column = layout.column(align=True)
             for index, axis in enumerate("WXYZ" if path.endswith("quaternion") else "XYZ"):
                 text = axis if index else f"{label} {axis}"
                 # Where in-betweens are in a component, the object's own value is kept elsewhere.
                 if target.is_noted([(path, index)]):
-                    column.prop(target.motion, ORIGINALS[path][0], index=index, text=text)
+                    column.prop(target.motion, ORIGINALS[path][0], index=index, text=text, translate=False)
                 else:
-                    column.prop(target.carrier, path, index=index, text=text)
+                    column.prop(target.carrier, path, index=index, text=text, translate=False)
 
 
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
-    _draw_mode_menu(labelled(layout, "Segment"), CURRENT, {segment.mode})
+    _draw_mode_menu(labelled(layout, iface_("Segment", NARROW)), CURRENT, {segment.mode})
     column = layout.column(align=True)
-    labelled(column, "Frames").label(text=f"{segment.first:g} \N{EN DASH} {segment.last:g}")
-    labelled(column, "Turn").label(text=degrees(segment.turn))
-    labelled(column, "Distance").label(text=length(context.scene, segment.distance))
+    for label, text in (
+        (iface_("Frames", NARROW), f"{segment.first:g} \N{EN DASH} {segment.last:g}"),
+        (iface_("Turn", NARROW), degrees(segment.turn)),
+        (iface_("Distance", NARROW), length(context.scene, segment.distance)),
+    ):
+        labelled(column, label).label(text=text, translate=False)
 
 
 def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> None:
     """A button that shows the mode and sets another."""
     layout.enabled = bool(modes)
-    text = LABELS[next(iter(modes))] if len(modes) == 1 else "Mixed" if modes else "None"
-    layout.operator_menu_enum("rigid_motion.set_mode", "mode", text=text).on = scope
+    text = iface_(LABELS[next(iter(modes))]) if len(modes) == 1 else iface_("Mixed") if modes else iface_("None")
+    layout.operator_menu_enum("rigid_motion.set_mode", "mode", text=text, translate=False).on = scope
 
 
 def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:
     row = layout.row(align=True)
-    row.operator("rigid_motion.reduce_keys", text="Reduce Keys")
-    row.operator("rigid_motion.restore_keys")
+    row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=NARROW)
+    row.operator("rigid_motion.restore_keys", text="Restore Keys", text_ctxt=NARROW)
     reduction = animation.reduction_of(target)
     if reduction is not None:
         row.operator("rigid_motion.discard_dense_keys", text="", icon="TRASH")
         column = layout.column(align=True)
         for label, text in reduction_rows(context.scene, replace(reduction, rig=None)):
-            labelled(column, label).label(text=text)
+            labelled(column, label).label(text=text, translate=False)
 
 
 def _in_space(base: type, space: str, parent: type | None = None) -> type[bpy.types.Panel]:

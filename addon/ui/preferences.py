@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 
 from .. import animation
 from ..animation.properties import MODE_ITEMS
-from . import keymap
+from . import keymap, manual
 from .look import DEFAULT_LOOK
 
 EXTENSION = __package__.rpartition(".")[0]
@@ -93,6 +93,9 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
 
         layout.label(text="Pie Menu")
         keymap.draw(context, layout)
+
+        layout.separator()
+        manual.draw(layout)
 
 
 CLASSES = (RigidMotionPreferences,)

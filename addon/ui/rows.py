@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import blf
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 
 from .wording import wrapped
 
@@ -18,11 +19,11 @@ MARGIN = 84
 
 
 def labelled(layout: bpy.types.UILayout, label: str = "") -> bpy.types.UILayout:
-    """The right-hand part of a row, with a label on the left."""
+    """The right-hand part of a row, with a label on the left, in the user's language."""
     split = layout.split(factor=LABEL)
     left = split.row()
     left.alignment = "RIGHT"
-    left.label(text=label)
+    left.label(text=label, translate=False)
     return split.row()
 
 
@@ -33,6 +34,6 @@ def draw_text(context: bpy.types.Context, layout: bpy.types.UILayout, text: str,
     blf.size(0, context.preferences.ui_styles[0].widget.points * system.ui_scale)
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for line in wrapped(text, lambda line: blf.dimensions(0, line)[0] <= width):
-        column.label(text=line, icon=icon)
+    for line in wrapped(iface_(text), lambda line: blf.dimensions(0, line)[0] <= width):
+        column.label(text=line, icon=icon, translate=False)
         icon = "BLANK1"

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..animation import Refused, key_frames, modes_of
@@ -90,14 +91,22 @@ def frames_meant(context: bpy.types.Context, target: Transform, scope: str) -> F
     if scope == SELECTED:
         frames = key_frames(target, selected=True)
         if not len(frames):
-            raise Refused(f"{target.name}: no key of location, rotation or scale is selected")
+            raise Refused(rpt_("{name}: no key of location, rotation or scale is selected").format(name=target.name))
         return tuple(frames.tolist())
     source = source_of(target)
     if source is None:
-        raise Refused(f"{target.name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)")
+        raise Refused(
+            rpt_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)").format(
+                name=target.name
+            )
+        )
     segment = segment_at(source, frame_in_action(target.animated, context.scene.frame_current_final))
     if segment is None:
-        raise Refused(f"{target.name}: the playhead is not between two keys; move it there, or select keys instead")
+        raise Refused(
+            rpt_("{name}: the playhead is not between two keys; move it there, or select keys instead").format(
+                name=target.name
+            )
+        )
     return (segment.key,)
 
 

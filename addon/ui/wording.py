@@ -7,6 +7,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..animation import Reduction, WholeRig
 from ..animation.inbetweens.describing import SegmentFacts
@@ -14,34 +17,47 @@ from ..animation.inbetweens.outlets.restoring import CHANGED, MUTED, NOT_FIRST, 
 from ..animation.properties import MODE_ITEMS
 from ..animation.transforms import BoneTransform, Transform
 
+NARROW = "Rigid Motion"
+"""The context in which short words are translated, where there is no room for those that Blender has for them."""
+
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """What each mode does for the motion, in one sentence without a full stop."""
 
-NO_KEYS = "No keys of location, rotation or scale yet"
-NO_SEGMENT = "No segment on this frame"
-STRIPS = "Moved by strips: enter one to see its segments (NLA Editor, Tab)"
-BAKED = "Baked to keys. Un-Bake brings its own keys back"
-OUT_OF_DATE = "The keys have changed since: Live Update is off, in the preferences"
-DELTA_EDITED = (
+NO_KEYS = n_("No keys of location, rotation or scale yet")
+NO_SEGMENT = n_("No segment on this frame")
+STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
+BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
+OUT_OF_DATE = n_("The keys have changed since: Live Update is off, in the preferences")
+DELTA_EDITED = n_(
     "The delta transform holds the in-betweens, so this edit of it lasts until the frame changes. "
     "To keep it, edit Delta Transform below"
 )
 
-NO_BONE = "No Bone Active"
-BLENDED = "Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first"
+NO_BONE = n_("No Bone Active")
+BLENDED = n_("Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first")
 
 TROUBLES = {
-    REMOVED: ("ERROR", 'The constraint "Rigid Motion" was removed, so the in-betweens are Blender\'s own'),
-    OTHER_SLOT: ("ERROR", 'The constraint "Rigid Motion" shows another Action, not the one that moves the bone'),
-    MUTED: ("INFO", 'The constraint "Rigid Motion" is muted, so the in-betweens are Blender\'s own'),
-    CHANGED: ("ERROR", 'The constraint "Rigid Motion" has other settings, which put the bone elsewhere'),
-    NOT_FIRST: ("ERROR", 'Another constraint comes before "Rigid Motion", which has to be the first'),
-    WEAK: ("INFO", 'The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left'),
+    REMOVED: ("ERROR", n_('The constraint "Rigid Motion" was removed, so the in-betweens are Blender\'s own')),
+    OTHER_SLOT: ("ERROR", n_('The constraint "Rigid Motion" shows another Action, not the one that moves the bone')),
+    MUTED: ("INFO", n_('The constraint "Rigid Motion" is muted, so the in-betweens are Blender\'s own')),
+    CHANGED: ("ERROR", n_('The constraint "Rigid Motion" has other settings, which put the bone elsewhere')),
+    NOT_FIRST: ("ERROR", n_('Another constraint comes before "Rigid Motion", which has to be the first')),
+    WEAK: (
+        "INFO",
+        n_('The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left'),
+    ),
 }
 """What is amiss with the constraint of a bone, each behind its icon."""
+
+COUNTED = {
+    "objects": n_("{count} objects"),
+    "bones": n_("{count} bones"),
+    "objects and bones": n_("{count} objects and bones"),
+}
+"""Several targets by their number."""
 
 NEAR_HALF_TURN = math.radians(170.0)
 """From here on a small change of a key may send the object round the other way."""
@@ -54,16 +70,20 @@ def cautions(segment: SegmentFacts) -> list[str]:
     texts = []
     if segment.long_way:
         texts.append(
-            "Blender turns this segment by more than half a turn; the mode goes the short way. "
-            "To go the long way, set a key in between"
+            iface_(
+                "Blender turns this segment by more than half a turn; the mode goes the short way. "
+                "To go the long way, set a key in between"
+            )
         )
     if segment.turn > NEAR_HALF_TURN:
         texts.append(
-            f"{degrees(segment.turn)} is nearly half a turn: a small change of a key can send it the other way round. "
-            "To be sure, set a key in between"
+            iface_(
+                "{angle} is nearly half a turn: a small change of a key can send it the other way round. "
+                "To be sure, set a key in between"
+            ).format(angle=degrees(segment.turn))
         )
     if segment.scales_unevenly:
-        texts.append("The scale is not the same along all axes, and stays Blender's own")
+        texts.append(iface_("The scale is not the same along all axes, and stays Blender's own"))
     return texts
 
 
@@ -83,26 +103,31 @@ def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
 def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     """What became of the keys of a target."""
     error = length(scene, reduction.largest_error, precision=3)
-    summary = f"{reduction.before} keys became {reduction.after}, largest error {error}"
+    summary = rpt_("{before} keys became {after}, largest error {error}").format(
+        before=reduction.before, after=reduction.after, error=error
+    )
     if reduction.rig is not None:
-        summary += f", keys on {reduction.rig.frames} frames"
+        summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
         if (feet := _slides(scene, reduction.rig)) is not None:
-            summary += f", feet that stand slide {feet}"
+            summary += rpt_(", feet that stand slide {distance}").format(distance=feet)
     if len(reduction.segments) > 1:
-        summary += f"; segments: {', '.join(counted_modes(reduction.segments))}"
+        summary += rpt_("; segments: {modes}").format(modes=", ".join(counted_modes(reduction.segments)))
     return summary
 
 
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
     """What became of keys, and of the rig where it is one, as labels and what belongs to them."""
     rows = [
-        ("Keys", f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
-        ("Off By", f"{length(scene, reduction.largest_error, precision=3)} at most"),
+        (iface_("Keys", NARROW), f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
+        (
+            iface_("Off By", NARROW),
+            iface_("{error} at most").format(error=length(scene, reduction.largest_error, precision=3)),
+        ),
     ]
     if reduction.rig is not None:
-        rows.insert(1, ("Frames", f"{reduction.rig.frames} with keys"))
+        rows.insert(1, (iface_("Frames", NARROW), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
         if (feet := _slides(scene, reduction.rig)) is not None:
-            rows.append(("Feet", f"slide {feet}"))
+            rows.append((iface_("Feet", NARROW), iface_("slide {distance}").format(distance=feet)))
     return rows
 
 
@@ -111,23 +136,23 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
     if rig.slide_before <= 0.0:
         return None
     before, after = (length(scene, slide, precision=2) for slide in (rig.slide_before, rig.slide_after))
-    return f"{after}, recorded {before}"
+    return iface_("{after}, recorded {before}").format(after=after, before=before)
 
 
 def counted_modes(segments: Mapping[str, int]) -> list[str]:
     """Each mode with how many segments have it, most of them first."""
-    return [f"{count} {LABELS[mode]}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])]
+    return [f"{count} {iface_(LABELS[mode])}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])]
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:
     """A list that fits into a line."""
     rest = len(items) - most
-    return ", ".join(items[:most]) + (f" and {rest} more" if rest > 0 else "")
+    return ", ".join(items[:most]) + (rpt_(" and {count} more").format(count=rest) if rest > 0 else "")
 
 
 def names_of(targets: Sequence[Transform]) -> str:
     """One target by its name, several by their number."""
-    return targets[0].name if len(targets) == 1 else f"{len(targets)} {kind_of(targets)}"
+    return targets[0].name if len(targets) == 1 else rpt_(COUNTED[kind_of(targets)]).format(count=len(targets))
 
 
 def kind_of(targets: Iterable[Transform]) -> str:
@@ -137,7 +162,10 @@ def kind_of(targets: Iterable[Transform]) -> str:
 
 
 def spoken_of(text: str, kind: str) -> str:
-    """A text about objects, as it is where `kind` is meant: "objects", "bones" or "objects and bones"."""
+    """A text about objects, as it is where `kind` is meant: "objects", "bones" or "objects and bones".
+
+    It is English in and out: what comes out is translated as a whole.
+    """
     if kind == "bones":
         text = text.replace("an object", "a bone").replace("Object > ", "Pose > ")
         text = re.sub(r"\bobject\b", "bone", text)

@@ -84,7 +84,7 @@ HINDRANCES = {
     "limits": (modifier("LIMITS", "rotation_quaternion"), "Rotation Quaternion X has a modifier of type Limits"),
     "stepped": (modifier("STEPPED"), "Location Y has a modifier of type Stepped"),
     "envelope": (modifier("ENVELOPE"), "Location Y has a modifier of type Envelope"),
-    "built-in function": (modifier("FNGENERATOR"), "Location Y has a modifier of type Fngenerator"),
+    "built-in function": (modifier("FNGENERATOR"), "Location Y has a modifier of type Built-In Function"),
     "cycles in a range": (modifier("CYCLES", use_restricted_range=True), "type Cycles with a restricted range"),
     "cycles in part": (modifier("CYCLES", use_influence=True, influence=0.5), "with a restricted range or influence"),
     "driven location": (driver("location", 2), "Location Z is driven: remove the driver, or bake it"),

@@ -24,10 +24,10 @@ class Layout:
     def separator(self):
         pass
 
-    def menu(self, name, text=""):
+    def menu(self, name, text="", translate=True):
         self.drawn.append((name, "", ""))
 
-    def operator(self, name, text="", icon="NONE"):
+    def operator(self, name, text="", icon="NONE", translate=True):
         properties = SimpleNamespace(mode="", on="", name="")
         self.drawn.append((name, icon, properties))
         return properties

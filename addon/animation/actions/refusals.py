@@ -7,6 +7,9 @@ from collections.abc import Mapping
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..curves import LARGEST, Keys
 from ..transforms import GROUP, Refused, Transform
@@ -17,11 +20,52 @@ MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
 
 COMPONENTS = (
-    *(f"Location {axis}" for axis in "XYZ"),
-    *(f"Rotation {axis}" for axis in "WXYZ"),
-    *(f"Scale {axis}" for axis in "XYZ"),
+    *(n_("Location X"), n_("Location Y"), n_("Location Z")),
+    *(n_("Rotation W"), n_("Rotation X"), n_("Rotation Y"), n_("Rotation Z")),
+    *(n_("Scale X"), n_("Scale Y"), n_("Scale Z")),
 )
 """What the rows of a source are called."""
+
+CHANNELS = {
+    "location": n_("Location"),
+    "rotation_quaternion": n_("Rotation Quaternion"),
+    "rotation_euler": n_("Rotation Euler"),
+    "scale": n_("Scale"),
+    "delta_location": n_("Delta Location"),
+    "delta_rotation_quaternion": n_("Delta Rotation Quaternion"),
+    "delta_rotation_euler": n_("Delta Rotation Euler"),
+    "delta_scale": n_("Delta Scale"),
+}
+"""Properties of what is moved, as the Dope Sheet names their channels."""
+
+LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
+LINKED_RIG = n_("{name} is linked from another file: make an override of it first (Object > Library Override > Make)")
+
+MODIFIED = n_(
+    "{name}: {channel} has a modifier of type {modifier}, which rigid in-betweens cannot follow: "
+    "mute or remove it, or bake the channel (Graph Editor, Channel)"
+)
+MODIFIED_CYCLES = n_(
+    "{name}: {channel} has a modifier of type {modifier} with a restricted range or influence, which rigid "
+    "in-betweens cannot follow: mute or remove it, or bake the channel (Graph Editor, Channel)"
+)
+
+KEY = n_("key {number} of {channel}")
+LEFT_HANDLE = n_("left handle of key {number} of {channel}")
+RIGHT_HANDLE = n_("right handle of key {number} of {channel}")
+EASING = n_("easing of key {number} of {channel}")
+"""What keys are made of, channels and keys first."""
+
+NOT_FINITE = n_("{name}: {key} is not a finite number: delete it (Dope Sheet, X)")
+BAD_FRAME = n_(
+    "{name}: {key} has the frame {number:g}, which no motion can be computed from: delete it (Dope Sheet, X)"
+)
+BAD_VALUE = n_(
+    "{name}: {key} has the value {number:g}, which no motion can be computed from: delete it (Dope Sheet, X)"
+)
+BAD_SETTING = n_(
+    "{name}: {key} has the setting {number:g}, which no motion can be computed from: delete it (Dope Sheet, X)"
+)
 
 
 def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> None:
@@ -33,35 +77,36 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
     differences = user.differences.values()
     for path, _ in (*user.channels.values(), *differences) if drivers else ():
         if path in drivers:
-            raise Refused(f"{user.name}: {_label(drivers[path])} is driven: remove the driver, or bake it to keys")
+            raise Refused(
+                rpt_("{name}: {channel} is driven: remove the driver, or bake it to keys").format(
+                    name=user.name, channel=_label(drivers[path])
+                )
+            )
     # The differences of bones are in a slot of their own.
     for channel in () if place.prefix else differences:
         fcurve = place.curves.get(channel)
         if fcurve is not None and not is_filled_in(fcurve):
             if fcurve.group is not None and fcurve.group.name == GROUP:
                 raise Refused(
-                    f"{user.name}: {_label(fcurve)} has in-betweens that were turned into keys: "
-                    "delete that channel, and they are made anew (Dope Sheet, X)"
+                    rpt_(
+                        "{name}: {channel} has in-betweens that were turned into keys: "
+                        "delete that channel, and they are made anew (Dope Sheet, X)"
+                    ).format(name=user.name, channel=_label(fcurve))
                 )
-            prop = channel[0].rpartition("delta_")[2]
             raise Refused(
-                f"{user.name}: {_label(fcurve)} is animated already: move that animation to a parent, or to "
-                f"{prop.replace('_', ' ')} (Object > Apply > Animated Transforms to Deltas does the reverse)"
+                rpt_(
+                    "{name}: {channel} is animated already: move that animation to a parent, or to "
+                    "{other} (Object > Apply > Animated Transforms to Deltas does the reverse)"
+                ).format(name=user.name, channel=_label(fcurve), other=_label_of(channel[0].rpartition("delta_")[2]))
             )
 
 
 def refuse_linked(user: Transform, place: SlotTransform | None = None) -> None:
     """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
     if not user.animated.is_editable:
-        way_out = "make it local first (Object > Relations > Make Local)"
-        if user.prefix:
-            way_out = "make an override of it first (Object > Library Override > Make)"
-        raise Refused(f"{user.animated.name} is linked from another file: {way_out}")
+        raise Refused(rpt_(LINKED_RIG if user.prefix else LINKED).format(name=user.animated.name))
     if place is not None and not place.slot.action.is_editable:
-        raise Refused(
-            f"{place.slot.action.name} is linked from another file: "
-            "make it local first (Object > Relations > Make Local)"
-        )
+        raise Refused(rpt_(LINKED).format(name=place.slot.action.name))
 
 
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
@@ -69,15 +114,21 @@ def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
     for modifier in fcurve.modifiers:
         plain = modifier.type == "CYCLES" and not modifier.use_restricted_range and not modifier.use_influence
         if not plain and not modifier.mute:
+            kinds = modifier.bl_rna.properties["type"]
+            text = MODIFIED_CYCLES if modifier.type == "CYCLES" else MODIFIED
             raise Refused(
-                f"{name}: {_label(fcurve)} has a modifier of type {modifier.type.title()}"
-                f"{' with a restricted range or influence' if modifier.type == 'CYCLES' else ''}, which rigid "
-                "in-betweens cannot follow: mute or remove it, or bake the channel (Graph Editor, Channel)"
+                rpt_(text).format(
+                    name=name,
+                    channel=_label(fcurve),
+                    modifier=iface_(kinds.enum_items[modifier.type].name, kinds.translation_context),
+                )
             )
     if not fcurve.keyframe_points and fcurve.sampled_points:
         raise Refused(
-            f"{name}: {_label(fcurve)} is sampled and has no keys: turn its samples into keys "
-            "(Graph Editor, Channel > Samples to Keys)"
+            rpt_(
+                "{name}: {channel} is sampled and has no keys: turn its samples into keys "
+                "(Graph Editor, Channel > Samples to Keys)"
+            ).format(name=name, channel=_label(fcurve))
         )
 
 
@@ -92,14 +143,18 @@ def refuse_numbers(name: str, source: Source) -> None:
     first, last = source.keyed_range
     if last - first > MOST_FRAMES:
         raise Refused(
-            f"{name} has keys over {last - first:.0f} frames, at most {MOST_FRAMES} can be filled in: "
-            "delete the keys that are far off"
+            rpt_(
+                "{name} has keys over {frames:.0f} frames, at most {most} can be filled in: "
+                "delete the keys that are far off"
+            ).format(name=name, frames=last - first, most=MOST_FRAMES)
         )
     first, last = source.seen_range
     if last - first > MOST_FRAMES and not source.repeats:
         raise Refused(
-            f"{name} goes on outside of its keys for all {last - first} frames of its scene, at most {MOST_FRAMES} "
-            "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+            rpt_(
+                "{name} goes on outside of its keys for all {frames} frames of its scene, at most {most} "
+                "can be filled in: shorten the scene, or give the channels constant extrapolation and no cycles"
+            ).format(name=name, frames=last - first, most=MOST_FRAMES)
         )
     try:
         source.key_frames  # noqa: B018 - raises where cycles make too many
@@ -110,12 +165,7 @@ def refuse_numbers(name: str, source: Source) -> None:
 def _numbers(keys: Keys) -> dict[str, np.ndarray]:
     """All that keys are made of, channels and keys first, by what it is to a key."""
     settings = None if keys.easing_settings is None else np.moveaxis(keys.easing_settings, 0, -1)
-    parts = {
-        "": keys.points,
-        "left handle of ": keys.left,
-        "right handle of ": keys.right,
-        "easing of ": settings,
-    }
+    parts = {KEY: keys.points, LEFT_HANDLE: keys.left, RIGHT_HANDLE: keys.right, EASING: settings}
     return {part: numbers for part, numbers in parts.items() if numbers is not None}
 
 
@@ -123,11 +173,16 @@ def _explain_numbers(name: str, source: Source) -> None:
     """Raise `Refused` with the first number of a source that is not finite, or the first channel out of order."""
 
     def label(row: int) -> str:
-        return f"Rotation {'XYZ'[row - 3]}" if source.order is not None and 3 <= row < 6 else COMPONENTS[row]
+        by_angles = source.order is not None and 3 <= row < 6
+        return iface_(COMPONENTS[row + 1 if by_angles else row])
 
     for row, value in source.rest.items():
         if not math.isfinite(value):
-            raise Refused(f"{name}: {label(row)} is not a finite number: set it anew (sidebar, Item)")
+            raise Refused(
+                rpt_("{name}: {channel} is not a finite number: set it anew (sidebar, Item)").format(
+                    name=name, channel=label(row)
+                )
+            )
     for rows, keys in source.channels:
         for part, numbers in _numbers(keys).items():
             # What is no number is not smaller, either.
@@ -135,32 +190,38 @@ def _explain_numbers(name: str, source: Source) -> None:
             if len(unusable):
                 channel, key, *axis = unusable[0].tolist()
                 number = numbers[tuple(unusable[0])]
-                what = "is not a finite number"
+                text = NOT_FINITE
                 if math.isfinite(number):
-                    quantity = "setting" if part.startswith("easing") else ("frame", "value")[axis[0]]
-                    what = f"has the {quantity} {number:g}, which no motion can be computed from"
-                raise Refused(
-                    f"{name}: {part}key {key + 1} of {label(rows[channel])} {what}: delete it (Dope Sheet, X)"
-                )
+                    text = BAD_SETTING if part == EASING else (BAD_FRAME, BAD_VALUE)[axis[0]]
+                which = rpt_(part).format(number=key + 1, channel=label(rows[channel]))
+                raise Refused(rpt_(text).format(name=name, key=which, number=number))
         if np.any(np.diff(keys.times) < 0.0):
             raise Refused(
-                f"{name}: the keys of {label(rows[0])} are not in the order of their frames: "
-                "move one of them and back (Dope Sheet, G)"
+                rpt_(
+                    "{name}: the keys of {channel} are not in the order of their frames: "
+                    "move one of them and back (Dope Sheet, G)"
+                ).format(name=name, channel=label(rows[0]))
             )
-    raise Refused(f"{name}: a delta transform is not a finite number: set it anew (Object Properties, Delta Transform)")
+    raise Refused(
+        rpt_(
+            "{name}: a delta transform is not a finite number: set it anew (Object Properties, Delta Transform)"
+        ).format(name=name)
+    )
 
 
 def _refuse_modes(name: str, mode: int | Keys) -> None:
     """Raise `Refused` where an object, or a key of its mode channel, has what is no mode."""
     if not isinstance(mode, Keys):
         if mode == UNKNOWN:
-            raise Refused(f"{name} has a mode that this version does not know: choose another")
+            raise Refused(rpt_("{name} has a mode that this version does not know: choose another").format(name=name))
         return
     known = np.isin(np.rint(mode.values[0]), list(MODE_NAMES)) & np.isfinite(mode.times)
     if not known.all():
         raise Refused(
-            f"{name}: key {int(np.argmin(known)) + 1} of the mode channel has no mode that this version knows: "
-            "delete it (Dope Sheet, X), or choose a mode for the whole object"
+            rpt_(
+                "{name}: key {number} of the mode channel has no mode that this version knows: "
+                "delete it (Dope Sheet, X), or choose a mode for the whole object"
+            ).format(name=name, number=int(np.argmin(known)) + 1)
         )
 
 
@@ -168,4 +229,9 @@ def _label(fcurve: bpy.types.FCurve) -> str:
     """A channel as the Dope Sheet names it."""
     name = fcurve.data_path.rpartition(".")[2]
     axes = "WXYZ" if name.endswith("quaternion") else "XYZ"
-    return f"{name.replace('_', ' ').title()} {axes[fcurve.array_index]}" if fcurve.array_index < len(axes) else name
+    return f"{_label_of(name)} {axes[fcurve.array_index]}" if fcurve.array_index < len(axes) else name
+
+
+def _label_of(name: str) -> str:
+    """A property as the Dope Sheet names its channels."""
+    return iface_(CHANNELS.get(name, name))

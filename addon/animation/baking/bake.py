@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import Poses
 from ...motion.eulers import ORDERS, extrinsic_eulers_from_quaternions
@@ -107,13 +108,17 @@ def bake(
         then.
     """
     if not step > 0.0:
-        raise Refused(f"the step between baked keys has to be above zero, not {step}")
+        raise Refused(rpt_("the step between baked keys has to be above zero, not {step}").format(step=step))
 
     def plan(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source, np.ndarray]]:
         refuse_tweak_mode(transform)
         live = [(place, source) for place, source in readable(transform, readings) if source.is_live]
         if not live:
-            raise Refused(f"{transform.name} has no rigid in-betweens to bake: choose a mode for its keys first")
+            raise Refused(
+                rpt_("{name} has no rigid in-betweens to bake: choose a mode for its keys first").format(
+                    name=transform.name
+                )
+            )
         return [
             (place, source, _frames(source, *_widened(transform, source, first, last), step)) for place, source in live
         ]
@@ -173,7 +178,9 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
         return tuple(map(float, source.seen_range))
     if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
         raise Refused(
-            f"{transform.name} has its keys from frame {keys[0]:g} to {keys[-1]:g}: none of them is in that range"
+            rpt_("{name} has its keys from frame {first:g} to {last:g}: none of them is in that range").format(
+                name=transform.name, first=keys[0], last=keys[-1]
+            )
         )
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.best_of import least_errors
@@ -146,7 +147,9 @@ def _chosen(
         radius, poses = radius * float(np.abs(poses.scales).max()), Poses(poses.positions, poses.quaternions)
     elif poses.scales is not None and not np.all(poses.scales > 0.0):
         raise Refused(
-            f"{transform.name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"
+            rpt_("{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)").format(
+                name=transform.name
+            )
         )
     return reduce_keys(frames, poses, mode, tolerance, radius)
 
@@ -192,8 +195,10 @@ def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
 def goes_elsewhere(name: str) -> Refused:
     """Why something cannot have fewer keys, although those that are left say all about the time between them."""
     return Refused(
-        f"{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
-        "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
+        rpt_(
+            "{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
+            "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
+        ).format(name=name)
     )
 
 

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import Poses, Skeleton, reduce_skeleton_keys, shell_error
 from ...motion.contacts import slide, standing
@@ -34,6 +36,14 @@ from .fewer_keys import (
     with_keys,
 )
 from .sizes import radius_of, size_of
+
+NO_FEWER = n_(
+    "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: allow a larger one"
+)
+NO_FEWER_POSES = n_(
+    "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: "
+    "allow a larger one, or give each bone keys of its own"
+)
 
 HOLD = 4.0
 """How many times the error counts of what stands on the ground."""
@@ -72,7 +82,8 @@ def fewer_keys_of_rigs(
             plans.update(dict.fromkeys(members, refusal))
             continue
         except ValueError as problem:
-            plans.update(dict.fromkeys(members, Refused(f"{rig.name} cannot be reduced: {problem}")))
+            why = rpt_("{name} cannot be reduced: {problem}").format(name=rig.name, problem=problem)
+            plans.update(dict.fromkeys(members, Refused(why)))
             continue
         for transform, plan in fewer.items():
             found = plans.setdefault(transform, [])
@@ -121,8 +132,10 @@ class _Rig:
         for bone, poses in zip(self.bones, basis, strict=True):
             if poses.scales is not None and poses.scales.min() <= 0.0:
                 raise Refused(
-                    f"{self.rig.name}/{bone.name}: its scale passes zero, and with it the size of all that hangs on "
-                    "it: reduce the bones above and below it apart from one another"
+                    rpt_(
+                        "{name}: its scale passes zero, and with it the size of all that hangs on "
+                        "it: reduce the bones above and below it apart from one another"
+                    ).format(name=f"{self.rig.name}/{bone.name}")
                 )
         grows = any(poses.scales is not None and np.abs(poses.scales - 1.0).max() > SMALLEST for poses in basis)
         follows = [_follows(bone, grows) for bone in self.bones]
@@ -165,11 +178,8 @@ class _Rig:
         # What has as few keys already stays as it is.
         chosen = {number: own for number, own in chosen.items() if len(own) < len(before[number])}
         if not chosen:
-            way_out = ", or give each bone keys of its own" if shared else ""
-            raise Refused(
-                f"{self.rig.name}: its bones need their keys on all of {len(self.frames)} frames to stay within the "
-                f"tolerance: allow a larger one{way_out}"
-            )
+            text = NO_FEWER_POSES if shared else NO_FEWER
+            raise Refused(rpt_(text).format(name=self.rig.name, frames=len(self.frames)))
         shown = self.poses.copy()
         fewer: dict[int, Source] = {}
 

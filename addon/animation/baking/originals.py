@@ -7,21 +7,34 @@ for which original is noted on what is moved, the latest last: what was done las
 from __future__ import annotations
 
 import bpy
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.slots import SlotTransform, places_of
 from ..transforms import Refused, Transform
 from . import rigs
 from .copies import BAKED, REDUCED, copied, entries_in_use, exchange, note
 
-WAYS_BACK = {BAKED: "Un-Bake", REDUCED: "Restore Keys"}
-"""What takes it back."""
+NOT_DONE = {
+    BAKED: n_("{name} is not baked, or has another Action by now"),
+    REDUCED: n_("{name} is not reduced, or has another Action by now"),
+}
+"""Why something cannot be taken back."""
+
+DONE_SINCE = {
+    BAKED: n_("{name} was baked since it was reduced: Un-Bake first"),
+    REDUCED: n_("{name} was reduced since it was baked: Restore Keys first"),
+}
+"""Why that cannot which was done before, by what was done last."""
 
 
 def refuse_tweak_mode(transform: Transform) -> None:
     """Raise `Refused` where a strip is being edited: its Action cannot be exchanged meanwhile."""
     data = transform.animated.animation_data
     if data is not None and data.use_tweak_mode:
-        raise Refused(f"{transform.name}: leave the strip that is being edited first (NLA Editor, Tab)")
+        raise Refused(
+            rpt_("{name}: leave the strip that is being edited first (NLA Editor, Tab)").format(name=transform.name)
+        )
 
 
 def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
@@ -58,9 +71,9 @@ def refuse_without_original(transform: Transform, kind: str) -> None:
     notes = [entry for entry in transform.motion.bakes if entry.kind == kind and entry.original is not None]
     latest = next((entry.kind for entry in entries_in_use(transform) if entry.original is not None), None)
     if latest is None or not notes:
-        raise Refused(f"{transform.name} is not {kind.lower()}, or has another Action by now")
+        raise Refused(rpt_(NOT_DONE[kind]).format(name=transform.name))
     if latest != kind:
-        raise Refused(f"{transform.name} was {latest.lower()} since it was {kind.lower()}: {WAYS_BACK[latest]} first")
+        raise Refused(rpt_(DONE_SINCE[latest]).format(name=transform.name))
 
 
 def put_back(transform: Transform, kind: str) -> None:

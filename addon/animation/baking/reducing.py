@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
@@ -35,6 +37,24 @@ from .originals import (
     refuse_without_original,
 )
 from .sizes import radius_of
+
+HAS_KEYS = (
+    n_("{name} has no keys of location, rotation or scale"),
+    n_("{name} has {count} key of location, rotation or scale"),
+    n_("{name} has {count} keys of location, rotation or scale"),
+)
+"""How something begins that has hardly a key, by the number of these."""
+
+SIMULATED = n_("{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)")
+SOLVED_CAMERA = n_(
+    "{has}, a camera solution moves it: turn that into keys first (Object Constraint Properties, Constraint to F-Curve)"
+)
+CONSTRAINED = n_(
+    "{has}, constraints or drivers move it: bake them first (Object > Animation > Bake Action, with Visual Keying)"
+)
+CONSTRAINED_BONE = n_(
+    "{has}, constraints or drivers move it: bake them first (Pose > Animation > Bake Action, with Visual Keying)"
+)
 
 SOLVED = {"CAMERA_SOLVER", "OBJECT_SOLVER", "FOLLOW_TRACK"}
 """Constraints that have a button of their own for turning them into keys."""
@@ -105,7 +125,9 @@ def reduce_keys_of(
     if mode not in KEYFRAME_MODES:
         raise Refused(no_such_mode(mode, KEYFRAME_MODES))
     if not 0.0 < tolerance < math.inf:
-        raise Refused(f"the tolerance has to be a number above zero, not {tolerance:g}")
+        raise Refused(
+            rpt_("the tolerance has to be a number above zero, not {tolerance:g}").format(tolerance=tolerance)
+        )
 
     of_rigs: Plans = {}
 
@@ -250,36 +272,31 @@ def _why_no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> str
     if count <= 2:
         return _why_nothing_is_keyed(transform, count)
     if keeps_scale:
-        return (
-            f"{transform.name} keeps its {count} keys: its scale changes differently along its axes, which is no "
+        return rpt_(
+            "{name} keeps its {count} keys: its scale changes differently along its axes, which is no "
             "part of a pose; move that animation to a child, or remove keys of the scale by hand"
-        )
-    return f"{transform.name} needs its {count} keys to stay within the tolerance: allow a larger one"
+        ).format(name=transform.name, count=count)
+    return rpt_("{name} needs its {count} keys to stay within the tolerance: allow a larger one").format(
+        name=transform.name, count=count
+    )
 
 
 def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
     """What moves something that has hardly a key, and how that becomes keys."""
     obj = transform.carrier
-    has = f"{transform.name} has {count or 'no'} key{'s' * (count != 1)} of location, rotation or scale"
+    has = rpt_(HAS_KEYS[min(count, 2)]).format(name=transform.name, count=count)
     constraints = {constraint.type for constraint in obj.constraints if constraint.enabled and not is_ours(constraint)}
     if not transform.prefix and obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
-        return f"{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)"
+        return rpt_(SIMULATED).format(has=has)
     if constraints & SOLVED:
-        return (
-            f"{has}, a camera solution moves it: turn that into keys first "
-            "(Object Constraint Properties, Constraint to F-Curve)"
-        )
+        return rpt_(SOLVED_CAMERA).format(has=has)
     if constraints or _is_driven(transform):
-        menu = "Pose" if transform.prefix else "Object"
-        return (
-            f"{has}, constraints or drivers move it: bake them first "
-            f"({menu} > Animation > Bake Action, with Visual Keying)"
-        )
+        return rpt_(CONSTRAINED_BONE if transform.prefix else CONSTRAINED).format(has=has)
     if not transform.prefix and any(
         place.prefix for slot in slots_of([transform.animated]) for place in transforms_in(slot)
     ):
-        return f"{has}, its bones have: select those in Pose mode, and reduce theirs"
-    return f"{has}: there is nothing to reduce"
+        return rpt_("{has}, its bones have: select those in Pose mode, and reduce theirs").format(has=has)
+    return rpt_("{has}: there is nothing to reduce").format(has=has)
 
 
 def _is_driven(transform: Transform) -> bool:

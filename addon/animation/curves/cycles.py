@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from .keys import Keys
 
@@ -69,7 +70,11 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
             rounds = np.ceil(length / period)
             rounds = min(rounds, count) if count else rounds
             if rounds * len(inside) > MAX_COPIES:
-                raise ValueError(f"{rounds:.0f} rounds of {period:g} frames are too many: give Cycles a count")
+                raise ValueError(
+                    rpt_("{rounds:.0f} rounds of {period:g} frames are too many: give Cycles a count").format(
+                        rounds=rounds, period=period
+                    )
+                )
             number = np.arange(1.0, rounds + 1.0)[:, None]
             mirrored = (number % 2 == 1) & (mode == "MIRROR")
             copies.append((np.where(mirrored, begin + end - inside, inside) + side * number * period).ravel())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.refusals import refuse_linked
 from ..actions.slots import Slot, SlotTransform, uses_of
@@ -56,7 +57,11 @@ def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
         refuse_linked(transform)
         places = [place for place, _ in readings if place.filled] if isinstance(transform, BoneTransform) else []
         if not places:
-            raise Refused(f"{transform.name} has no constraint to restore: choose a mode for keys of a bone first")
+            raise Refused(
+                rpt_("{name} has no constraint to restore: choose a mode for keys of a bone first").format(
+                    name=transform.name
+                )
+            )
         return [place for place in places if trouble_of(transform, place)]
 
     def act(transform: BoneTransform, places: list[SlotTransform]) -> None:

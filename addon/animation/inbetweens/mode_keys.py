@@ -13,6 +13,7 @@ from functools import partial
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
@@ -157,8 +158,9 @@ def set_mode(
         place = active_place(transform, places)
         if place is None:
             raise Refused(
-                f"{transform.name} has no Action with keys to set a mode on: "
-                "key it first, or enter a strip (NLA Editor, Tab)"
+                rpt_(
+                    "{name} has no Action with keys to set a mode on: key it first, or enter a strip (NLA Editor, Tab)"
+                ).format(name=transform.name)
             )
         return [place]
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import bpy
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.reading import differing_users, sources_of_users
 from ..actions.refusals import refuse_numbers
@@ -10,6 +12,15 @@ from ..actions.slots import SlotTransform, slot_transforms_of
 from ..actions.sources import Source
 from ..transforms import Refused, Transform, transform_of
 from .differences import differences
+
+DIFFERING = n_(
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode or delta transform; the "
+    "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+)
+DIFFERING_BONE = n_(
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode or Local Location; the "
+    "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+)
 
 
 def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
@@ -28,7 +39,9 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
     except Refused as problem:
         return str(problem)
     except ValueError as problem:
-        return f"{transform.name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)"
+        return rpt_("{name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)").format(
+            name=transform.name, problem=problem
+        )
     return ""
 
 
@@ -36,10 +49,5 @@ def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[
     """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
     if transform in (differing := differing_users(place, sources)):
         leader = next(user for user in place.users if user not in differing)
-        reason = "another rotation mode or delta transform"
-        if transform.prefix:
-            reason = "another rotation mode or Local Location"
-        raise Refused(
-            f"{transform.name} moves by the same Action slot as {leader.name}, but has {reason}; the in-betweens are "
-            f"those of {leader.name}: give it an Action of its own (Object > Relations > Make Single User)"
-        )
+        text = DIFFERING_BONE if transform.prefix else DIFFERING
+        raise Refused(rpt_(text).format(name=transform.name, leader=leader.name))

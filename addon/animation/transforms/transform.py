@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.eulers import ORDERS
 from .components import LOCATION, REST, ROTATION, ROWS, SCALE
@@ -83,8 +84,10 @@ class Transform(ABC):
         if mode in ORDERS:
             return "rotation_euler"
         raise Refused(
-            f"{self.name} turns by axis and angle, which has no rigid in-betweens: "
-            "set its rotation mode to Quaternion first (sidebar, Item)"
+            rpt_(
+                "{name} turns by axis and angle, which has no rigid in-betweens: "
+                "set its rotation mode to Quaternion first (sidebar, Item)"
+            ).format(name=self.name)
         )
 
     @property

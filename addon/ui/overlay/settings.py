@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...animation.properties import MODE_ITEMS
 from ..rows import draw_text, labelled
+from ..wording import NARROW
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
+
+HIDDEN = n_("Hidden by Viewport Overlays")
 
 
 class RigidMotionOverlay(bpy.types.PropertyGroup):
@@ -59,11 +64,11 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     settings = context.scene.rigid_motion_overlay
     labelled(layout).prop(settings, "show_paths", text="Show")
     if settings.show_paths and not are_paths_shown(context):
-        draw_text(context, layout, "Hidden by Viewport Overlays", "INFO")
+        draw_text(context, layout, HIDDEN, "INFO")
     column = layout.column()
     column.active = settings.show_paths
-    labelled(column, "Mode").prop(settings, "mode", text="")
-    labelled(column, "Step").prop(settings, "tick_step", text="")
+    labelled(column, iface_("Mode", NARROW)).prop(settings, "mode", text="")
+    labelled(column, iface_("Step", NARROW)).prop(settings, "tick_step", text="")
     labelled(column).prop(settings, "show_native")
     axes = labelled(column)
     axes.prop(settings, "show_axes")

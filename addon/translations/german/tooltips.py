@@ -1,0 +1,286 @@
+"""Descriptions of operators, properties, modes, menus and panels."""
+
+TOOLTIPS = {
+    # Modes
+    "Blender's own in-betweens: every channel for itself": "Blenders eigene Zwischenbilder: jeder Kanal für sich",
+    "The origin runs along a straight line while the object turns at an even speed": (
+        "Der Ursprung läuft auf einer geraden Linie, während sich das Objekt gleichmäßig dreht"
+    ),
+    "The origin runs along a straight line while the bone turns at an even speed": (
+        "Der Ursprung läuft auf einer geraden Linie, während sich der Knochen gleichmäßig dreht"
+    ),
+    "Turns about and slides along one fixed axis in space, both at an even speed": (
+        "Dreht sich um eine feste Achse im Raum und gleitet an ihr entlang, beides gleichmäßig"
+    ),
+    "Nearly the screw motion, slower at the keys and faster half-way": (
+        "Fast die Schraubung, langsamer an den Schlüsselbildern und schneller auf halbem Weg"
+    ),
+    "The screw motion, by the exponential of the motor's logarithm": (
+        "Die Schraubung, berechnet über den Logarithmus des Motors"
+    ),
+    "The motor blend, with uniform scale blended along with it": (
+        "Die Motor-Überblendung, die gleichmäßige Skalierung mit überblendet"
+    ),
+    "Turns, slides and grows at even rates: a screw that widens as the object grows": (
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraubung, die weiter wird, wenn das Objekt wächst"
+    ),
+    "Turns, slides and grows at even rates: a screw that widens as the bone grows": (
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraubung, die weiter wird, wenn der Knochen wächst"
+    ),
+    "Screws that flow into one another: no corner at a key, neither in the path nor in the turning": (
+        "Schraubungen, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung"
+    ),
+    # Choosing modes
+    "Choose how the selected objects move from key to key": (
+        "Wählen, wie sich die ausgewählten Objekte von Schlüsselbild zu Schlüsselbild bewegen"
+    ),
+    "Choose how the selected bones move from key to key": (
+        "Wählen, wie sich die ausgewählten Knochen von Schlüsselbild zu Schlüsselbild bewegen"
+    ),
+    "On: {segments}": "Für: {segments}",
+    "What happens between the keys": "Was zwischen den Schlüsselbildern geschieht",
+    "What happens between the keys. A key of this property decides from its frame on": (
+        "Was zwischen den Schlüsselbildern geschieht. Ein Schlüsselbild dieser Eigenschaft gilt ab seinem Einzelbild"
+    ),
+    "Which segments get the mode": "Welche Segmente den Modus bekommen",
+    "One mode for all segments. Keys of the mode are removed": (
+        "Ein Modus für alle Segmente. Schlüsselbilder des Modus werden entfernt"
+    ),
+    "The segment that the playhead is in. The others keep their modes": (
+        "Das Segment unter dem Abspielkopf. Die anderen behalten ihre Modi"
+    ),
+    "The segments that the selected keys begin. The others keep their modes": (
+        "Die Segmente, die an den ausgewählten Schlüsselbildern beginnen. Die anderen behalten ihre Modi"
+    ),
+    "How the selected objects move from key to key": (
+        "Wie sich die ausgewählten Objekte von Schlüsselbild zu Schlüsselbild bewegen"
+    ),
+    "How the selected bones move from key to key": (
+        "Wie sich die ausgewählten Knochen von Schlüsselbild zu Schlüsselbild bewegen"
+    ),
+    "How objects and bones move on from the selected keys": (
+        "Wie sich Objekte und Knochen von den ausgewählten Schlüsselbildern aus weiterbewegen"
+    ),
+    "How the selected objects or bones move between the two keys that the playhead is between": (
+        "Wie sich die ausgewählten Objekte oder Knochen zwischen den beiden Schlüsselbildern um den Abspielkopf bewegen"
+    ),
+    "One mode for all segments of the objects and bones that are shown": (
+        "Ein Modus für alle Segmente der angezeigten Objekte und Knochen"
+    ),
+    "Give the objects Blender's own in-betweens again, and remove the keys of their modes. "
+    "Keys of location, rotation and scale stay": (
+        "Den Objekten wieder Blenders eigene Zwischenbilder geben und die Schlüsselbilder ihrer Modi entfernen. "
+        "Schlüsselbilder von Position, Rotation und Skalierung bleiben"
+    ),
+    "Give the bones Blender's own in-betweens again, and remove the keys of their modes. "
+    "Keys of location, rotation and scale stay": (
+        "Den Knochen wieder Blenders eigene Zwischenbilder geben und die Schlüsselbilder ihrer Modi entfernen. "
+        "Schlüsselbilder von Position, Rotation und Skalierung bleiben"
+    ),
+    "Bring all in-betweens of this file up to date with their keys. "
+    "Needed only while Live Update is off, in the preferences of the extension": (
+        "Alle Zwischenbilder dieser Datei auf den Stand ihrer Schlüsselbilder bringen. "
+        "Nur nötig, solange „Live-Aktualisierung“ in den Einstellungen der Erweiterung aus ist"
+    ),
+    'Put the constraint "Rigid Motion" back on the selected bones, which shows their in-betweens: '
+    "first in the stack, unmuted, with full influence": (
+        "Den ausgewählten Knochen die Beschränkung „Rigid Motion“ zurückgeben, die ihre Zwischenbilder zeigt: "
+        "als erste im Stapel, nicht stumm, mit vollem Einfluss"
+    ),
+    # Baking
+    "Put the in-betweens on location, rotation and scale as real keys of type Generated, in a copy of the Action, "
+    "for hand-over to programs that read keys only. Un-Bake gives the original back": (
+        "Die Zwischenbilder als echte Schlüsselbilder vom Typ „Generated“ in Position, Rotation und Skalierung "
+        "schreiben, in eine Kopie der Aktion, für Programme, die nur Schlüsselbilder lesen. "
+        "„Backen aufheben“ gibt das Original zurück"
+    ),
+    "Frames from one baked key to the next. Below 1 there are keys between the frames, for motion blur": (
+        "Einzelbilder von einem gebackenen Schlüsselbild zum nächsten. "
+        "Unter 1 liegen auch Schlüsselbilder zwischen den Einzelbildern, für Bewegungsunschärfe"
+    ),
+    "What to bake, widened to whole segments": "Was gebacken wird, erweitert auf ganze Segmente",
+    "From the first key of each to its last": "Jeweils vom ersten Schlüsselbild bis zum letzten",
+    "The frame range of the scene, or its preview range while that is in use": (
+        "Der Bildbereich der Szene, oder ihr Vorschaubereich, solange dieser benutzt wird"
+    ),
+    "From one frame to another": "Von einem Einzelbild zu einem anderen",
+    "First frame to bake": "Erstes Einzelbild, das gebacken wird",
+    "Last frame to bake": "Letztes Einzelbild, das gebacken wird",
+    "Give baked objects the Actions back that they had before, with their own keys and modes": (
+        "Gebackenen Objekten die Aktionen zurückgeben, die sie vorher hatten, "
+        "mit ihren eigenen Schlüsselbildern und Modi"
+    ),
+    "Give baked bones the Actions back that they had before, with their own keys and modes": (
+        "Gebackenen Knochen die Aktionen zurückgeben, die sie vorher hatten, "
+        "mit ihren eigenen Schlüsselbildern und Modi"
+    ),
+    # Fewer keys
+    "Leave only the keys that the motion needs, location and rotation together, in a copy of the Action: "
+    "for imported motion capture, baked simulations and solved cameras. Restore Keys gives all of them back": (
+        "Nur die Schlüsselbilder lassen, die die Bewegung braucht, Position und Rotation zusammen, in einer Kopie der "
+        "Aktion: für importiertes Motion-Capture, gebackene Simulationen und gelöste Kameras. "
+        "„Schlüsselbilder wiederherstellen“ gibt alle zurück"
+    ),
+    "How far off any point may be on any frame, within the radius around what is moved. Of bones that counts "
+    "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size": (
+        "Wie weit irgendein Punkt im Radius um das Bewegte auf irgendeinem Einzelbild abweichen darf. Bei Knochen "
+        "zählt der Ort, an den sie durch alles gelangen, woran sie hängen. Anfangs ein Millimeter, bei einem Rig 0,3 "
+        "% seiner Größe"
+    ),
+    "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
+    "At 0 each object has the size of its own bounding box, and each bone its length": (
+        "Bis zu welcher Entfernung vom Ursprung nichts weiter abweichen darf: je größer, desto mehr zählt die "
+        "Rotation. Bei 0 hat jedes Objekt die Größe seines Begrenzungsrahmens und jeder Knochen seine Länge"
+    ),
+    "What fills in between the keys that are left, and which keys those are": (
+        "Was zwischen den verbliebenen Schlüsselbildern geschieht, und damit, welche das sind"
+    ),
+    "Then key each segment with the mode that comes closest to the recording there, within the tolerance. "
+    "Where one mode meets another the path may turn a corner": (
+        "Danach jedem Segment den Modus geben, der dort der Aufnahme am nächsten kommt, innerhalb der Toleranz. "
+        "Wo ein Modus auf einen anderen trifft, kann der Pfad einen Knick haben"
+    ),
+    "Give all bones of a rig keys on the same frames. Otherwise each has its own: fewer keys in all": (
+        "Allen Knochen eines Rigs Schlüsselbilder auf denselben Einzelbildern geben. "
+        "Sonst hat jeder seine eigenen: insgesamt weniger Schlüsselbilder"
+    ),
+    "Keep bones that stand on the ground to a quarter of the tolerance while they do": (
+        "Knochen, die auf dem Boden stehen, solange auf ein Viertel der Toleranz genau halten"
+    ),
+    "Give reduced objects all the keys back that they had before, to the last handle": (
+        "Reduzierten Objekten alle Schlüsselbilder zurückgeben, die sie vorher hatten, bis zum letzten Griff"
+    ),
+    "Give reduced bones all the keys back that they had before, to the last handle": (
+        "Reduzierten Knochen alle Schlüsselbilder zurückgeben, die sie vorher hatten, bis zum letzten Griff"
+    ),
+    "Remove the keys from the file that Restore Keys would give back, once the reduced ones are good. "
+    "The reduced keys stay as they are": (
+        "Die Schlüsselbilder aus der Datei entfernen, die „Schlüsselbilder wiederherstellen“ zurückgäbe, sobald die "
+        "reduzierten gut sind. Die reduzierten Schlüsselbilder bleiben, wie sie sind"
+    ),
+    # The panel
+    "Where the object or bone is seen on this frame, with the in-betweens. "
+    "The Item tab has Blender's own values, without": (
+        "Wo das Objekt oder der Knochen auf diesem Einzelbild zu sehen ist, mit den Zwischenbildern. "
+        "Der Reiter „Gegenstand“ hat Blenders eigene Werte, ohne sie"
+    ),
+    "Where it is seen on this frame: its location with the in-betweens": (
+        "Wo es auf diesem Einzelbild zu sehen ist: seine Position mit den Zwischenbildern"
+    ),
+    "How it is seen turned on this frame: its rotation with the in-betweens": (
+        "Wie gedreht es auf diesem Einzelbild zu sehen ist: seine Rotation mit den Zwischenbildern"
+    ),
+    "How large it is seen on this frame: its scale with the in-betweens": (
+        "Wie groß es auf diesem Einzelbild zu sehen ist: seine Skalierung mit den Zwischenbildern"
+    ),
+    "The delta transforms that the object has of its own, to which the in-betweens are added": (
+        "Die Delta-Transformation, die das Objekt selbst hat und zu der die Zwischenbilder hinzukommen"
+    ),
+    "Which delta transforms in-betweens are in; the object's own are kept here meanwhile": (
+        "In welchen Delta-Transformationen Zwischenbilder sind; die eigenen des Objekts werden solange hier aufgehoben"
+    ),
+    "The object's own delta location, to which the in-betweens are added": (
+        "Die eigene Delta-Position des Objekts, zu der die Zwischenbilder hinzukommen"
+    ),
+    "The object's own delta rotation, to which the in-betweens are added": (
+        "Die eigene Delta-Rotation des Objekts, zu der die Zwischenbilder hinzukommen"
+    ),
+    "The object's own delta scale, by which the in-betweens are multiplied": (
+        "Die eigene Delta-Skalierung des Objekts, mit der die Zwischenbilder multipliziert werden"
+    ),
+    # Paths
+    "Draw the paths of the selected objects or bones: Blender's own, and beside it that of a rigid-motion mode. "
+    "Of a bone it is the path of its head, or of its tail where the bone only turns. "
+    "Parents are taken as they are on the current frame": (
+        "Die Pfade der ausgewählten Objekte oder Knochen zeichnen: Blenders eigenen und daneben den eines Modus von "
+        "Rigid Motion. Bei einem Knochen ist es der Pfad seines Kopfes, oder seines Endes, wo er sich nur dreht. "
+        "Elternteile werden so genommen, wie sie auf dem aktuellen Einzelbild sind"
+    ),
+    "The mode that each segment has": "Der Modus, den jedes Segment hat",
+    "The mode to draw. Another one than keyed shows what it would do, and changes nothing": (
+        "Der Modus, der gezeichnet wird. Ein anderer als der gesetzte zeigt, was er täte, und ändert nichts"
+    ),
+    "Draw Blender's own path too, in its own color": "Auch Blenders eigenen Pfad zeichnen, in eigener Farbe",
+    "Draw how it is turned along its path, by its local axes at some of the ticks": (
+        "Zeichnen, wie es entlang seines Pfades gedreht ist: seine lokalen Achsen an einigen der Zeitmarken"
+    ),
+    "Length of the axes. At 1 they are half as long as the object or bone is": (
+        "Länge der Achsen. Bei 1 sind sie halb so lang wie das Objekt oder der Knochen"
+    ),
+    "Frames from one tick to the next. At 0, as many ticks as can be told apart on the screen": (
+        "Einzelbilder von einer Zeitmarke zur nächsten. Bei 0 so viele, wie sich auf dem Bildschirm unterscheiden "
+        "lassen"
+    ),
+    # Preferences
+    "What Set Rigid Motion Mode takes where no mode is named: in Search, by a shortcut of your own": (
+        "Was „Rigid-Motion-Modus setzen“ nimmt, wo kein Modus genannt ist: in der Suche, mit eigenem Tastenkürzel"
+    ),
+    "Follow every edit at once. Otherwise in-betweens stay as they are until Refresh In-Betweens": (
+        "Jeder Bearbeitung sofort folgen. Sonst bleiben Zwischenbilder, wie sie sind, "
+        "bis zu „Zwischenbilder aktualisieren“"
+    ),
+    "Color of the path as Blender's own in-betweens have it": "Farbe des Pfades mit Blenders eigenen Zwischenbildern",
+    "Color of the path as the mode has it": "Farbe des Pfades mit dem Modus",
+    "Color of the selected keys on a path. The others are white": (
+        "Farbe der ausgewählten Schlüsselbilder auf einem Pfad. Die anderen sind weiß"
+    ),
+    "Color of the marks that are evenly timed along a path": (
+        "Farbe der Marken, die entlang eines Pfades in gleichen Zeitabständen liegen"
+    ),
+    "Width of the paths": "Breite der Pfade",
+    # Why a button is greyed out
+    "Select an object with keys first": "Zuerst ein Objekt mit Schlüsselbildern auswählen",
+    "Select bones first": "Zuerst Knochen auswählen",
+    "No keys of location, rotation or scale are shown here": (
+        "Hier werden keine Schlüsselbilder von Position, Rotation oder Skalierung gezeigt"
+    ),
+    "These objects have Blender's own in-betweens already": "Diese Objekte haben schon Blenders eigene Zwischenbilder",
+    "These bones have Blender's own in-betweens already": "Diese Knochen haben schon Blenders eigene Zwischenbilder",
+    "These objects and bones have Blender's own in-betweens already": (
+        "Diese Objekte und Knochen haben schon Blenders eigene Zwischenbilder"
+    ),
+    "There are no rigid in-betweens to bake: choose a mode for keys of these objects first": (
+        "Es gibt keine starren Zwischenbilder zu backen: zuerst einen Modus für Schlüsselbilder dieser Objekte wählen"
+    ),
+    "There are no rigid in-betweens to bake: choose a mode for keys of these bones first": (
+        "Es gibt keine starren Zwischenbilder zu backen: zuerst einen Modus für Schlüsselbilder dieser Knochen wählen"
+    ),
+    "There are no rigid in-betweens to bake: choose a mode for keys of these objects and bones first": (
+        "Es gibt keine starren Zwischenbilder zu backen: "
+        "zuerst einen Modus für Schlüsselbilder dieser Objekte und Knochen wählen"
+    ),
+    "None of these objects is baked": "Keines dieser Objekte ist gebacken",
+    "None of these bones is baked": "Keiner dieser Knochen ist gebacken",
+    "None of these objects and bones is baked": "Keines dieser Objekte und keiner dieser Knochen ist gebacken",
+    "None of these objects has more than two keys. Constraints, drivers and simulations are turned into keys first "
+    "(Object > Animation > Bake Action, with Visual Keying)": (
+        "Keines dieser Objekte hat mehr als zwei Schlüsselbilder. Beschränkungen, Treiber und Simulationen werden "
+        "zuerst zu Schlüsselbildern (Objekt > Animation > Aktion backen, mit Visual Keying)"
+    ),
+    "None of these bones has more than two keys. Constraints, drivers and simulations are turned into keys first "
+    "(Pose > Animation > Bake Action, with Visual Keying)": (
+        "Keiner dieser Knochen hat mehr als zwei Schlüsselbilder. Beschränkungen, Treiber und Simulationen werden "
+        "zuerst zu Schlüsselbildern (Pose > Animation > Aktion backen, mit Visual Keying)"
+    ),
+    "None of these objects and bones has more than two keys. Constraints, drivers and simulations are turned into keys "
+    "first (Object > Animation > Bake Action, with Visual Keying)": (
+        "Keines dieser Objekte und keiner dieser Knochen hat mehr als zwei Schlüsselbilder. Beschränkungen, Treiber "
+        "und Simulationen werden zuerst zu Schlüsselbildern (Objekt > Animation > Aktion backen, mit Visual Keying)"
+    ),
+    "The keys of these objects are not reduced": "Die Schlüsselbilder dieser Objekte sind nicht reduziert",
+    "The keys of these bones are not reduced": "Die Schlüsselbilder dieser Knochen sind nicht reduziert",
+    "The keys of these objects and bones are not reduced": (
+        "Die Schlüsselbilder dieser Objekte und Knochen sind nicht reduziert"
+    ),
+    "None of these objects lacks its constraint": "Keinem dieser Objekte fehlt seine Beschränkung",
+    "None of these bones lacks its constraint": "Keinem dieser Knochen fehlt seine Beschränkung",
+    "None of these objects and bones lacks its constraint": (
+        "Keinem dieser Objekte und Knochen fehlt seine Beschränkung"
+    ),
+    "These keys were baked since: Un-Bake first": (
+        "Diese Schlüsselbilder wurden seitdem gebacken: zuerst „Backen aufheben“"
+    ),
+    "These keys were reduced since: Restore Keys first": (
+        "Diese Schlüsselbilder wurden seitdem reduziert: zuerst „Schlüsselbilder wiederherstellen“"
+    ),
+}

@@ -1,0 +1,55 @@
+"""Where the documentation is: buttons that open it, and the pages behind *Online Manual* (F1)."""
+
+from __future__ import annotations
+
+import bpy
+
+WEBSITE = "https://example.org/rigid-motion"
+"""The home of the project, in the manifest too. To be set before a release: `scripts/check_release.py` looks at it."""
+
+DOCS = f"{WEBSITE}/blob/main/docs/"
+"""The pages of the version that is worked on."""
+
+ANIMATORS = "animators.md"
+
+HOW_TO = f"{ANIMATORS}#how-to"
+MODES = f"{ANIMATORS}#which-mode-is-good-for-what"
+RIGS = f"{ANIMATORS}#rigs"
+IN_THE_FILE = f"{ANIMATORS}#what-is-in-the-file"
+LIMITS = f"{ANIMATORS}#limits-plainly"
+
+PAGES = (
+    ("bpy.ops.rigid_motion.set_mode", MODES),
+    ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
+    ("bpy.ops.rigid_motion.mend", IN_THE_FILE),
+    ("bpy.ops.rigid_motion.*", HOW_TO),
+    ("bpy.types.objectmotion.mode", MODES),
+    ("bpy.types.objectmotion.own_*", LIMITS),
+    ("bpy.types.objectmotion.*", HOW_TO),
+    ("bpy.types.bonemotion.mode", RIGS),
+    ("bpy.types.bonemotion.*", RIGS),
+    ("bpy.types.rigidmotionoverlay.*", HOW_TO),
+    ("bpy.types.rigidmotionpreferences.*", HOW_TO),
+    ("bpy.types.showntransform.*", HOW_TO),
+)
+"""Operators and properties, in lower case as Blender asks for them, and the page of each: the first that fits."""
+
+
+def pages() -> tuple[str, tuple[tuple[str, str], ...]]:
+    """What Blender asks for: where pages are, and which is whose."""
+    return DOCS, PAGES
+
+
+def draw(layout: bpy.types.UILayout) -> None:
+    """Buttons that open the documentation and the website."""
+    row = layout.row()
+    row.operator("wm.url_open", text="Documentation", icon="HELP").url = DOCS + ANIMATORS
+    row.operator("wm.url_open", text="Website", icon="URL").url = WEBSITE
+
+
+def register() -> None:
+    bpy.utils.register_manual_map(pages)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_manual_map(pages)

@@ -1,0 +1,3 @@
+"""The extension switched on."""
+
+from tests.ui.conftest import extension  # noqa: F401 - a fixture

@@ -1,0 +1,137 @@
+"""Every text of the extension that a user sees, by the context in which Blender looks for its translation.
+
+Texts of classes and properties are read from what Blender has registered; those that code draws, reports or raises, from
+the code itself: what is marked with Blender's own functions, and the literals that Blender translates by itself.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import bpy
+from bpy.app.translations import contexts
+
+import addon
+from addon import ui
+from addon.animation import properties
+from addon.ui.on_targets import OnTargets
+from addon.ui.overlay.settings import RigidMotionOverlay
+from addon.ui.shown import ShownTransform
+from addon.ui.wording import DESCRIPTIONS, NARROW, spoken_of
+
+PACKAGE = Path(addon.__file__).parent
+FLOORS = ("animation", "ui")
+"""The packages that have texts. The core names its modes, which are enum items above, and its errors are for Python."""
+
+Message = tuple[str, str]
+"""Context and text, as in a dictionary of translations."""
+
+DEFAULT, OF_OPERATORS = contexts.default, contexts.operator_default
+
+MARKS = ("n_", "rpt_", "iface_", "tip_")
+"""Blender's functions for texts that it cannot translate by itself, as this program imports them."""
+
+DRAWN = {
+    "label": ("text", DEFAULT),
+    "prop": ("text", DEFAULT),
+    "menu": ("text", DEFAULT),
+    "operator": ("text", OF_OPERATORS),
+    "operator_menu_enum": ("text", OF_OPERATORS),
+    "invoke_props_dialog": ("confirm_text", DEFAULT),
+}
+"""Functions that translate a literal they are given: under which name, and its context."""
+
+CLASSES = (*ui.CLASSES, *properties.CLASSES, RigidMotionOverlay, ShownTransform)
+
+
+def messages() -> set[Message]:
+    """All of them. The extension has to be registered."""
+    found = {message for path in sources() for message in marked_or_drawn(parsed(path))}
+    for cls in CLASSES:
+        found |= set(of_class(cls))
+        found |= set(of_properties(cls))
+    found |= {(DEFAULT, spoken_of(text, "bones")) for text in DESCRIPTIONS.values()}
+    return {(context, text) for context, text in found if text}
+
+
+def sources() -> list[Path]:
+    """The files that may have texts in them."""
+    return [path for floor in FLOORS for path in sorted((PACKAGE / floor).rglob("*.py"))]
+
+
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def of_class(cls: type) -> Iterator[Message]:
+    """Label and description; those of operators on objects also as they are for bones."""
+    is_operator = issubclass(cls, bpy.types.Operator)
+    yield OF_OPERATORS if is_operator else DEFAULT, getattr(cls, "bl_label", "")
+    description = getattr(cls, "bl_description", "")
+    yield DEFAULT, description
+    if issubclass(cls, OnTargets):
+        yield DEFAULT, spoken_of(description, "bones")
+        for kind in ("objects", "bones", "objects and bones"):
+            yield DEFAULT, spoken_of(cls.nothing_to_do, kind)
+
+
+def of_properties(cls: type) -> Iterator[Message]:
+    """Names, descriptions and enum items of the properties that are not hidden."""
+    own = {name for base in cls.__mro__ for name in vars(base).get("__annotations__", {})} - {"bl_options"}
+    rna = operator_type(cls) if issubclass(cls, bpy.types.Operator) else cls.bl_rna
+    for prop in rna.properties:
+        if prop.identifier not in own or prop.is_hidden:
+            continue
+        if prop.name != prop.identifier:
+            yield prop.translation_context, prop.name
+        yield DEFAULT, prop.description
+        for item in prop.enum_items_static if prop.type == "ENUM" else ():
+            yield prop.translation_context, item.name
+            yield DEFAULT, item.description
+
+
+def operator_type(cls: type) -> bpy.types.Struct:
+    """What has the properties of an operator; the class itself has those that all operators have."""
+    module, name = cls.bl_idname.split(".")
+    return getattr(getattr(bpy.ops, module), name).get_rna_type()
+
+
+def marked_or_drawn(tree: ast.AST) -> Iterator[Message]:
+    """The literals that are marked, or given to what translates them."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        if name in MARKS and (text := literal(node.args[0])) is not None:
+            yield NARROW if len(node.args) > 1 else DEFAULT, text
+        elif name in DRAWN:
+            keyword, context = DRAWN[name]
+            for given in node.keywords:
+                if given.arg == keyword and (text := literal(given.value)) is not None:
+                    yield NARROW if any(other.arg == "text_ctxt" for other in node.keywords) else context, text
+        elif name == "report" and (text := literal(node.args[1])) is not None:
+            yield DEFAULT, text
+
+
+def literal(node: ast.AST) -> str | None:
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+def sentences(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Every literal with words in it, also as a part of an f-string, but for docstrings: line and text."""
+    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        text = literal(node)
+        if text is not None and id(node) not in docstrings and has_words(text):
+            yield node.lineno, text
+
+
+def has_words(text: str) -> bool:
+    """Whether a text is more than a name in code: words with spaces between or around them."""
+    return " " in text and any(character.isalpha() for character in text)
+
+
+def texts_of(found: Iterable[Message]) -> set[str]:
+    return {text for _, text in found}
