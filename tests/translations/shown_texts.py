@@ -1,7 +1,7 @@
 """Every text of the extension that a user sees, by the context in which Blender looks for its translation.
 
-Texts of classes and properties are read from what Blender has registered; those that code draws, reports or raises, from
-the code itself: what is marked with Blender's own functions, and the literals that Blender translates by itself.
+Texts of classes and properties are read from what Blender has registered; those that code draws, reports or raises,
+from the code itself: what is marked with Blender's own functions, and the literals that Blender translates by itself.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import contexts
 
-import addon
-from addon import ui
-from addon.animation import properties
-from addon.ui.on_targets import OnTargets
-from addon.ui.overlay.settings import RigidMotionOverlay
-from addon.ui.shown import ShownTransform
-from addon.ui.wording import DESCRIPTIONS, NARROW, spoken_of
+import rigid_motion
+from rigid_motion import ui
+from rigid_motion.animation import properties
+from rigid_motion.ui.on_targets import OnTargets
+from rigid_motion.ui.overlay.settings import RigidMotionOverlay
+from rigid_motion.ui.shown import ShownTransform
+from rigid_motion.ui.wording import DESCRIPTIONS, NARROW, spoken_of
 
-PACKAGE = Path(addon.__file__).parent
+PACKAGE = Path(rigid_motion.__file__).parent
 FLOORS = ("animation", "ui")
 """The packages that have texts. The core names its modes, which are enum items above, and its errors are for Python."""
 

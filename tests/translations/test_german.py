@@ -1,16 +1,14 @@
-"""German: every text that a user sees has a translation, every translation is of such a text, and both fit each other."""
+"""German: every text that a user sees has a translation, every translation is of such a text, and they fit."""
 
 from __future__ import annotations
 
 import ast
 import string
 
-import bpy
 import pytest
 
-import addon
-from addon.translations import LANGUAGES, OWNER
-from addon.translations.german import BY_CONTEXT
+from rigid_motion.translations import LANGUAGES
+from rigid_motion.translations.german import BY_CONTEXT, LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS
 from tests.translations.shown_texts import (
     MARKS,
     marked_or_drawn,
@@ -144,10 +142,7 @@ def test_a_translation_that_does_not_fit_is_found(english, german):
 
 def test_no_text_is_translated_twice():
     assert sum(len(texts) for texts in BY_CONTEXT.values()) == len(GERMAN)
-    default = BY_CONTEXT["*"]
-    from addon.translations.german import LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS
-
-    assert sum(map(len, (LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS))) == len(default)
+    assert sum(map(len, (LABELS, NOTES, REFUSALS, REPORTS, TOOLTIPS))) == len(BY_CONTEXT["*"])
 
 
 def test_what_the_texts_call_things_is_what_they_are_called():
@@ -157,13 +152,3 @@ def test_what_the_texts_call_things_is_what_they_are_called():
     for german in GERMAN.values():
         for quoted in (part.partition("“")[0] for part in german.split("„")[1:]):
             assert quoted in names | of_blender, quoted
-
-
-def test_blender_has_them_while_the_extension_is_on(empty_file):
-    """It refuses to register an owner twice, and to let go of one that it does not have."""
-    addon.register()
-    with pytest.raises(ValueError, match="already"):
-        bpy.app.translations.register(OWNER, {})
-    addon.unregister()
-    with pytest.raises(ValueError, match="not registered|no translations"):
-        bpy.app.translations.unregister(OWNER)
