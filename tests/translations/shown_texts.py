@@ -19,7 +19,7 @@ from rigid_motion.animation import properties
 from rigid_motion.ui.on_targets import OnTargets
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.shown import ShownTransform
-from rigid_motion.ui.wording import DESCRIPTIONS, NARROW, spoken_of
+from rigid_motion.ui.wording import DESCRIPTIONS, OWN_WORDS, spoken_of
 
 PACKAGE = Path(rigid_motion.__file__).parent
 FLOORS = ("animation", "ui")
@@ -105,12 +105,12 @@ def marked_or_drawn(tree: ast.AST) -> Iterator[Message]:
             continue
         name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
         if name in MARKS and (text := literal(node.args[0])) is not None:
-            yield NARROW if len(node.args) > 1 else DEFAULT, text
+            yield OWN_WORDS if len(node.args) > 1 else DEFAULT, text
         elif name in DRAWN:
             keyword, context = DRAWN[name]
             for given in node.keywords:
                 if given.arg == keyword and (text := literal(given.value)) is not None:
-                    yield NARROW if any(other.arg == "text_ctxt" for other in node.keywords) else context, text
+                    yield OWN_WORDS if any(other.arg == "text_ctxt" for other in node.keywords) else context, text
         elif name == "report" and (text := literal(node.args[1])) is not None:
             yield DEFAULT, text
 

@@ -24,6 +24,9 @@ from .baking.copies import BAKED, REDUCED
 from .inbetweens import live, mode_keys
 from .transforms import transform_of
 
+OWN_WORDS = "Rigid Motion"
+"""The context of words that Blender has another translation for, or one that is too long where they are shown."""
+
 FIRST = ("motor_spline", "dq_sclerp")
 """The modes that menus show first: those to take where nothing speaks for another."""
 
@@ -156,6 +159,7 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
     )
     own_quaternion: FloatVectorProperty(
         name="Delta Rotation",
+        translation_context=OWN_WORDS,
         description="The object's own delta rotation, to which the in-betweens are added",
         size=4,
         default=(1.0, 0.0, 0.0, 0.0),
@@ -166,6 +170,7 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
     )
     own_euler: FloatVectorProperty(
         name="Delta Rotation",
+        translation_context=OWN_WORDS,
         description="The object's own delta rotation, to which the in-betweens are added",
         subtype="EULER",
         options=set(),

@@ -20,7 +20,7 @@ from ..animation.baking.sizes import metres_per_unit
 from ..animation.inbetweens.live import paused
 from ..animation.inbetweens.mending import with_troubles
 from ..animation.inbetweens.polls import with_in_betweens, with_modes, with_more_keys_than
-from ..animation.properties import MODE_ITEMS
+from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.transforms import Transform
 from .on_targets import OnTargets
 from .preferences import DEFAULT_MODE, default_mode
@@ -86,6 +86,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         description="Which segments get the mode",
         items=SCOPES,
         default=WHOLE,
+        translation_context=OWN_WORDS,
         options={"SKIP_SAVE"},
     )
 
@@ -94,7 +95,7 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         if not properties.is_property_set("mode"):
             return super().description(context, properties)
         what = tip_(spoken_of(DESCRIPTIONS[properties.mode], "bones" if is_posing(context) else "objects"))
-        on = tip_("On: {segments}").format(segments=tip_(SCOPE_NAMES[properties.on]))
+        on = tip_("On: {segments}").format(segments=tip_(SCOPE_NAMES[properties.on], OWN_WORDS))
         return f"{what}.\n{on}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -177,6 +178,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
             ("SCENE", "Scene", "The frame range of the scene, or its preview range while that is in use"),
             ("CUSTOM", "Custom", "From one frame to another"),
         ],
+        translation_context=OWN_WORDS,
     )
     first: FloatProperty(name="Start", description="First frame to bake", default=1.0, step=100, precision=2)
     last: FloatProperty(name="End", description="Last frame to bake", default=250.0, step=100, precision=2)

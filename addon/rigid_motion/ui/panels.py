@@ -12,12 +12,13 @@ from bpy.app.translations import pgettext_iface as iface_
 from .. import animation
 from ..animation.inbetweens.describing import SegmentFacts, parts_with_in_betweens
 from ..animation.inbetweens.polls import with_in_betweens
+from ..animation.properties import OWN_WORDS
 from ..animation.transforms import ORIGINALS, SCALE, BoneTransform, ObjectTransform, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
-from .wording import LABELS, NARROW, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length, reduction_rows
+from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length, reduction_rows
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
@@ -42,9 +43,9 @@ class _Main:
         segment, notes = facts_and_notes(target, context.scene.frame_current_final)
         if is_key_editor(context):
             _draw_mode_menu(
-                labelled(layout, iface_("Selected", NARROW)), SELECTED, modes_meant(context, target, SELECTED)
+                labelled(layout, iface_("Selected", OWN_WORDS)), SELECTED, modes_meant(context, target, SELECTED)
             )
-        label = iface_("Bone", NARROW) if isinstance(target, BoneTransform) else iface_("Object", NARROW)
+        label = iface_("Bone", OWN_WORDS) if isinstance(target, BoneTransform) else iface_("Object", OWN_WORDS)
         mode_path, _ = target.mode_channel
         if any(fcurve.data_path == mode_path for fcurve in fcurves_of(target.animated)):
             _draw_mode_menu(labelled(layout, label), WHOLE, modes_meant(context, target, WHOLE))
@@ -129,12 +130,12 @@ class _Delta:
 
 
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
-    _draw_mode_menu(labelled(layout, iface_("Segment", NARROW)), CURRENT, {segment.mode})
+    _draw_mode_menu(labelled(layout, iface_("Segment", OWN_WORDS)), CURRENT, {segment.mode})
     column = layout.column(align=True)
     for label, text in (
-        (iface_("Frames", NARROW), f"{segment.first:g} \N{EN DASH} {segment.last:g}"),
-        (iface_("Turn", NARROW), degrees(segment.turn)),
-        (iface_("Distance", NARROW), length(context.scene, segment.distance)),
+        (iface_("Frames", OWN_WORDS), f"{segment.first:g} \N{EN DASH} {segment.last:g}"),
+        (iface_("Turn", OWN_WORDS), degrees(segment.turn)),
+        (iface_("Distance", OWN_WORDS), length(context.scene, segment.distance)),
     ):
         labelled(column, label).label(text=text, translate=False)
 
@@ -148,8 +149,8 @@ def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> 
 
 def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transform) -> None:
     row = layout.row(align=True)
-    row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=NARROW)
-    row.operator("rigid_motion.restore_keys", text="Restore Keys", text_ctxt=NARROW)
+    row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=OWN_WORDS)
+    row.operator("rigid_motion.restore_keys", text="Restore Keys", text_ctxt=OWN_WORDS)
     reduction = animation.reduction_of(target)
     if reduction is not None:
         row.operator("rigid_motion.discard_dense_keys", text="", icon="TRASH")

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 
 from .. import animation
-from ..animation.properties import MODE_ITEMS
+from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from . import keymap, manual
 from .look import DEFAULT_LOOK
 
@@ -42,7 +42,14 @@ def _on_live_update(chosen: RigidMotionPreferences, _context: bpy.types.Context)
 
 def _color(name: str, description: str, default: tuple[float, float, float, float]) -> object:
     return FloatVectorProperty(
-        name=name, description=description, size=4, subtype="COLOR_GAMMA", default=default, min=0.0, max=1.0
+        name=name,
+        description=description,
+        size=4,
+        subtype="COLOR_GAMMA",
+        default=default,
+        min=0.0,
+        max=1.0,
+        translation_context=OWN_WORDS,
     )
 
 
@@ -83,6 +90,8 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
+        manual.draw(layout)
+        layout.separator()
         layout.prop(self, "default_mode")
         layout.prop(self, "live_update")
 
@@ -93,9 +102,6 @@ class RigidMotionPreferences(bpy.types.AddonPreferences):
 
         layout.label(text="Pie Menu")
         keymap.draw(context, layout)
-
-        layout.separator()
-        manual.draw(layout)
 
 
 CLASSES = (RigidMotionPreferences,)

@@ -14,11 +14,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..animation import Reduction, WholeRig
 from ..animation.inbetweens.describing import SegmentFacts
 from ..animation.inbetweens.outlets.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
-from ..animation.properties import MODE_ITEMS
+from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.transforms import BoneTransform, Transform
-
-NARROW = "Rigid Motion"
-"""The context in which short words are translated, where there is no room for those that Blender has for them."""
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
@@ -118,16 +115,16 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
     """What became of keys, and of the rig where it is one, as labels and what belongs to them."""
     rows = [
-        (iface_("Keys", NARROW), f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
+        (iface_("Keys", OWN_WORDS), f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"),
         (
-            iface_("Off By", NARROW),
+            iface_("Off By", OWN_WORDS),
             iface_("{error} at most").format(error=length(scene, reduction.largest_error, precision=3)),
         ),
     ]
     if reduction.rig is not None:
-        rows.insert(1, (iface_("Frames", NARROW), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
+        rows.insert(1, (iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
         if (feet := _slides(scene, reduction.rig)) is not None:
-            rows.append((iface_("Feet", NARROW), iface_("slide {distance}").format(distance=feet)))
+            rows.append((iface_("Feet", OWN_WORDS), iface_("slide {distance}").format(distance=feet)))
     return rows
 
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from bpy.app.translations import contexts
 
-from ...ui.wording import NARROW
-from .labels import LABELS, OF_OPERATORS, SHORT
+from ...animation.properties import OWN_WORDS
+from .labels import LABELS, OF_OPERATORS, OF_OWN_CONTEXT
 from .notes import NOTES
 from .refusals import REFUSALS
 from .reports import REPORTS
@@ -22,7 +22,7 @@ from .tooltips import TOOLTIPS
 BY_CONTEXT = {
     contexts.default: LABELS | TOOLTIPS | NOTES | REFUSALS | REPORTS,
     contexts.operator_default: OF_OPERATORS,
-    NARROW: SHORT,
+    OWN_WORDS: OF_OWN_CONTEXT,
 }
 
 TEXTS = {(context, english): german for context, texts in BY_CONTEXT.items() for english, german in texts.items()}

@@ -3,12 +3,12 @@
 LABELS = {
     # Modes
     "Blender": "Blender",
-    "Smooth Screw (PGA)": "Weiche Schraubung (PGA)",
-    "Screw (Dual Quaternion)": "Schraubung (Dualquaternion)",
+    "Smooth Screw (PGA)": "Weiche Schraube (PGA)",
+    "Screw (Dual Quaternion)": "Schraube (Dualquat.)",
     "Vector + Quaternion": "Vektor + Quaternion",
-    "Motor Blend (PGA)": "Motor-Überblendung (PGA)",
-    "Motor Screw (PGA)": "Motor-Schraubung (PGA)",
-    "Versor Blend (CGA)": "Versor-Überblendung (CGA)",
+    "Motor Blend (PGA)": "Motor-Mischung (PGA)",
+    "Motor Screw (PGA)": "Motor-Schraube (PGA)",
+    "Versor Blend (CGA)": "Versor-Mischung (CGA)",
     "Versor Spiral (CGA)": "Versor-Spirale (CGA)",
     "As Keyed": "Wie gesetzt",
     "Mixed": "Gemischt",
@@ -19,8 +19,6 @@ LABELS = {
     "Rigid Motion of Bones": "Rigid Motion der Knochen",
     "Rigid Motion of Keys": "Rigid Motion der Schlüsselbilder",
     "Current Segment": "Aktuelles Segment",
-    "All Segments": "Alle Segmente",
-    "Selected Keys": "Ausgewählte Schlüsselbilder",
     "Whole Object": "Ganzes Objekt",
     "Whole Bone": "Ganzer Knochen",
     "Transform on Screen": "Sichtbare Transformation",
@@ -31,12 +29,9 @@ LABELS = {
     "Bake": "Backen",
     # Properties
     "Mode": "Modus",
-    "Segments": "Segmente",
     "Default Mode": "Standardmodus",
     "Live Update": "Live-Aktualisierung",
     "Blender's Path": "Blenders Pfad",
-    "Mode's Path": "Pfad des Modus",
-    "Ticks": "Zeitmarken",
     "Line Width": "Linienbreite",
     "Rigid Motion Paths": "Rigid-Motion-Pfade",
     "Show": "Anzeigen",
@@ -44,10 +39,6 @@ LABELS = {
     "Size": "Größe",
     "Frame Step": "Einzelbildschritt",
     "Step": "Schritt",
-    "Frames": "Einzelbilder",
-    "Action": "Aktion",
-    "Scene": "Szene",
-    "Custom": "Benutzerdefiniert",
     "Start": "Start",
     "End": "Ende",
     "Tolerance": "Toleranz",
@@ -62,7 +53,6 @@ LABELS = {
     "Rotation Quaternion": "Rotation (Quaternion)",
     "Rotation Euler": "Rotation (Euler)",
     "Delta Location": "Delta-Position",
-    "Delta Rotation": "Delta-Rotation",
     "Delta Rotation Quaternion": "Delta-Rotation (Quaternion)",
     "Delta Rotation Euler": "Delta-Rotation (Euler)",
     "Delta Scale": "Delta-Skalierung",
@@ -73,13 +63,13 @@ LABELS = {
     "Rotation X": "Rotation X",
     "Rotation Y": "Rotation Y",
     "Rotation Z": "Rotation Z",
-    "Scale X": "Skalierung X",
-    "Scale Y": "Skalierung Y",
-    "Scale Z": "Skalierung Z",
+    "Scale X": "X-Skalierung",
+    "Scale Y": "Y-Skalierung",
+    "Scale Z": "Z-Skalierung",
 }
 
 OF_OPERATORS = {
-    "Set Rigid Motion Mode": "Rigid-Motion-Modus setzen",
+    "Set Rigid Motion Mode": "Rigid-Motion-Modus",
     "Clear Modes": "Modi entfernen",
     "Bake to Keys": "Auf Schlüsselbilder backen",
     "Bake to Keys...": "Auf Schlüsselbilder backen...",
@@ -95,8 +85,22 @@ OF_OPERATORS = {
     "Website": "Website",
 }
 
-SHORT = {
-    # One word each: the panel has a quarter of its width for them.
+OF_OWN_CONTEXT = {
+    # Blender has another word for them, which is not the one that is meant
+    "Selected Keys": "Ausgewählte Schlüsselbilder",
+    "Delta Rotation": "Delta-Rotation",
+    # Beside these
+    "Segments": "Segmente",
+    "All Segments": "Alle Segmente",
+    "Current Segment": "Aktuelles Segment",
+    "Blender's Path": "Blenders Pfad",
+    "Mode's Path": "Pfad des Modus",
+    "Ticks": "Zeitmarken",
+    # One of three buttons in a row
+    "Action": "Aktion",
+    "Scene": "Szene",
+    "Custom": "Eigene",
+    # One word each: the panel has a quarter of its width for them
     "Object": "Objekt",
     "Bone": "Knochen",
     "Selected": "Auswahl",

@@ -1,7 +1,7 @@
 """What the panel notes on a segment, and how it sums up."""
 
 NOTES = {
-    "No Bone Active": "Kein aktiver Knochen",
+    "No Bone Active": "Kein Knochen aktiv",
     "No keys of location, rotation or scale yet": ("Noch keine Schlüsselbilder von Position, Rotation oder Skalierung"),
     "No segment on this frame": "Kein Segment auf diesem Einzelbild",
     "Moved by strips: enter one to see its segments (NLA Editor, Tab)": (

@@ -13,22 +13,22 @@ TOOLTIPS = {
         "Dreht sich um eine feste Achse im Raum und gleitet an ihr entlang, beides gleichmäßig"
     ),
     "Nearly the screw motion, slower at the keys and faster half-way": (
-        "Fast die Schraubung, langsamer an den Schlüsselbildern und schneller auf halbem Weg"
+        "Fast die Schraubenbewegung, langsamer an den Schlüsselbildern und schneller auf halbem Weg"
     ),
     "The screw motion, by the exponential of the motor's logarithm": (
-        "Die Schraubung, berechnet über den Logarithmus des Motors"
+        "Die Schraubenbewegung, berechnet über den Logarithmus des Motors"
     ),
     "The motor blend, with uniform scale blended along with it": (
-        "Die Motor-Überblendung, die gleichmäßige Skalierung mit überblendet"
+        "Die Motor-Mischung, bei der sich gleichmäßige Skalierung mitmischt"
     ),
     "Turns, slides and grows at even rates: a screw that widens as the object grows": (
-        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraubung, die weiter wird, wenn das Objekt wächst"
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn das Objekt wächst"
     ),
     "Turns, slides and grows at even rates: a screw that widens as the bone grows": (
-        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraubung, die weiter wird, wenn der Knochen wächst"
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn der Knochen wächst"
     ),
     "Screws that flow into one another: no corner at a key, neither in the path nor in the turning": (
-        "Schraubungen, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung"
+        "Schrauben, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung"
     ),
     # Choosing modes
     "Choose how the selected objects move from key to key": (
@@ -213,7 +213,7 @@ TOOLTIPS = {
     ),
     # Preferences
     "What Set Rigid Motion Mode takes where no mode is named: in Search, by a shortcut of your own": (
-        "Was „Rigid-Motion-Modus setzen“ nimmt, wo kein Modus genannt ist: in der Suche, mit eigenem Tastenkürzel"
+        "Was „Rigid-Motion-Modus“ nimmt, wo kein Modus genannt ist: in der Suche, mit eigenem Tastenkürzel"
     ),
     "Follow every edit at once. Otherwise in-betweens stay as they are until Refresh In-Betweens": (
         "Jeder Bearbeitung sofort folgen. Sonst bleiben Zwischenbilder, wie sie sind, "

@@ -7,9 +7,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ...animation.properties import MODE_ITEMS
+from ...animation.properties import MODE_ITEMS, OWN_WORDS
 from ..rows import draw_text, labelled
-from ..wording import NARROW
 
 MODE_CHOICES = [("CHOSEN", "As Keyed", "The mode that each segment has", 0), *MODE_ITEMS[1:]]
 
@@ -67,8 +66,8 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
         draw_text(context, layout, HIDDEN, "INFO")
     column = layout.column()
     column.active = settings.show_paths
-    labelled(column, iface_("Mode", NARROW)).prop(settings, "mode", text="")
-    labelled(column, iface_("Step", NARROW)).prop(settings, "tick_step", text="")
+    labelled(column, iface_("Mode", OWN_WORDS)).prop(settings, "mode", text="")
+    labelled(column, iface_("Step", OWN_WORDS)).prop(settings, "tick_step", text="")
     labelled(column).prop(settings, "show_native")
     axes = labelled(column)
     axes.prop(settings, "show_axes")

@@ -1,0 +1,127 @@
+"""The extension in a Blender that speaks German: a report, the panel, tooltips, menus, the pie and the preferences.
+
+Blender's module for Python knows no languages, so this is where the dictionary meets the real interface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+
+import bpy
+from bpy.app.translations import pgettext_iface, pgettext_rpt
+
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+from tests.gui.scenarios.panel_notes import SCREW, cube, extension, key, preferences
+
+NOTHING_REDUCED = "The keys of these objects are not reduced"
+
+
+def speak(language: str) -> None:
+    view = bpy.context.preferences.view
+    view.language = language
+    view.use_translate_interface = view.use_translate_reports = view.use_translate_tooltips = True
+
+
+@contextmanager
+def panel_texts() -> Iterator[list[str]]:
+    """The notes of the panel as they are broken into lines, in the language that they are drawn in."""
+    rows = import_module(f"{extension().module}.ui.rows")
+    wrapped, seen = rows.wrapped, []
+
+    def noted(text, fits):
+        seen.append(text)
+        return wrapped(text, fits)
+
+    rows.wrapped = noted
+    try:
+        yield seen
+    finally:
+        rows.wrapped = wrapped
+
+
+def refusal() -> str:
+    """What Blender reports where the cube is refused."""
+    try:
+        bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    except RuntimeError as error:
+        return str(error)
+    raise AssertionError("the cube was not refused")
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    """An animator works in German; then in English again; then without the extension."""
+    speak("de_DE")
+    view = hand.area("VIEW_3D")
+    yield from reported()
+    yield from in_the_panel(hand, view)
+    yield from in_menus(hand, view)
+    yield from preferences(hand)
+    yield from other_languages()
+
+
+def reported() -> Steps[None]:
+    """In reports, and in the texts that operators put together."""
+    cube().rotation_mode = "AXIS_ANGLE"
+    assert "Cube dreht sich nach Achse und Winkel" in refusal(), refusal()
+    key({1: 0, 20: 90, 40: 100})
+    curve = cube().animation_data.action.layers[0].strips[0].channelbags[0].fcurves.find("location", index=1)
+    curve.modifiers.new("FNGENERATOR")
+    assert "Position Y hat einen Modifikator vom Typ Eingebaute Funktion" in refusal(), refusal()
+    operators = import_module(f"{extension().module}.ui.operators")
+    tooltip = operators.RIGID_MOTION_OT_unbake.description(bpy.context, None)
+    assert tooltip.startswith("Gebackenen Objekten die Aktionen zurückgeben"), tooltip
+    yield
+
+
+def in_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """Where words are short of room, and where notes are long."""
+    yield from hand.open_sidebar(view, "Animation")
+    sidebar = places.region(view, "UI")
+    with panel_texts() as texts:
+        key({1: 0, 20: 90, 40: 269})
+        bpy.ops.rigid_motion.set_mode(mode=SCREW)
+        bpy.context.scene.frame_set(10)
+        bpy.context.scene.rigid_motion_overlay.show_paths = True
+        yield from hand.picture("panel", places.box(sidebar))
+        assert texts == [], texts
+        bpy.context.scene.frame_set(30)
+        yield from hand.picture("panel-with-a-note", places.box(sidebar))
+        assert any(text.startswith("179.0° sind fast eine halbe Umdrehung") for text in texts), texts
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    bpy.ops.rigid_motion.reduce_keys("EXEC_DEFAULT", tolerance=10.0)
+    yield from hand.picture("panel-reduced", places.box(sidebar))
+    bpy.ops.rigid_motion.restore_keys()
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    yield from hand.click((yield from hand.find_button(view, "UI", "rigid_motion.bake")))
+    yield from hand.picture("bake")
+    yield from hand.press("ESC")
+
+
+def in_menus(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """The pie, and the menu that is behind a right click."""
+    centre = places.centre(places.region(view))
+    yield from hand.hover(centre)
+    yield from hand.pie("T", "N", picture="pie", box=places.box_around(centre, 900, 420), alt=True)
+    yield from hand.click(centre, button="RIGHTMOUSE")
+    yield from hand.press("UP_ARROW")
+    yield from hand.press("RIGHT_ARROW")
+    yield from hand.picture("menu")
+    yield from hand.press("ESC")
+    yield from hand.press("ESC")
+
+
+def other_languages() -> Steps[None]:
+    """English texts where the language is English, another's where it has none of its own, or the extension is off."""
+    assert pgettext_rpt(NOTHING_REDUCED).startswith("Die Schlüsselbilder")
+    assert pgettext_iface("Live Update") == "Live-Aktualisierung"
+    for language in ("en_US", "fr_FR"):
+        speak(language)
+        yield
+        assert pgettext_rpt(NOTHING_REDUCED) == NOTHING_REDUCED
+    speak("de_DE")
+    bpy.ops.preferences.addon_disable(module=extension().module)
+    yield
+    assert pgettext_rpt(NOTHING_REDUCED) == NOTHING_REDUCED, "an extension that is off translates nothing"

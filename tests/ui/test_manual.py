@@ -1,0 +1,103 @@
+"""F1 over what the extension has, and the buttons in its preferences: the right page of the documentation."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from bl_operators.wm import WM_OT_doc_view_manual, _wm_doc_get_id
+
+from rigid_motion.animation.properties import BoneMotion, ObjectMotion
+from rigid_motion.ui import manual, operators
+from rigid_motion.ui.overlay.settings import RigidMotionOverlay
+from rigid_motion.ui.preferences import RigidMotionPreferences
+from rigid_motion.ui.shown import ShownTransform
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def page(doc_id: str) -> str | None:
+    """What Blender opens for the identity that it gives a button, for instance "RIGID_MOTION_OT_bake.step"."""
+    return WM_OT_doc_view_manual._lookup_rna_url(_wm_doc_get_id(doc_id, do_url=False), verbose=False)
+
+
+def anchors(text: str) -> set[str]:
+    """What headings of a page can be reached by."""
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("cls", operators.CLASSES, ids=lambda cls: cls.__name__)
+def test_every_operator_has_a_page(cls, extension):
+    assert page(cls.bl_idname).startswith(manual.DOCS)
+
+
+@pytest.mark.parametrize(
+    "cls",
+    [ObjectMotion, BoneMotion, RigidMotionOverlay, RigidMotionPreferences, ShownTransform],
+    ids=lambda cls: cls.__name__,
+)
+def test_every_property_that_is_drawn_has_a_page(cls, extension):
+    own = {name for base in cls.__mro__ for name in vars(base).get("__annotations__", {})}
+    shown = [prop.identifier for prop in cls.bl_rna.properties if prop.identifier in own and not prop.is_hidden]
+    assert shown
+    for name in shown:
+        assert page(f"{cls.__name__}.{name}").startswith(manual.DOCS), name
+
+
+def test_the_page_is_the_one_on_what_was_pointed_at(extension):
+    assert page("rigid_motion.set_mode").endswith("animators.md#which-mode-is-good-for-what")
+    assert page("RIGID_MOTION_OT_reduce_keys.tolerance").endswith("reduction.md")
+    assert page("BoneMotion.mode").endswith("animators.md#rigs")
+
+
+def test_blenders_own_pages_stay_its_own(extension):
+    assert page("Object.location").startswith("https://docs.blender.org/")
+
+
+def test_without_the_extension_there_are_none(extension):
+    hooks = [prefix for prefix, _ in bpy.utils.manual_map()]
+    assert hooks.count(manual.DOCS) == 1
+    manual.unregister()
+    assert manual.DOCS not in [prefix for prefix, _ in bpy.utils.manual_map()]
+    manual.register()
+
+
+@pytest.mark.parametrize("target", sorted({page for _, page in manual.PAGES} | {manual.ANIMATORS}))
+def test_every_page_is_in_the_checkout_and_has_the_heading(target):
+    name, _, anchor = target.partition("#")
+    text = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    assert not anchor or anchor in anchors(text)
+
+
+def test_the_address_is_that_of_the_manifest():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert manifest["website"] == manual.WEBSITE
+    assert manual.DOCS.startswith(manual.WEBSITE)
+
+
+class Layout:
+    """Notes what buttons are for."""
+
+    def __init__(self) -> None:
+        self.buttons: list[tuple[str, SimpleNamespace]] = []
+
+    def row(self) -> Layout:
+        return self
+
+    def operator(self, name: str, text: str, icon: str) -> SimpleNamespace:
+        self.buttons.append((name, SimpleNamespace(url="")))
+        return self.buttons[-1][1]
+
+
+def test_the_buttons_open_the_documentation_and_the_website():
+    layout = Layout()
+    manual.draw(layout)
+    assert [(name, properties.url) for name, properties in layout.buttons] == [
+        ("wm.url_open", f"{manual.DOCS}animators.md"),
+        ("wm.url_open", manual.WEBSITE),
+    ]
