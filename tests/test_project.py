@@ -25,6 +25,7 @@ FLOORS = {
     "motion": {"numpy"},
     "animation": {"numpy", *BLENDER},
     "ui": {"numpy", *BLENDER, "addon_utils", "blf", "gpu", "gpu_extras", "rna_keymap_ui"},
+    "translations": BLENDER,
 }
 """What each floor of the extension may import beside the standard library and the floors below."""
 

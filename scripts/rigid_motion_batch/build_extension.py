@@ -81,9 +81,12 @@ def _stage(folder: Path) -> None:
 
 
 def _blender_ext(*arguments: str) -> None:
-    """Run Blender's own command for extensions."""
-    tool = Path(bpy.utils.system_resource("SCRIPTS")) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
-    done = subprocess.run([sys.executable, str(tool), *arguments], capture_output=True, text=True)
+    """Run Blender's own command for extensions, with the tags that Blender knows, as if Blender ran it."""
+    scripts = Path(bpy.utils.system_resource("SCRIPTS"))
+    tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+    tags = scripts / "modules" / "_bpy_internal" / "extensions" / "tags.py"
+    command = [sys.executable, str(tool), *arguments, f"--valid-tags={tags}"]
+    done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         raise BuildError(f"Blender {bpy.app.version_string} refuses the extension:\n{done.stdout}{done.stderr}".strip())
 

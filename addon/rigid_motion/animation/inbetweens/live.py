@@ -473,5 +473,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    if bpy.app.timers.is_registered(_look_through):
+        bpy.app.timers.unregister(_look_through)
     for name, handler in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(handler)
