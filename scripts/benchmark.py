@@ -44,6 +44,7 @@ from addon.motion import MODES, Poses, interpolate, reduce_keys, shell_error, tw
 from addon.motion.quaternions import align_signs, multiply
 from addon.motion.trigonometry import VECTOR_TANGENT
 from scripts.publishing import opening, publish
+from scripts.summaries import of_speed
 
 ENOUGH = 4.0
 """Seconds after which one way of computing a case has been measured well enough."""
@@ -338,7 +339,7 @@ def main(arguments: list[str] | None = None) -> int:
         lines += report(case, race(ways(case), options.rounds))
     print("key reduction ...", file=sys.stderr, flush=True)
     lines += reductions((900, 1000, 10_000, options.count))
-    publish(lines, options.output)
+    publish(lines, options.output, of_speed)
     return 0
 
 

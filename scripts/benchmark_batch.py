@@ -31,7 +31,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from scripts.publishing import opening, publish
+from scripts.publishing import more_or_less, opening, publish
+from scripts.summaries import of_batch
 from scripts.workplan.worker import peak_memory_of
 
 SECONDS = 2.0
@@ -173,7 +174,7 @@ def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> Itera
         say(f"memory over {count} clips ...")
         run = compare(clips[:count], folder, 2, *options)
         base = base or run.own
-        yield f"| {count} | {run.own / 1e6:.0f} | {run.own / base - 1.0:+.1%} |"
+        yield f"| {count} | {run.own / 1e6:.0f} | {more_or_less(run.own / base) if base else ''} |"
     yield ""
     yield "| one clip of | samples | a worker at most, MB | more than for a clip of no length, a sample | seconds |"
     yield "|---:|---:|---:|---:|---:|"
@@ -220,7 +221,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         lines += workers(f"{options.films} clips with video", clips[: options.films], folder, options.rounds, *small)
         lines += memory(folder, clips[: options.clips], [int(part) for part in options.minutes.split(",")])
-    publish(lines, options.output)
+    publish(lines, options.output, of_batch)
     return 0
 
 

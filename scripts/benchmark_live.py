@@ -29,6 +29,7 @@ from scripts.live_benchmark.rigs import RigSize, rigs
 from scripts.live_benchmark.scenes import Size
 from scripts.live_benchmark.shots import choosing, shots
 from scripts.publishing import opening, publish
+from scripts.summaries import of_live
 
 CHOOSING = Size(400, 10, 1000)
 """A mode is chosen for all of these."""
@@ -86,7 +87,7 @@ def main(arguments: list[str] | None = None) -> int:
             lines += run[section]()
     finally:
         animation.unregister()
-    publish(lines, options.output)
+    publish(lines, options.output, of_live)
     return 0
 
 

@@ -33,6 +33,7 @@ from addon.motion import Poses, interpolate, repair, shell_error
 from addon.motion.measures import rms
 from scripts.graph_decimate import decimate
 from scripts.publishing import opening, publish
+from scripts.summaries import of_reduction
 from scripts.trajectories import TrajectoryError, read_trajectories
 from scripts.trajectories.reading import FORMATS
 from scripts.whole_bodies import rigs
@@ -228,7 +229,7 @@ def main(arguments: list[str] | None = None) -> int:
             lines += section(bodies, [(one.name, options.fps, one.poses) for one in recordings])
     finally:
         animation.unregister()
-    publish(lines, options.output)
+    publish(lines, options.output, of_reduction)
     return 0
 
 

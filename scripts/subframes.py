@@ -33,6 +33,7 @@ from addon.motion.eulers import extrinsic_eulers_from_quaternions
 from addon.motion.measures import rms
 from addon.motion.quaternions import align_signs, angle_between, multiply
 from scripts.publishing import opening, publish
+from scripts.summaries import of_sub_frames
 
 SEGMENTS = 24
 
@@ -169,7 +170,7 @@ def main(arguments: list[str] | None = None) -> int:
             lines += table(motion, options.radius)
     finally:
         animation.unregister()
-    publish(lines, options.output)
+    publish(lines, options.output, of_sub_frames)
     return 0
 
 

@@ -13,6 +13,7 @@ from addon.motion import MODES
 from scripts.comparison.report.findings import listed
 from scripts.comparison.study.modes import REFERENCE
 from scripts.streaming.packets import HEADER
+from scripts.summaries import of_paper, with_summary
 
 from . import bodies_section, claims, sending_section, strips, triangle
 from .bandwidths import Bandwidth
@@ -77,7 +78,8 @@ def write_page(found: Results) -> str:
         _bandwidth(found),
         _files(found),
     ]
-    return "\n".join(line for section in sections if section for line in [*section, ""]).rstrip() + "\n"
+    page = "\n".join(line for section in sections if section for line in [*section, ""]).rstrip() + "\n"
+    return with_summary(page, of_paper(page))
 
 
 def with_section(page: str, section: str) -> str:
@@ -91,7 +93,8 @@ def with_section(page: str, section: str) -> str:
         places = [place for name in AFTER[heading] if (place := before.find(f"\n{name}\n")) >= 0]
         place = min(places, default=len(before))
         before, rest = before[:place], before[place:]
-    return "\n\n".join(part.strip("\n") for part in (before, section, rest) if part.strip("\n")) + "\n"
+    whole = "\n\n".join(part.strip("\n") for part in (before, section, rest) if part.strip("\n")) + "\n"
+    return with_summary(whole, of_paper(whole))
 
 
 # -- sections ----------------------------------------------------------------------------------------------------------
@@ -267,11 +270,12 @@ def _table(found: Results) -> list[str]:
     lines = [
         "## Table 1",
         "",
-        "The lowest rate at which a mode is as good as the state of the art at its rate, and the bandwidth saved. As "
-        "good means no larger an error, by three yardsticks set beforehand. Geometric means over clips, of which one "
-        f"counts where it has two samples to an update: {_clips_counted(found)}. The first row after the paper's is a "
-        f"check: the state of the art held against itself, which needs what it has but for {_check(found):.0%} at "
-        "most. Rates that were as good on some clips only say on how many. A dash: on none.",
+        "The lowest rate at which a mode is as good as the state of the art at its rate, and the bandwidth saved, or "
+        "how much more it takes. As good means no larger an error, by three yardsticks set beforehand. Geometric "
+        "means over clips, of which one counts where it has two samples to an update: "
+        f"{_clips_counted(found)}. The first row after the paper's is a check: the state of the art held against "
+        f"itself, which needs what it has but for {_check(found):.0%} at most. Rates that were as good on some clips "
+        "only say on how many. A dash: on none.",
         "",
     ]
     for one in found.sets:
