@@ -26,16 +26,16 @@ from unittest import mock
 import numpy as np
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
-from addon.motion import curves, decimate
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.metrics import geometric_mean
-from scripts.comparison.study.modes import BEST_OF, REFERENCE
-from scripts.comparison.study.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
-from scripts.files import write_text
-from scripts.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
-from scripts.paper.table import RADIUS, SAMPLES_AN_UPDATE
+from rigid_motion.motion import curves, decimate
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.metrics import geometric_mean
+from rigid_motion_batch.comparison.study.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.comparison.study.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
+from rigid_motion_batch.files import write_text
+from rigid_motion_batch.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
+from rigid_motion_batch.paper.table import RADIUS, SAMPLES_AN_UPDATE
 
 OUTPUT = DOCS / "figures" / "recordings.json"
 

@@ -5,7 +5,7 @@
 
 A quote is what stands between <!-- quote NAME --> and <!-- end -->; `QUOTES` says what belongs there. Figures come
 from pages that a script has written (paper.md, subframes.md, benchmark_batch.md) and from docs/figures/recordings.json,
-which docs/measure_recordings.py writes. Pages of figures get their summaries as well, see scripts/summaries.py.
+which docs/measure_recordings.py writes. Pages of figures get their summaries as well, see rigid_motion_batch/summaries.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
-from scripts.comparison.report.findings import listed
-from scripts.files import write_text
-from scripts.markdown_tables import numbers, tables, tables_of, titled
-from scripts.summaries import SUMMARIES, with_summary
-from scripts.summaries.paper import TABLE_1, percent_saved
+from rigid_motion_batch.comparison.report.findings import listed
+from rigid_motion_batch.files import write_text
+from rigid_motion_batch.markdown_tables import numbers, tables, tables_of, titled
+from rigid_motion_batch.summaries import SUMMARIES, with_summary
+from rigid_motion_batch.summaries.paper import TABLE_1, percent_saved
 
 QUOTE = re.compile(r"(<!-- quote ([a-z0-9-]+) -->)(.*?)(<!-- end -->)", re.DOTALL)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from docs import quote_figures
-from scripts.summaries import SUMMARIES, with_summary
+from rigid_motion_batch.summaries import SUMMARIES, with_summary
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
