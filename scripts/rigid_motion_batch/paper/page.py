@@ -15,12 +15,12 @@ from rigid_motion_batch.comparison.study.modes import REFERENCE
 from rigid_motion_batch.streaming.packets import HEADER
 from rigid_motion_batch.summaries import of_paper, with_summary
 
-from . import bodies_section, claims, sending_section, strips, triangle
+from . import bodies_section, claims, sending_section, shell, strips, triangle
 from .bandwidths import Bandwidth
-from .bows import SCREW
+from .bows import FORMULA, SCREW
 from .catching import LINK
 from .results import Results
-from .table import ADAPTIVE, UNIFORM, YARDSTICKS
+from .table import ADAPTIVE, RADIUS, UNIFORM, YARDSTICKS
 from .timing import ALGEBRA, AS_GOOD, CONFIDENCE, EQUAL, FAST, FRAMES_PER_S, PAPER, SINGLE, USERS, Timing
 from .wording import (
     changed,
@@ -63,6 +63,7 @@ def write_page(found: Results) -> str:
     """The whole page."""
     sections = [
         _opening(found),
+        _shell_error(found),
         _in_short(found),
         _triangle(found),
         _strips(found),
@@ -122,6 +123,20 @@ def _opening(found: Results) -> list[str]:
     if found.run:
         lines += ["", ", ".join(f"{name} {value}" for name, value in found.run.items()) + "."]
     return lines
+
+
+def _shell_error(found: Results) -> list[str]:
+    if not found.needed:
+        return []
+    picture = ["", f"![{shell.TITLE}](paper/shell_error.svg)"] if "paper/shell_error.svg" in found.pictures else []
+    return [
+        "## The shell error",
+        "",
+        f"The farthest that any point within {1e3 * RADIUS:.0f} mm of a body's origin is from where it was recorded at "
+        "that moment: one length for place and turn together, whatever the body's axes. Of a whole clip it is the root "
+        "mean square (RMS) over all samples.",
+        *picture,
+    ]
 
 
 def _in_short(found: Results) -> list[str]:
@@ -383,9 +398,14 @@ def _bows(found: Results) -> list[str]:
         "## Why a screw wins here and loses there",
         "",
         "Between two updates the origin runs straight under the state of the art, and on a bow under a screw. How "
-        "much of that bow the recorded path has is a number k, and the screw has the smaller RMS position error "
-        "where k is above a half, exactly. In a cell: k, and the screw's error as a multiple of the state of the "
-        "art's.",
+        "much of that bow the recorded path has is a number k. With a the way from the straight line to where the "
+        "origin was recorded, and b that to where the screw has it, summed over all samples between updates,",
+        "",
+        *(f"    {line}" for line in FORMULA),
+        "",
+        "So k is 1 where the path has all of the bow, and 0 where it has none of it; and since a - b is the screw's "
+        "error, that has the smaller RMS position error where k is above a half, exactly. In a cell: k, and the "
+        "screw's error as a multiple of the state of the art's.",
         "",
         *grid(
             ["clip", *(f"{rate}/s" for rate in rates)],

@@ -86,7 +86,10 @@ FILES = {
     "strips.csv": (Instant, [Instant(mode, 0.5, 55.0, 0.0678) for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp")]),
 }
 
-PICTURES = ("paper/triangle.png", "paper/strips.png", "paper/engines.svg", "paper/catching.png", "paper/catching.mp4")
+PICTURES = (
+    *("paper/triangle.png", "paper/strips.png", "paper/engines.svg", "paper/shell_error.svg"),
+    *("paper/catching.png", "paper/catching.mp4"),
+)
 
 
 def written(folder: Path, **changed: list) -> str:
