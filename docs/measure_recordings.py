@@ -51,6 +51,9 @@ COUNTED = (REFERENCE, "dq_sclerp", "pga_lerp", "motor_spline")
 CHOICES = {"all": "all,best_of", "without_spline": "lerp_slerp,dq_sclerp,pga_lerp,best_of"}
 """What `best_of` chooses from."""
 
+BUDGETS = ("5", "10", "20")
+"""Adaptive keys a second, of which `best_of` chooses the modes as well."""
+
 DIGITS = 4
 """Significant ones that are kept of a figure."""
 
@@ -101,6 +104,7 @@ def main(arguments: list[str] | None = None) -> int:
         "keys_needed": _needed(clips, COUNTED, fit=True),
         "rules": {name: _by_rule(clips, name) for name in RULES},
         "best_of": {name: _best_of(paths, modes) for name, modes in CHOICES.items()},
+        "best_of_adaptive": _best_of_adaptive(paths),
     }
     options.output.parent.mkdir(parents=True, exist_ok=True)
     write_text(options.output, json.dumps(_rounded(figures), indent=1) + "\n")
@@ -202,6 +206,21 @@ def _best_of(paths: Sequence[Path], modes: str) -> dict[str, dict[str, float]]:
     with _compared(paths, "--rates", ",".join(RATES), "--modes", modes) as folder:
         table = _Metrics(folder)
         return {rate: _best_at(table, folder, rate) for rate in RATES}
+
+
+def _best_of_adaptive(paths: Sequence[Path]) -> dict[str, float]:
+    """The same with adaptive keys, as many on average: the errors alone."""
+    with _compared(
+        paths, "--decimate", "adaptive", "--budget", ",".join(BUDGETS), "--modes", ",".join((*COUNTED, BEST_OF))
+    ) as folder:
+        return _adaptive_gains(_Metrics(folder))
+
+
+def _adaptive_gains(table: _Metrics) -> dict[str, float]:
+    def ratio(clip: str, rate: str) -> float:
+        return table.value(clip, rate, BEST_OF) / table.value(clip, rate, table.best(clip, rate))
+
+    return {rate: table.mean(partial(ratio, rate=rate)) for rate in BUDGETS}
 
 
 def _best_at(table: _Metrics, folder: Path, rate: str) -> dict[str, float]:

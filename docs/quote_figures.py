@@ -5,7 +5,8 @@
 
 A quote is what stands between <!-- quote NAME --> and <!-- end -->; `QUOTES` says what belongs there. Figures come
 from pages that a script has written (paper.md, subframes.md, benchmark_batch.md) and from docs/figures/recordings.json,
-which docs/measure_recordings.py writes. Pages of figures get their summaries as well, see rigid_motion_batch/summaries.
+which docs/measure_recordings.py writes; those of the motions in assets/ are measured at once. Pages of figures get
+their summaries as well, see rigid_motion_batch/summaries.
 """
 
 from __future__ import annotations
@@ -15,14 +16,23 @@ import json
 import re
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
+from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.comparison.report.findings import listed
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.metrics import measure_reconstruction
+from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.markdown_tables import numbers, tables, tables_of, titled
+from rigid_motion_batch.paper.table import RADIUS
+from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.summaries import SUMMARIES, with_summary
 from rigid_motion_batch.summaries.paper import TABLE_1, percent_saved
 
@@ -241,9 +251,40 @@ def best_of(sources: Sources) -> str:
     return grid(("keys a second", *rates), ("---", *["---:"] * len(rates)), rows)
 
 
+def best_of_adaptive(sources: Sources) -> str:
+    found = sources.recordings["best_of_adaptive"]
+    gains = spread([100.0 * (1.0 - error) for error in found.values()], 1)
+    return f"{gains} % with {listed(list(found))} keys a second (`--decimate adaptive --budget {','.join(found)}`)"
+
+
 def best_of_gains(sources: Sources, which: str) -> str:
     found = sources.recordings["best_of"][which].values()
     return f"{spread([100.0 * (1.0 - one['rms_shell']) for one in found], 1)} %"
+
+
+# -- the motions in assets/ --------------------------------------------------------------------------------------------
+
+
+@cache
+def _asset_errors(asset: str, rate: str, modes: Sequence[str]) -> dict[str, float]:
+    """By mode, the RMS shell error of an asset that is kept at so many keys a second, in metres: measured now."""
+    (clip,), _ = read_clips([str(ASSETS / f"{asset}.csv")], "blender")
+    return {
+        row.mode: row.rms_shell_m for row in measure_reconstruction(reconstruct(clip, Uniform(rate), modes, RADIUS))
+    }
+
+
+def smooth_errors(sources: Sources) -> str:
+    """Of the clip and the modes of smooth.png."""
+    errors = _asset_errors("reach", "8", ("lerp_slerp", "dq_sclerp", "motor_spline"))
+    return listed([f"{1e3 * error:.1f} mm" for error in errors.values()])
+
+
+def throw_gains(sources: Sources, rate: str) -> str:
+    """How much closer `best_of` is than the best single mode."""
+    errors = dict(_asset_errors("throw", rate, (*KEYFRAME_MODES, BEST_OF)))
+    best = errors.pop(BEST_OF)
+    return f"{100.0 * (1.0 - best / min(errors.values())):.0f} %"
 
 
 # -- streams, sub-frames and memory ------------------------------------------------------------------------------------
@@ -290,8 +331,12 @@ QUOTES: dict[str, Callable[[Sources], str]] = {
     "rules-fitted": lambda sources: rules_fitted(sources, OWN_RULE),
     "rules-fitted-parabola": lambda sources: rules_fitted(sources, "parabola"),
     "best-of": best_of,
+    "best-of-adaptive": best_of_adaptive,
     "best-of-gains": lambda sources: best_of_gains(sources, "all"),
     "best-of-gains-without-spline": lambda sources: best_of_gains(sources, "without_spline"),
+    "smooth-errors": smooth_errors,
+    "throw-gain-5": lambda sources: throw_gains(sources, "5"),
+    "throw-gain-10": lambda sources: throw_gains(sources, "10"),
     "streamed-updates": lambda sources: streamed(sources, "updates"),
     "streamed-bytes": lambda sources: streamed(sources, "bytes"),
     "sub-frames-slow": lambda sources: sub_frames(sources, "Slow", "QUATERNION", "live, mm"),
