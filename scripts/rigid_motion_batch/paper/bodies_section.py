@@ -32,13 +32,11 @@ from .bodies import (
     Limb,
 )
 from .bows import SCREW
+from .claims import BLEND
 from .table import ADAPTIVE, RADIUS, UNIFORM
 from .wording import changed, grid, less, percent
 
 HEADING = "## The same study on bodies"
-
-BLEND = "pga_lerp"
-"""The multivectors of the paper."""
 
 ONE_MOTION = 1e-6
 """Metres: what is nearer than that is one motion for all that can be seen."""
