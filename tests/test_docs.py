@@ -6,10 +6,15 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from docs import quote_figures
+from docs import measure_recordings, quote_figures
+from rigid_motion.motion import curves, decimate
+from rigid_motion_batch.comparison.study.needed import OfRigidBody
+from rigid_motion_batch.paper.table import RADIUS
 from rigid_motion_batch.summaries import SUMMARIES, with_summary
+from tests.scripts.comparison.recordings import swinging_clip
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
@@ -131,3 +136,30 @@ def test_no_page_says_a_negative_percentage():
     for path in PAGES:
         found = re.findall(r"[^\w.\N{EN DASH}][-\N{MINUS SIGN}]\d+(?:\.\d+)? ?%", path.read_text(encoding="utf-8"))
         assert not found, f"{path.name}: {found}"
+
+
+TIMES = np.array((1.0, 12.0, 1.0, 0.5)), np.array((12.0, 1.0, 1.0, 0.7))
+"""Of segments before and after a key."""
+
+
+def test_the_rule_in_bold_is_that_of_the_program():
+    np.testing.assert_array_equal(measure_recordings.RULES[quote_figures.OWN_RULE](*TIMES), curves._shares(*TIMES))
+    assert set(measure_recordings.RULES) == set(quote_figures.RULES)
+
+
+def test_other_rules_are_others():
+    own = curves._shares(*TIMES)
+    for name, rule in measure_recordings.RULES.items():
+        if name != quote_figures.OWN_RULE:
+            assert np.abs(rule(*TIMES) - own).max() > 0.01, name
+
+
+def test_half_of_what_the_parabola_adds_is_the_stream_spline_of_the_program():
+    clip = swinging_clip(seed=1)
+    half, whole, none = (measure_recordings._errors_of_clips([clip], part) for part in (0.5, 1.0, 0.0))
+    keys = decimate(clip.times, 5.0)
+    stretch = OfRigidBody(clip, RADIUS).between(0, int(keys[-1]))
+    error = stretch.error(keys, "motor_spline_causal") / stretch.error(keys, "lerp_slerp")
+    assert half["5"] == pytest.approx(error, rel=1e-12)
+    assert abs(whole["5"] - half["5"]) > 1e-3
+    assert abs(none["5"] - half["5"]) > 1e-3
