@@ -34,7 +34,7 @@ def _live_beside_baking(page: str) -> str:
     if not ratios:
         raise LookupError("no baking")
     text = f"Filling in, choosing a mode and baking are {span(ratios)} times faster than Blender's own baking"
-    return f"{text}, and slower in {slower} cases." if slower else f"{text}, and nowhere slower."
+    return f"{text}, and slower in {slower} case{'s' * (slower > 1)}." if slower else f"{text}, and nowhere slower."
 
 
 def _files_grow(page: str) -> str:

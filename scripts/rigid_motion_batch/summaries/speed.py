@@ -73,10 +73,12 @@ def _slower(page: str) -> str:
 
 def _blend_beside_lerp(page: str) -> str:
     ratios = [race["lerp_slerp", OURS] / race["pga_lerp", OURS] for race in _races(page).values()]
+    low, high = percent_more(min(ratios)), percent_more(max(ratios))
+    time = low if low == high else f"between {low} and {high}"
     quicker = sum(ratio < 1.0 for ratio in ratios)
     return (
-        f"Multivectors by LERP (`pga_lerp`) take between {percent_more(min(ratios))} and {percent_more(max(ratios))} "
-        f"time than `lerp_slerp`, less in {quicker} of {len(ratios)} cases."
+        f"Multivectors by LERP (`pga_lerp`) take {time} time than `lerp_slerp`: less in {quicker} of {len(ratios)} "
+        f"case{'s' * (len(ratios) > 1)}."
     )
 
 
