@@ -1,0 +1,60 @@
+"""How the pictures of the extension's page are rendered: on the processor, the same pixels every time, and no more."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import bpy
+
+SIGNATURE = 8
+"""The bytes that every PNG file begins with; chunks follow, each with its length, its kind and a checksum."""
+
+NOTES = {b"tEXt", b"zTXt", b"iTXt", b"tIME", b"eXIf"}
+
+
+def empty_scene() -> bpy.types.Scene:
+    """The scene, with nothing in it."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    return bpy.context.scene
+
+
+def look_from(place: tuple[float, float, float], turn: tuple[float, float, float], width: float) -> None:
+    """Have a camera at a place, turned from looking down, that sees so much of the scene without perspective."""
+    camera = bpy.data.cameras.new("Camera")
+    camera.type, camera.ortho_scale = "ORTHO", width
+    obj = bpy.data.objects.new("Camera", camera)
+    obj.location, obj.rotation_euler = place, turn
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.scene.camera = obj
+
+
+def render(
+    path: Path, size: tuple[int, int], samples: int, *, transparent: bool = False, denoise: bool = False
+) -> None:
+    """Render the scene into a PNG file, without the date and the other notes that Blender leaves in one."""
+    scene = bpy.context.scene
+    settings, cycles = scene.render, scene.cycles
+    settings.engine, settings.film_transparent = "CYCLES", transparent
+    cycles.device, cycles.samples, cycles.seed = "CPU", samples, 0
+    cycles.use_denoising, cycles.max_bounces = denoise, 4
+    scene.view_settings.view_transform = "Standard"
+    settings.resolution_x, settings.resolution_y, settings.resolution_percentage = *size, 100
+    settings.image_settings.file_format = "PNG"
+    settings.image_settings.color_mode = "RGBA" if transparent else "RGB"
+    settings.image_settings.compression = 100
+    settings.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    path.write_bytes(without_notes(path.read_bytes()))
+
+
+def without_notes(png: bytes) -> bytes:
+    """A PNG file with what makes the picture, without dates, times and names."""
+    kept, place = [png[:SIGNATURE]], SIGNATURE
+    while place < len(png):
+        length, kind = struct.unpack_from(">I4s", png, place)
+        if kind not in NOTES:
+            kept.append(png[place : place + length + 12])
+        place += length + 12
+    return b"".join(kept)

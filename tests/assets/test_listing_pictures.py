@@ -1,0 +1,72 @@
+"""The pictures of the extension's page: what they show is what happens, and they can be shown anywhere."""
+
+from __future__ import annotations
+
+import struct
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+from assets import make_listing
+from rigid_motion import animation
+from rigid_motion_batch.making import featured
+from rigid_motion_batch.making.rendering import without_notes
+
+LISTING = make_listing.ASSETS / "listing"
+
+HAND = Vector((1.0, 2.0, 3.0))
+
+
+@pytest.fixture
+def followed(empty_file):
+    animation.register()
+    yield
+    animation.unregister()
+
+
+def grips(mode: str | None) -> np.ndarray:
+    """Where the grip of the hammer is on each frame, from the hand, in lengths of the hammer."""
+    hammer = bpy.data.objects.new("Hammer", None)
+    bpy.context.scene.collection.objects.link(hammer)
+    return np.array([pose @ featured.GRIP - HAND for pose in featured.swing(hammer, HAND, mode)]) / featured.LENGTH
+
+
+def test_by_blenders_own_in_betweens_the_grip_leaves_the_hand(followed):
+    away = np.linalg.norm(grips(None), axis=1)
+    assert away.max() > 0.4
+    assert away[[0, -1]] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_by_the_screw_it_stays_in_the_hand(followed):
+    assert np.linalg.norm(grips("dq_sclerp"), axis=1).max() < 1e-5
+
+
+def test_the_icon_is_seen_on_any_ground(empty_file):
+    """It is transparent around, leaves a margin, and has both bright and dark in it."""
+    image = bpy.data.images.load(str(LISTING / "icon.png"))
+    pixels = np.array(image.pixels).reshape(256, 256, 4)
+    alpha = pixels[..., 3]
+    assert max(alpha[0].max(), alpha[-1].max(), alpha[:, 0].max(), alpha[:, -1].max()) == 0.0
+    assert 0.2 < (alpha > 0.5).mean() < 0.7
+    brightness = pixels[alpha > 0.9, :3].mean(axis=1)
+    assert brightness.min() < 0.15
+    assert brightness.max() > 0.9
+
+
+def test_pictures_say_nothing_of_when_and_where_they_were_made():
+    for name in ("icon.png", "featured.png"):
+        picture = (LISTING / name).read_bytes()
+        assert without_notes(picture) == picture
+
+
+def test_notes_in_a_picture_are_found():
+    note = struct.pack(">I4s", 4, b"tEXt") + b"a\0b!" + b"sum!"
+    picture = (LISTING / "icon.png").read_bytes()
+    assert without_notes(picture[:33] + note + picture[33:]) == picture
+
+
+@pytest.mark.parametrize(("name", "most"), [("icon.png", 60_000), ("featured.png", 1_500_000)])
+def test_a_page_with_them_loads_soon(name, most):
+    assert (LISTING / name).stat().st_size < most

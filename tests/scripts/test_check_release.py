@@ -1,0 +1,129 @@
+"""What a release needs: each part is missed where it is not there."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch import check_release
+from rigid_motion_batch.check_release import CHANGELOG, CHECKS, LISTING, MANIFEST, MANUAL
+
+ROOT = Path(__file__).resolve().parents[2]
+WEBSITE = "https://motion.dev/rigid"
+
+
+def git(folder: Path, *arguments: str) -> None:
+    identity = ("-c", "user.name=T", "-c", "user.email=t@motion.dev", "-c", "commit.gpgsign=false")
+    subprocess.run(["git", *identity, *arguments], cwd=folder, check=True, capture_output=True)
+
+
+def change(folder: Path, name: str, old: str, new: str) -> None:
+    text = (folder / name).read_text(encoding="utf-8")
+    assert old in text
+    (folder / name).write_text(text.replace(old, new), encoding="utf-8")
+
+
+@pytest.fixture
+def ready(tmp_path, monkeypatch) -> Path:
+    """A checkout of which nothing is missing: this one, with addresses and a day."""
+    for name in (MANIFEST, CHANGELOG, MANUAL, LISTING):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tmp_path / name)
+    manifest = check_release._manifest(ROOT)
+    change(tmp_path, MANIFEST, manifest["website"], WEBSITE)
+    change(tmp_path, MANUAL, manifest["website"], WEBSITE)
+    change(tmp_path, MANIFEST, manifest["maintainer"], "Maintainer <maintainer@motion.dev>")
+    change(tmp_path, MANIFEST, f'"{manifest["version"]}"\nname', '"0.1.0"\nname')
+    (tmp_path / CHANGELOG).write_text("# Changelog\n\n## 0.1.0 - 2026-12-01\n", encoding="utf-8")
+    git(tmp_path, "init", "--quiet")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "--quiet", "-m", "Ready")
+    monkeypatch.setattr(check_release, "CHECKOUT", tmp_path)
+    return tmp_path
+
+
+def missing(capsys: pytest.CaptureFixture[str]) -> str:
+    """What the command complains of; it ends with 1."""
+    assert check_release.main([]) == 1
+    return capsys.readouterr().err
+
+
+def test_where_all_is_there_it_says_so(ready, capsys):
+    assert check_release.main([]) == 0
+    assert capsys.readouterr() == ("All is there for a release.\n", "")
+
+
+def test_stand_ins_for_addresses_are_no_release(ready):
+    change(ready, MANIFEST, WEBSITE, "https://example.org/rigid-motion")
+    change(ready, MANUAL, WEBSITE, "https://example.org/rigid-motion")
+    change(ready, MANIFEST, "@motion.dev", "@example.org")
+    website, mail = check_release.addresses(ready)
+    assert "the website is https://example.org/rigid-motion" in website
+    assert "maintainer@example.org" in mail
+
+
+def test_the_buttons_open_what_the_manifest_names(ready):
+    change(ready, MANUAL, WEBSITE, "https://motion.dev/other")
+    (finding,) = check_release.addresses(ready)
+    assert finding.startswith(f"{MANUAL}: WEBSITE is https://motion.dev/other")
+
+
+@pytest.mark.parametrize(
+    ("host", "is_stand_in"),
+    [("example.org", True), ("www.example.com", True), ("rigid.test", True), ("", True), ("examples.org", False)],
+)
+def test_hosts_that_are_nobodys_are_known(host, is_stand_in):
+    assert check_release._is_stand_in(host) == is_stand_in
+
+
+def test_a_version_without_a_day_is_no_release(ready):
+    change(ready, CHANGELOG, " - 2026-12-01", " - unreleased")
+    assert list(check_release.version(ready)) == [f"{CHANGELOG}: 0.1.0 is unreleased: give it the day of the release"]
+
+
+def test_a_version_without_an_entry_is_no_release(ready):
+    change(ready, MANIFEST, 'version = "0.1.0"\nname', 'version = "9.9.9"\nname')
+    assert "no entry of 9.9.9" in next(check_release.version(ready))
+
+
+def test_a_version_that_has_its_tag_was_released(ready, capsys):
+    git(ready, "tag", "v0.1.0")
+    assert "the tag v0.1.0 is there already" in missing(capsys)
+
+
+def test_what_is_not_committed_is_not_released(ready, capsys):
+    change(ready, CHANGELOG, "2026-12-01", "2026-12-02")
+    assert f"{CHANGELOG} is not committed" in missing(capsys)
+
+
+def test_pictures_are_there_in_their_size(ready):
+    (ready / LISTING / "icon.png").unlink()
+    shutil.copy(ROOT / LISTING / "icon.png", ready / LISTING / "featured.png")
+    icon, featured = check_release.pictures(ready)
+    assert "icon.png is missing" in icon
+    assert "featured.png is 256 x 256 pixels, and has to be 1920 x 1080" in featured
+
+
+@pytest.mark.parametrize("words", [0, 149, 301])
+def test_the_text_is_as_long_as_people_read(words, ready):
+    (ready / LISTING / "description.md").write_text("word " * words)
+    (finding,) = check_release.text(ready)
+    assert f"has {words} words" in finding
+
+
+def test_a_zip_that_blender_refuses_is_no_release(ready, monkeypatch, capsys):
+    from rigid_motion_batch import build_extension
+
+    def refused(folder: Path) -> Path:
+        raise build_extension.BuildError("Blender refuses the extension")
+
+    monkeypatch.setattr(build_extension, "build", refused)
+    assert "Blender refuses the extension" in missing(capsys)
+
+
+def test_the_pictures_and_the_text_of_this_checkout_are_ready():
+    assert [finding for check in CHECKS if check.__name__ in ("pictures", "text") for finding in check(ROOT)] == []
