@@ -118,7 +118,7 @@ class Poses:
 
     def __array_function__(self, function: Callable, types: tuple, args: tuple, kwargs: dict) -> np.ndarray:
         """Refuse in words too where NumPy would keep quiet: to `np.array_equal`, what is no array is just not equal."""
-        raise TypeError(f"np.{function.__name__} takes arrays, not poses: poses.positions and poses.quaternions are some")
+        raise TypeError(f"np.{function.__name__} takes arrays: poses.positions and poses.quaternions are some")
 
     def __getitem__(self, index: Any) -> Poses:
         """The poses at `index` of the leading axes, by NumPy's rules: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""
