@@ -2,7 +2,7 @@
 # # The modes in Python
 #
 # `rigid_motion.motion` fills in between keyed poses, measures what comes out, and finds the keys that a recording
-# needs. It takes NumPy alone: no Blender is here. In a checkout, `pip install ".[notebook]"` brings what this runs with.
+# needs. It takes NumPy alone: no Blender is here. In a checkout, `pip install ".[notebook]"` brings what it runs with.
 
 # %%
 import matplotlib.pyplot as plt
@@ -44,7 +44,7 @@ def draw_bars(axes, poses, colour, width):
     axes.plot(*ends[..., :2].T.swapaxes(1, 2), color=colour, linewidth=width, solid_capstyle="round")
 
 
-figure, grid = plt.subplots(2, 4, figsize=(11, 4.6), sharex=True, sharey=True, layout="constrained")
+figure, grid = plt.subplots(2, 4, figsize=(11, 3.6), sharex=True, sharey=True, layout="constrained")
 for (mode, path), axes in zip(paths.items(), grid.flat, strict=True):
     axes.plot(*path.positions[:, :2].T, color=COLOURS[mode], linewidth=2)
     draw_bars(axes, path[::8], COLOURS[mode], 0.7)
