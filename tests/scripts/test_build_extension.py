@@ -126,6 +126,14 @@ def test_what_blender_refuses_is_reported_in_its_words_and_the_old_zip_stays(tmp
     assert {path.name: path.read_text() for path in old.parent.iterdir()} == {old.name: "old"}
 
 
+def test_a_tag_that_blender_does_not_know_is_refused(tmp_path, monkeypatch, capsys):
+    manifest = tmp_path / MANIFEST.name
+    manifest.write_text(MANIFEST.read_text(encoding="utf-8").replace('"Rigging"', '"Interpolation"'), encoding="utf-8")
+    monkeypatch.setattr(build_extension, "BESIDE", (manifest, LICENSE))
+    assert build_extension.main(["--output", str(tmp_path / "dist")]) == 2
+    assert "Interpolation" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("missing", ["LICENSE", "rigid_motion"])
 def test_a_missing_part_is_named(missing, tmp_path, monkeypatch, capsys):
     if missing == "LICENSE":

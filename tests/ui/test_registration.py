@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 import rigid_motion
+from rigid_motion.animation.inbetweens import live
 from rigid_motion.ui import keymap, menus
 
 
@@ -35,3 +36,11 @@ def test_switched_off_it_leaves_nothing_behind_however_often(empty_file):
         assert on["handlers"] != before["handlers"]
         rigid_motion.unregister()
         assert footprint() == before
+
+
+def test_a_look_through_the_file_that_still_waits_is_called_off(empty_file):
+    """In a window Blender is asked for one as soon as it is idle."""
+    rigid_motion.register()
+    bpy.app.timers.register(live._look_through, first_interval=1.0)
+    rigid_motion.unregister()
+    assert not bpy.app.timers.is_registered(live._look_through)
