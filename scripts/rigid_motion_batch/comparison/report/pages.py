@@ -402,8 +402,8 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
         (
             "Bytes/s",
             "Size of the keys that were kept: seven double-precision numbers, 56 bytes, for each key. Keys that are "
-            "not evenly spaced also need their times, which are not counted. Where every segment has a mode of its own, "
-            "a key has one byte more.",
+            "not evenly spaced also need their times, which are not counted. With a mode for every segment, a key has "
+            "one byte more.",
         ),
     ]
     return element(
