@@ -174,7 +174,7 @@ def test_where_joints_only_turn_screw_and_slerp_are_called_one_motion():
     text = section()
     assert "all joints but the roots of `fast` move by at most 0 mm: screw and SLERP are the same motion there." in text
     assert "In `slow` a joint moves by up to 12.3 mm" in text
-    assert "and the two differ by up to 2.1 mm in its parent's space (`Thigh`) and by 3.2 mm in that of the roots" in text
+    assert "two differ by up to 2.1 mm in its parent's space (`Thigh`) and by 3.2 mm in that of the roots" in text
     moved = [replace(row, parents_m=0.5) for row in ROWS["apart"]]
     assert "are the same motion" not in section(apart=moved)
 
