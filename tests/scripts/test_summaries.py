@@ -47,8 +47,8 @@ def test_more_time_is_never_less_than_none(blend: str, words: str):
 
 def test_a_page_in_parts_is_summed_up_by_its_parts():
     assert said(of_live(CHOOSING)) == (
-        "- Computing in-betweens, choosing a mode and baking are 3.5 times faster than Blender's own baking, and slower "
-        "in 1 case. - Goals met: 0 of 1. Missed: `set_mode` for all in one call (at most 0.2 s)."
+        "- Computing in-betweens, choosing a mode and baking are 3.5 times faster than Blender's own baking, and "
+        "slower in 1 case. - Goals met: 0 of 1. Missed: `set_mode` for all in one call (at most 0.2 s)."
     )
 
 
