@@ -6,6 +6,7 @@
     python scripts/bootstrap.py test                        the tests
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
+    python scripts/bootstrap.py reduce shot.blend           few keys for files and recordings that have too many
     python scripts/bootstrap.py stream --help               a recording over a network, in real time
     python scripts/bootstrap.py tasks list renders/hand     the tasks of a comparison, and what is done of them
     python scripts/bootstrap.py dask scheduler              many machines: Dask's own commands
@@ -39,6 +40,7 @@ COMMANDS = {
     "test": (["-m", "pytest"], ("test", "farm")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
+    "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
     "tasks": (["-m", "rigid_motion_batch.workplan"], ()),
     "dask": (["-m", "dask"], ("farm",)),

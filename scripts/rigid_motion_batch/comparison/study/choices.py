@@ -199,8 +199,17 @@ class Tolerance(Choice):
         return ""
 
     def tolerance(self, clip: Clip) -> float:
+        return self.metres(clip.metres_per_unit)
+
+    def metres(self, per_unit: float) -> float:
+        """The length in metres, given how many a unit of the recording has."""
         number, unit = self._parts()
-        return float(number) * (METRES[unit] if unit else clip.metres_per_unit)
+        return float(number) * (METRES[unit] if unit else per_unit)
+
+    def alike(self, metres: float, per_unit: float) -> str:
+        """Another length, in metres, written in the unit that this one is in."""
+        _, unit = self._parts()
+        return f"{metres / METRES[unit]:.3g} {unit}" if unit else f"{metres / per_unit:.3g}"
 
     @property
     def size(self) -> float:
