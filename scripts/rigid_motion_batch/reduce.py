@@ -19,6 +19,7 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
+from rigid_motion.animation.baking.sizes import OF_A_RIG
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.blend_jobs import (
@@ -33,12 +34,10 @@ from rigid_motion_batch.command_line import number
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.comparison.study.radii import RIGID
 from rigid_motion_batch.keyed_files import RATES
-from rigid_motion_batch.reduce_recordings import Reading, Recorded, RecordingRun, Writing
+from rigid_motion_batch.reduce_recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing
 from rigid_motion_batch.reduce_targets import Wishes, reducing
 from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked, Work, do_all
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
-
-TOLERANCE = Tolerance("5mm")
 
 MODE = "motor_spline"
 
@@ -98,10 +97,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--tolerance",
         type=_tolerance,
-        default=TOLERANCE,
         metavar="LENGTH",
         help="how far off anything may be on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file "
-        f"({TOLERANCE.written})",
+        f"(in .blend files 1mm, and {OF_A_RIG:.1%}% of the size of a rig; of recordings {TOLERANCE.written})",
     )
     keys.add_argument("--mode", choices=KEYFRAME_MODES, default=MODE, help="what fills in between them (%(default)s)")
     keys.add_argument(
@@ -117,7 +115,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings = parser.add_argument_group("recordings")
     recordings.add_argument("--blend", action="store_true", help="write rigid motions as .blend files, too")
     recordings.add_argument(
-        "--fps", type=_fps, metavar="N", help="frames a second of .blend files (whole, nearest to the recording's rate)"
+        "--fps", type=_fps, metavar="N", help="frames a second of .blend files (those of the recording)"
     )
     recordings.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
     add_reading_options(parser)

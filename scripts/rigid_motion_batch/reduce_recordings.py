@@ -9,21 +9,25 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigid_motion_batch.blend_files import FileProblem, refuse_read_only, refuse_to_replace, write_file
 from rigid_motion_batch.blend_jobs import place_of
+from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.comparison.study.clips import Clip
 from rigid_motion_batch.comparison.study.metrics import write_poses
 from rigid_motion_batch.comparison.study.radii import RIGID
 from rigid_motion_batch.comparison.study.reading import folder_names, read_source
 from rigid_motion_batch.comparison.study.reconstructions import fill_in
 from rigid_motion_batch.keyed_files import key_body, key_object, new_file
-from rigid_motion_batch.reduce_targets import Wishes
+from rigid_motion_batch.reduce_targets import Wishes, fewer, off
 from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked, counted
 from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
 from rigid_motion_batch.trajectories.reading import split_source
+
+TOLERANCE = Tolerance("5mm")
+"""Where none is given."""
 
 SUFFIX = "-keys"
 """Of the names of files that are written."""
@@ -138,15 +142,15 @@ class RecordingRun:
     ) -> None:
         for path in filter(None, (table, scene)):
             self._refuse(title, path)
-        mode, radius, tolerance = self.wishes.mode, self.wishes.radius or RIGID, self.wishes.tolerance
-        timeline = new_file(clip, self.wishes, self.writing.fps) if scene else None
+        mode, radius, tolerance = self.wishes.mode, self.wishes.radius or RIGID, self.wishes.tolerance or TOLERANCE
+        frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps) if scene else None
         keys = tolerance.keys(clip, mode, radius)
         largest = float(fill_in(clip, tolerance, {mode: keys}, radius).errors[mode].shell.max())
         self._stop_if_asked()
-        if timeline:
-            key_object(clip, keys, mode, timeline, name)
-        off = tolerance.alike(largest, clip.metres_per_unit)
-        self._note(f"{title}: {self._would}reduced, {len(clip.times)} -> {len(keys)} keys, {off} off at most")
+        if frames is not None:
+            key_object(clip, keys, frames, mode, name)
+        told = fewer(len(clip.times), len(keys)) + off(tolerance, largest, clip.metres_per_unit)
+        self._note(f"{title}: {self._would}reduced{told}")
         outcome.objects += 1
         if scene:
             self._save(file, scene)
@@ -160,8 +164,9 @@ class RecordingRun:
 
     def _do_body(self, title: str, clip: Clip, file: Path, name: str, scene: Path, outcome: Outcome) -> None:
         self._refuse(title, scene)
-        timeline = new_file(clip, self.wishes, self.writing.fps)
-        result = key_body(clip, self.wishes, timeline, name)
+        tolerance = self.wishes.tolerance or TOLERANCE
+        frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps)
+        result = key_body(clip, frames, replace(self.wishes, tolerance=tolerance), name)
         self._stop_if_asked()
         for target, reason in result.refused.items():
             outcome.refused += 1

@@ -9,14 +9,19 @@ import bpy
 
 from rigid_motion import animation
 from rigid_motion.animation import NeedsItsKeys, Reduction, Refused
-from rigid_motion.animation.baking.sizes import metres_per_unit
+from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit
 from rigid_motion.animation.inbetweens.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion_batch.blend_targets import Action, Result
 from rigid_motion_batch.comparison.study.choices import Tolerance
+from rigid_motion_batch.figures import unit_of
+from rigid_motion_batch.sessions import counted
 
 FEWEST = 2
 """So many keys are as few as a motion has."""
+
+LEAST = 1e-6
+"""Millimetres: no tolerance is smaller."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,9 @@ class Wishes:
     """How few keys are wanted, of what."""
 
     mode: str
-    tolerance: Tolerance
+    tolerance: Tolerance | None
+    """What each thing begins with in Blender's window, or `reduce.py` with recordings, where None."""
+
     radius: float | None
     """Of the shell in metres; what each object and bone measures, or what `compare` takes of recordings, where None."""
 
@@ -48,13 +55,15 @@ def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
 
 def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     """Leave targets of the open file the few keys that they need."""
-    unit = metres_per_unit(bpy.context.scene)
+    scene = bpy.context.scene
+    unit = metres_per_unit(scene)
+    tolerance = wishes.tolerance or _written(first_tolerance(scene, targets) * unit)
     before = [len(target.motion.bakes) for target in targets]
     refusals: list[Refused] = []
     animation.reduce_keys_of(
         targets,
         wishes.mode,
-        wishes.tolerance.metres(unit) / unit,
+        tolerance.metres(unit) / unit,
         None if wishes.radius is None else wishes.radius / unit,
         shared=wishes.shared,
         refused=refusals,
@@ -62,27 +71,54 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     done = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
     # Refusals come in the order of what refused.
     problems = dict(zip([target for target in targets if target not in done], refusals, strict=True))
+    doubt = _doubt(targets, wishes.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
-    told = described(animation.total_reduction(done), wishes, unit) if done else ""
     return Result(
         done,
         {target: reason for target, reason in reasons.items() if target not in left},
-        {target: reason for target, reason in reasons.items() if target in left},
-        told,
+        {target: f"{reason}{doubt}" for target, reason in reasons.items() if target in left},
+        f"{_described(animation.total_reduction(done), tolerance, unit)}{doubt}" if done else "",
     )
 
 
-def described(reduction: Reduction, wishes: Wishes, unit: float) -> str:
+def _described(reduction: Reduction, tolerance: Tolerance, unit: float) -> str:
     """How many keys there were and are, and how far off they are; lengths of the reduction are of `unit` metres."""
-    off = wishes.tolerance.alike(reduction.largest_error * unit, unit)
     rig = reduction.rig
-    frames = f" on {rig.frames} frames" if rig else ""
-    text = f", {reduction.before} -> {reduction.after} keys{frames}, {off} off at most"
+    told = fewer(reduction.before, reduction.after)
+    told += f" on {counted(rig.frames, 'frame')}" if rig else ""
+    told += off(tolerance, reduction.largest_error * unit, unit)
     if rig and rig.slide_before > 0.0:
-        before, after = (wishes.tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
-        text += f", feet slide {after} where they slid {before}"
-    return text
+        before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
+        told += f"; feet slide {after} where they slid {before}"
+    return told
+
+
+def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
+    """What to think of where a tolerance is in metres, and a rig hardly is: importers leave it in units of its own."""
+    size = max(targets[0].animated.dimensions) * unit if targets[0].prefix else 0.0
+    name, length = unit_of(size)
+    if tolerance is None or not tolerance.is_length or length == 1.0:
+        return ""
+    meant = tolerance.metres(unit) / (unit * length)
+    return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"
+
+
+def fewer(before: int, after: int) -> str:
+    """How many keys became how many."""
+    return f", {before} -> {after} keys"
+
+
+def off(tolerance: Tolerance, metres: float, per_unit: float) -> str:
+    """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
+    return f", {tolerance.alike(metres, per_unit)} off at most ({allowed} allowed)"
+
+
+def _written(metres: float) -> Tolerance:
+    """A length as a user would write it."""
+    number, unit = (metres, "m") if metres >= 1.0 else (1e3 * metres, "mm")
+    return Tolerance(f"{max(number, LEAST):.6f}{unit}")
 
 
 def _has_bones(target: Transform) -> bool:

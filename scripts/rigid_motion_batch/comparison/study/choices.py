@@ -206,10 +206,16 @@ class Tolerance(Choice):
         number, unit = self._parts()
         return float(number) * (METRES[unit] if unit else per_unit)
 
+    @property
+    def is_length(self) -> bool:
+        """Whether it says its unit, and does not go by that of the recording."""
+        return bool(self._parts()[1])
+
     def alike(self, metres: float, per_unit: float) -> str:
         """Another length, in metres, written in the unit that this one is in."""
         _, unit = self._parts()
-        return f"{metres / METRES[unit]:.3g} {unit}" if unit else f"{metres / per_unit:.3g}"
+        length = round(metres / (METRES[unit] if unit else per_unit), 4)
+        return f"{length:.3g} {unit}".strip()
 
     @property
     def size(self) -> float:
