@@ -40,8 +40,8 @@ CODE = (
     *(
         f"rigid_motion_batch/{part}"
         for part in (
-            *("axes.py", "command_line.py", "comparison", "figures.py", "files.py", "making", "paper", "places.py"),
-            *("rows.py", "streaming", "trajectories"),
+            *("axes.py", "command_line.py", "comparison", "figures.py", "files.py", "making", "markdown_tables.py"),
+            *("paper", "places.py", "rows.py", "streaming", "summaries", "trajectories"),
         )
     ),
 )
