@@ -26,7 +26,7 @@ from rigid_motion_batch.blend_files import (
     write_file,
 )
 from rigid_motion_batch.blend_targets import Action, Result, groups_of, matching, matching_missing, title_of
-from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked, counted
+from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked
 
 
 @dataclass(frozen=True)
@@ -182,16 +182,12 @@ class BlendRun:
             self._refuse(job, outcome, title_of(targets), reason, len(targets))
             return
         result = self.action.act(targets)
-        reasons = set(result.refused.values())
-        if len(result.refused) == len(targets) > 1 == len(reasons):  # It is the rig's.
-            self._refuse(job, outcome, title_of(targets), *reasons, len(targets))
-        else:
-            for target, reason in result.refused.items():
-                self._refuse(job, outcome, target.name, reason)
+        for name, reason, count in result.refusals():
+            self._refuse(job, outcome, name, reason, count)
         if result.done:
             self._tell_done(job, outcome, result)
         if result.left:
-            self._tell_left(job, result)
+            self._note(f"{job.source}: {result.told_of_left()}")
 
     def _refuse(self, job: Job, outcome: Outcome, name: str, reason: str, count: int = 1) -> None:
         outcome.refused += count
@@ -205,15 +201,6 @@ class BlendRun:
             outcome.objects += len(targets)
         told = f"{self._would}{self.action.done}{result.told}"
         self._note(f"{job.source}: {title_of(targets)}{' ' if len(targets) > 1 else ': '}{told}")
-
-    def _tell_left(self, job: Job, result: Result) -> None:
-        """Say of one target why it is left as it is, and of several how many are."""
-        targets = list(result.left)
-        if len(targets) == 1:
-            self._note(f"{job.source}: {targets[0].name} is left as it is: {result.left[targets[0]]}")
-        else:
-            rig, count = targets[0].animated.name, counted(len(targets), "bone")
-            self._note(f"{job.source}: {rig}: {count} left as they are: {result.left[targets[0]]}")
 
     def _finish(self, job: Job, outcome: Outcome) -> None:
         if not outcome.done:

@@ -26,6 +26,21 @@ class Result:
     told: str = ""
     """What there is to say of those that were done; begins with a comma or a semicolon."""
 
+    def refusals(self) -> Iterator[tuple[str, str, int]]:
+        """Which targets were refused, why, and how many they are: all bones of a rig at once where it is the rig's."""
+        reasons = set(self.refused.values())
+        if len(reasons) == 1 < len(self.refused) and not (self.done or self.left):
+            yield title_of(list(self.refused)), *reasons, len(self.refused)
+        else:
+            yield from ((target.name, reason, 1) for target, reason in self.refused.items())
+
+    def told_of_left(self) -> str:
+        """Which targets were left as they are, and why; of several bones the reason of one."""
+        (first, reason), *others = self.left.items()
+        example = f", such as {first.name}" if any(other != reason for _, other in others) else ""
+        left = "are left as they are" if others else "is left as it is"
+        return f"{title_of(list(self.left))} {left}{example}: {reason}"
+
 
 @dataclass(frozen=True)
 class Action:

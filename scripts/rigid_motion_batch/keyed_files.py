@@ -5,6 +5,8 @@ In metres and Blender's axes, where it was recorded; the first sample is on fram
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 
@@ -107,9 +109,7 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
     keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
     if not keyed:
         raise FileProblem("nothing of this body moves: there are no keys to reduce")
-    result = reduced(keyed, wishes)
-    if result.done:
-        animation.discard_dense_keys(result.done)  # The recording has them.
+    result = reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
     if result.left:
         animation.set_mode(list(result.left), wishes.mode)
     return result

@@ -54,9 +54,10 @@ examples:
 
 .blend files:
   Every object, and all bones of a rig together, that has more than two keys of location or rotation gets the keys that
-  the mode needs, and the mode on them. The dense keys stay in the file for Restore Keys. Of bones the tolerance holds
-  in the rig's space, through all that they hang on, and feet that stand keep to a quarter of it. What needs the keys
-  that it has is left as it is. Without --radius, objects and bones have the size that they are.
+  the mode needs, and the mode on them. The dense keys stay in the file for Restore Keys, unless --discard leaves them
+  out. Of bones the tolerance holds in the rig's space, through all that they hang on, and feet that stand keep to a
+  quarter of it; where the rig itself has keys, what it is off by comes on top. What needs the keys that it has is left
+  as it is. Without --radius, objects and bones have the size that they are.
 
 recordings:
   CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and bodies of .blend files (shot.blend:Camera), as `compare` reads
@@ -112,6 +113,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--shared", action="store_true", help="key poses: all bones of a rig have their keys on the same frames"
     )
+    keys.add_argument(
+        "--discard", action="store_true", help="leave the dense keys out of what is written: no Restore Keys there"
+    )
     recordings = parser.add_argument_group("recordings")
     recordings.add_argument("--blend", action="store_true", help="write rigid motions as .blend files, too")
     recordings.add_argument(
@@ -122,7 +126,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add_file_options(parser)
     options = parser.parse_args(arguments)
     files, recorded = _sorted(options.inputs)
-    options.wishes = Wishes(options.mode, options.tolerance, options.radius, options.shared)
+    options.wishes = Wishes(options.mode, options.tolerance, options.radius, options.shared, options.discard)
     options.action = reducing(options.wishes, options.objects)
     try:
         refuse_odd_places(options)

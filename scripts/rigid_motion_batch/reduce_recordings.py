@@ -107,11 +107,14 @@ class RecordingRun:
         except TrajectoryError as error:
             self._note(str(error))
             return Outcome(failed=True, unreadable=True)
+        except Exception as error:
+            self._tell_failure(job.source, error)
+            return Outcome(failed=True)
         if note:
             self._note(note)
-        self._stop_if_asked()
         file = _file_of(job.source)
         for clip, name in zip(clips, _names(file, clips), strict=True):
+            self._stop_if_asked()
             title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
             try:
                 self._do_clip(title, clip, file, name, outcome)
@@ -119,12 +122,14 @@ class RecordingRun:
                 outcome.failed = True
                 self._note(f"{title}: {problem}")
             except Exception as error:
-                # What nobody foresaw in one recording must not keep the others from being done.
                 outcome.failed = True
-                self._note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
-                traceback.print_exc()
-            self._stop_if_asked()
+                self._tell_failure(title, error)
         return outcome
+
+    def _tell_failure(self, title: str, error: Exception) -> None:
+        """What nobody foresaw in one recording must not keep the others from being done."""
+        self._note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
+        traceback.print_exception(error)
 
     def _do_clip(self, title: str, clip: Clip, file: Path, name: str, outcome: Outcome) -> None:
         for repair in clip.repairs:
@@ -151,7 +156,6 @@ class RecordingRun:
             key_object(clip, keys, frames, mode, name)
         told = fewer(len(clip.times), len(keys)) + off(tolerance, largest, clip.metres_per_unit)
         self._note(f"{title}: {self._would}reduced{told}")
-        outcome.objects += 1
         if scene:
             self._save(file, scene)
         if not self.writing.dry_run:
@@ -159,6 +163,7 @@ class RecordingRun:
                 write_poses(table, clip.times[keys], clip.poses[keys])
             except OSError as error:
                 raise FileProblem(f"{table} could not be written ({error.strerror}): use another --output") from None
+        outcome.objects += 1
         for path in filter(None, (table, scene)):
             self._tell_written(title, path, outcome)
 
@@ -168,16 +173,15 @@ class RecordingRun:
         frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps)
         result = key_body(clip, frames, replace(self.wishes, tolerance=tolerance), name)
         self._stop_if_asked()
-        for target, reason in result.refused.items():
-            outcome.refused += 1
-            self._note(f"{title}: {target.carrier.name}: not reduced: {reason}")
+        for bones, reason, count in result.refusals():
+            outcome.refused += count
+            self._note(f"{title}: {bones}: not reduced: {reason}")
         if result.left:
-            reason = next(iter(result.left.values()))
-            self._note(f"{title}: {counted(len(result.left), 'bone')} with all keys: {reason}")
+            self._note(f"{title}: {result.told_of_left()}")
         if result.done:
             self._note(f"{title}: {counted(len(result.done), 'bone')} {self._would}reduced{result.told}")
-        outcome.bones += len(result.done)
         self._save(file, scene)
+        outcome.bones += len(result.done)
         self._tell_written(title, scene, outcome)
 
     def _refuse(self, title: str, path: Path) -> None:

@@ -38,6 +38,9 @@ class Wishes:
     shared: bool
     """Whether all bones of a rig get keys on the same frames."""
 
+    discard: bool = False
+    """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
+
 
 def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
     """Fewer keys for what has more than two; and for what was asked for by its very name, if only to say why not."""
@@ -74,11 +77,14 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     doubt = _doubt(targets, wishes.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
+    told = f"{_described(animation.total_reduction(done), tolerance, unit)}{doubt}" if done else ""
+    if wishes.discard and done:
+        animation.discard_dense_keys(done)
     return Result(
         done,
         {target: reason for target, reason in reasons.items() if target not in left},
         {target: f"{reason}{doubt}" for target, reason in reasons.items() if target in left},
-        f"{_described(animation.total_reduction(done), tolerance, unit)}{doubt}" if done else "",
+        told,
     )
 
 
@@ -127,5 +133,6 @@ def _has_bones(target: Transform) -> bool:
 
 
 def _reason(target: Transform, refusal: Refused) -> str:
-    """A refusal without the name that it begins with."""
-    return str(refusal).removeprefix(target.name).removeprefix(":").strip()
+    """A refusal without the name that it begins with: the target's, or that of its rig."""
+    begin = next((name for name in (target.name, target.animated.name) if str(refusal).startswith(name)), "")
+    return str(refusal).removeprefix(begin).removeprefix(":").strip()

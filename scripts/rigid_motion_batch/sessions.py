@@ -135,7 +135,7 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
     objects, bones = sum(one.objects for one in outcomes), sum(one.bones for one in outcomes)
     refused = sum(one.refused for one in outcomes)
     written, failed = sum(bool(one.written) for one in outcomes), sum(one.failed for one in outcomes)
-    idle = len(outcomes) - written - failed
+    idle = sum(not (one.written or one.failed) for one in outcomes)
     parts = [f"{written} {would}written"]
     parts += [f"{idle} left alone"] if idle else []
     parts += [f"{failed} failed"] if failed else []

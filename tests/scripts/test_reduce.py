@@ -206,6 +206,22 @@ def test_the_dense_keys_stay_in_the_file_for_restore_keys(tmp_path):
         assert count_keys(tool) == len(FRAMES)
 
 
+def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    assert run(path, "--discard") == 0
+    with extension():
+        open_again(reduced_name(path))
+        assert not animation.is_reduced(bpy.data.objects["Tool"])
+        assert [action.name for action in bpy.data.actions] == [bpy.data.objects["Tool"].animation_data.action.name]
+
+
+def test_bones_that_need_their_keys_are_told_of_together(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--tolerance", "0.00001mm", "--shared") == 0
+    assert "Rig: 3 bones are left as they are: its bones need their keys on all of 90 frames" in capsys.readouterr().err
+    assert not reduced_name(path).exists()
+
+
 def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
     path = object_file(tmp_path / "shot.blend")
     assert run(path, "--tolerance", "0.00001mm") == 0
