@@ -68,7 +68,7 @@ def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
     if frames[-1] > LAST_FRAME:
         raise FileProblem(f"at {rate:g} frames a second this has more than {LAST_FRAME} frames: give a smaller --fps")
     if float(np.diff(frames).min()) < CLOSEST:
-        raise FileProblem(f"at {rate:g} frames a second some samples are on one frame to Blender: give a larger --fps")
+        raise FileProblem(f"at {rate:g} frames a second some samples are on one frame to Blender: thin them out")
     farthest = float(np.abs(clip.in_metres(clip.poses).positions).max())
     if farthest * SINGLE > tolerance:
         raise FileProblem(
@@ -100,7 +100,13 @@ def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name
 
 
 def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Result:
-    """Put a rig into the open file that moves as a whole body did, its samples on frames (n,), with few keys."""
+    """Put a rig into the open file that moves as a whole body did, its samples on frames (n,), with few keys.
+
+    Returns
+    -------
+    Result
+        What became of the bones that move; of those that were left, all keys have the mode.
+    """
     rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
     rig = Rig(name, rest, clip.figure.joints, bpy.context.scene.collection)
     channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))
@@ -108,7 +114,7 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
         rig.key(bone, frames, channels[bone])
     keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
     if not keyed:
-        raise FileProblem("nothing of this body moves: there are no keys to reduce")
+        return Result()
     result = reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
     if result.left:
         animation.set_mode(list(result.left), wishes.mode)

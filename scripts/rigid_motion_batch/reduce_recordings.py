@@ -180,6 +180,10 @@ class RecordingRun:
             self._note(f"{title}: {result.told_of_left()}")
         if result.done:
             self._note(f"{title}: {counted(len(result.done), 'bone')} {self._would}reduced{result.told}")
+        if not (result.done or result.left):
+            why = "nothing could be reduced" if result.refused else "nothing of this body moves"
+            self._note(f"{title}: {why}; left alone")
+            return
         self._save(file, scene)
         outcome.bones += len(result.done)
         self._tell_written(title, scene, outcome)

@@ -396,6 +396,29 @@ def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, 
         assert len(bpy.data.actions) == 1, "the recording has the dense keys, and this file need not"
 
 
+def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
+    write_body(tmp_path / "body.bvh", moves=False)
+    assert run(tmp_path / "body.bvh") == 0
+    assert "nothing of this body moves; left alone" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == ["body.bvh"]
+
+
+def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
+    path = tmp_path / "balloon.csv"
+    times, poses = write_csv(path)
+    sizes = 1.0 + 0.3 * np.sin(times)
+    header, *lines = path.read_text().splitlines()
+    rows = [f"{line},{size!r}" for line, size in zip(lines, sizes.tolist(), strict=True)]
+    path.write_text("\n".join([f"{header},scale", *rows]))
+    assert run(path, "--tolerance", "5mm", "--blend") == 0
+    assert (tmp_path / "balloon-keys.csv").read_text().startswith("t,x,y,z,qw,qx,qy,qz,s\n")
+    worlds = worlds_of(poses)
+    worlds[:, :3, :3] *= sizes[:, None, None]
+    frames = np.arange(1.0, len(times) + 1.0)
+    shown = played_on_a_farm(tmp_path / "balloon-keys.blend", ["balloon"], frames)[1][0]
+    assert displacement(shown, worlds) <= 5e-3 + ROUNDING
+
+
 def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
     source = hand_made(tmp_path)
     assert run(f"{source}:LeftHand", "--tolerance", "1cm") == 0
