@@ -1,4 +1,4 @@
-"""reduce.py as people run it: how near what it writes is to what was there, what it leaves alone, what it says."""
+"""reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
 
 from __future__ import annotations
 
@@ -13,113 +13,31 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import MODE_IDS, key_frames, modes_of, write_channel
-from rigid_motion.animation.transforms import transform_of
-from rigid_motion.motion import Poses, interpolate
-from rigid_motion.motion.quaternions import normalise
+from rigid_motion.animation import MODE_IDS, key_frames, modes_of
 from rigid_motion_batch import blend_files, reduce
-from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
-from tests.recordings import RECORDINGS
 from tests.scripts.baking import extension, new_file, open_again, save
-from tests.scripts.bvh_bodies import write_body
+from tests.scripts.reducing import (
+    FRAMES,
+    ROUNDING,
+    WALK,
+    count_keys,
+    displacement,
+    exit_code,
+    hand_made,
+    heads_of,
+    key_densely,
+    object_file,
+    played,
+    reduced_name,
+    rig_file,
+    run,
+    swing,
+    write_csv,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
-
-FRAMES = np.arange(1.0, 91.0)
-"""Of the dense keys in the scenes."""
-
-RADIUS = 0.1
-"""Metres: what is looked at around an origin, where the size of a thing does not say."""
-
-ROUNDING = 2e-5
-"""Metres: single precision of matrices, through a chain of bones."""
-
-BALL = RADIUS * normalise(np.random.default_rng(5).normal(size=(64, 3)))
-"""Points that far from an origin, in all directions."""
-
-
-def run(*arguments: object) -> int:
-    return reduce.main([str(argument) for argument in arguments])
-
-
-def exit_code(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        run(*arguments)
-    return ended.value.code
-
-
-def swing(count: int, seed: int = 0) -> Poses:
-    """A smooth motion through half a metre and a turn, faster and slower by turns, of so many poses."""
-    random = np.random.default_rng(seed)
-    phases = np.linspace(0.0, 5.0, count)[:, None] * random.uniform(0.5, 1.5, 3) + random.uniform(0.0, 6.0, 3)
-    angles = np.linspace(0.0, 3.0, count) + 0.2 * np.sin(np.linspace(0.0, 12.0, count))
-    axis = normalise(random.normal(size=3))
-    turns = np.column_stack((np.cos(angles), np.sin(angles)[:, None] * axis))
-    return Poses(0.5 * np.sin(phases), turns)
-
-
-def key_densely(carrier: bpy.types.Object | bpy.types.PoseBone, poses: Poses, frames: np.ndarray = FRAMES) -> None:
-    """A key of location and rotation on every frame, as a simulation or motion capture leaves them."""
-    carrier.rotation_mode = "QUATERNION"
-    animated = carrier.id_data
-    prefix = transform_of(carrier).prefix
-    write_channel(animated, f"{prefix}location", frames, poses.positions)
-    write_channel(animated, f"{prefix}rotation_quaternion", frames, poses.quaternions)
-
-
-def object_file(path: Path, *names: str) -> Path:
-    """A file with objects that have a key on every frame, saved by a Blender without the extension."""
-    new_file()
-    for seed, name in enumerate(names or ("Tool",)):
-        obj = new_object(name)
-        obj.empty_display_size = RADIUS
-        key_densely(obj, swing(len(FRAMES), seed))
-    path.parent.mkdir(exist_ok=True)
-    return save(path)
-
-
-def rig_file(path: Path) -> Path:
-    """A file with a chain of three bones that turn on every frame, and an empty at the end of each: "at BONE"."""
-    new_file()
-    data = bpy.data.armatures.new("Rig")
-    rig = new_object("Rig", data=data)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    parent = None
-    for number, name in enumerate(("Root", "Arm", "Hand")):
-        bone = data.edit_bones.new(name)
-        bone.head, bone.tail, bone.parent = (0.0, 0.0, 0.3 * number), (0.0, 0.0, 0.3 * number + 0.3), parent
-        parent = bone
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for seed, bone in enumerate(rig.pose.bones):
-        key_densely(bone, swing(len(FRAMES), seed + 20))
-        probe = new_object(f"at {bone.name}")
-        probe.parent, probe.parent_type, probe.parent_bone = rig, "BONE", bone.name
-    return save(path)
-
-
-def reduced_name(path: Path) -> Path:
-    return path.with_name(f"{path.stem}-reduced.blend")
-
-
-def played(path: Path, *names: str) -> np.ndarray:
-    """World matrices on all frames (objects, n, 4, 4), in a Blender that has never heard of the extension."""
-    return played_on_a_farm(path, names, FRAMES)[1]
-
-
-def displacement(worlds: np.ndarray, truth: np.ndarray, points: np.ndarray = BALL) -> float:
-    """How far any of these points of an object is from where it was, on any frame."""
-    offset = (worlds - truth)[..., :3, :]
-    return float(np.linalg.norm(points @ offset[..., :3].swapaxes(-1, -2) + offset[..., None, :, 3], axis=-1).max())
-
-
-def count_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> int:
-    return len(curves_of(carrier)["location", 0].keyframe_points)
-
-
-# .blend files
 
 
 @pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp", "lerp_slerp"])
@@ -167,6 +85,21 @@ def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path,
     counts = [count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones]
     assert sum(counts) < 3 * len(FRAMES) / 2
     assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
+
+
+@pytest.mark.recordings
+def test_a_recorded_walk_that_was_imported_plays_within_the_tolerance_in_any_blender(tmp_path):
+    new_file()
+    bpy.ops.import_scene.fbx(filepath=str(WALK))
+    path = save(tmp_path / "walk.blend")
+    before = path.read_bytes()
+    assert run(path, "--objects", "Hips/*", "--tolerance", "5mm") == 0
+    assert path.read_bytes() == before
+    shown, recorded = heads_of(reduced_name(path), path, tmp_path)
+    assert 0.0 < np.linalg.norm(shown - recorded, axis=-1).max() <= 5e-3 + ROUNDING
+    open_again(reduced_name(path))
+    bones = bpy.data.objects["Hips"].pose.bones
+    assert sum(map(count_keys, bones)) < len(bones) * len(shown) / 4
 
 
 def test_key_poses_are_on_the_same_frames_for_all_bones(tmp_path):
@@ -257,191 +190,6 @@ def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_
     assert run(path) == 0
     open_again(reduced_name(path))
     assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
-
-
-# Recordings
-
-
-def write_csv(path: Path, seconds: float = 2.0, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
-    """A recording in Blender's axes and metres, and what it is of."""
-    times = np.arange(round(seconds * rate) + 1) / rate
-    poses = swing(len(times), 3)
-    rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
-    lines = ["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]
-    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
-    return times, poses
-
-
-def read_table(path: Path) -> tuple[np.ndarray, Poses]:
-    header, *lines = path.read_text(encoding="utf-8").splitlines()
-    assert header == "t,x,y,z,qw,qx,qy,qz"
-    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
-    return rows[:, 0], Poses(rows[:, 1:4], rows[:, 4:])
-
-
-def worlds_of(poses: Poses) -> np.ndarray:
-    """Matrices (n, 4, 4), by the formula of unit quaternions and not by this program."""
-    w, x, y, z = poses.quaternions.T
-    worlds = np.zeros((len(w), 4, 4))
-    worlds[:, 3, 3], worlds[:, :3, 3] = 1.0, poses.positions
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    worlds[:, :3, :3] = np.array(rows).transpose(2, 0, 1)
-    return worlds
-
-
-@pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])
-def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, capsys, mode):
-    path = tmp_path / "hand.csv"
-    times, poses = write_csv(path)
-    before = path.read_bytes()
-    assert run(path, "--tolerance", "5mm", "--mode", mode) == 0
-    assert path.read_bytes() == before
-    key_times, keys = read_table(tmp_path / "hand-keys.csv")
-    assert 2 < len(key_times) < len(times) / 5
-    assert set(key_times) <= set(times)
-    filled = interpolate(key_times, keys, times, mode)
-    assert 0.0 < displacement(worlds_of(filled), worlds_of(poses)) <= 5e-3
-    said = capsys.readouterr()
-    assert f"{path}: reduced, {len(times)} -> {len(key_times)} keys, " in said.err
-    assert said.out == f"{tmp_path / 'hand-keys.csv'}\n"
-
-
-@pytest.mark.parametrize("fps", [None, 30])
-def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fps):
-    path = tmp_path / "hand.csv"
-    times, poses = write_csv(path)
-    assert run(path, "--tolerance", "5mm", "--blend", *(("--fps", fps) if fps else ())) == 0
-    blend, step = tmp_path / "hand-keys.blend", 1 if fps is None else 90 // fps
-    frames = np.arange(1.0, len(times[::step]) + 1.0)
-    worlds = played_on_a_farm(blend, ["hand"], frames)[1][0]
-    assert displacement(worlds, worlds_of(poses)[::step]) <= 5e-3 + ROUNDING
-    with extension():
-        open_again(blend)
-        scene, obj = bpy.context.scene, bpy.data.objects["hand"]
-        assert (scene.render.fps, scene.frame_start, scene.frame_end) == (fps or 90, 1, len(frames))
-        assert count_keys(obj) == len(read_table(tmp_path / "hand-keys.csv")[0])
-        assert set(modes_of(obj, key_frames(obj)[:-1])) == {"motor_spline"}
-
-
-def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp_path):
-    path = tmp_path / "hand.csv"
-    write_csv(path, rate=29.97)
-    assert run(path, "--blend") == 0
-    open_again(tmp_path / "hand-keys.blend")
-    render, keys = bpy.context.scene.render, curves_of(bpy.data.objects["hand"])["location", 0].keyframe_points
-    assert render.fps / render.fps_base == pytest.approx(29.97, rel=1e-6)
-    assert all(key.co.x == round(key.co.x) for key in keys)
-
-
-HEADS = """
-for path, end in ((path, ".npy"), (recording, " imported.npy")):
-    if path.endswith(".blend"):
-        bpy.ops.wm.open_mainfile(filepath=path)
-    else:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        importer = bpy.ops.import_scene.fbx if path.endswith(".fbx") else bpy.ops.import_anim.bvh
-        importer(filepath=path)
-    scene = bpy.context.scene
-    rig = max((obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: len(obj.pose.bones))
-    first, last = (round(frame) for frame in rig.animation_data.action.frame_range)
-    rows = []
-    for frame in range(first, last + 1):
-        scene.frame_set(frame)
-        shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        heads = {bone.name: shown.matrix_world @ bone.head for bone in shown.pose.bones}
-        rows.append([heads[name] for name in sorted(heads)])
-    np.save(found + end, np.array(rows))
-"""
-
-
-def heads_of(made: Path, recording: Path, tmp_path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Where all bones begin (frames, bones, 3): as a file plays, and as Blender itself imports the recording."""
-    on_a_farm(f"recording = {str(recording)!r}\n{HEADS}", made, tmp_path / "heads")
-    return np.load(tmp_path / "heads.npy"), np.load(tmp_path / "heads imported.npy")
-
-
-def hand_made(folder: Path) -> Path:
-    write_body(folder / "body.bvh")
-    return folder / "body.bvh"
-
-
-@pytest.mark.parametrize("options", [(), ("--shared",)])
-@pytest.mark.parametrize(
-    "recording",
-    [
-        hand_made,
-        pytest.param(lambda _: RECORDINGS.parent / "rigs" / "pab_walk.fbx", marks=pytest.mark.recordings, id="walk"),
-    ],
-)
-def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, recording, options):
-    source = recording(tmp_path)
-    assert run(source, "--tolerance", "5mm", "--output", tmp_path / "keyed", *options) == 0
-    made = tmp_path / "keyed" / f"{source.stem}-keys.blend"
-    assert os.listdir(made.parent) == [made.name]
-    shown, imported = heads_of(made, source, tmp_path)
-    assert shown.shape == imported.shape
-    assert 0.0 < np.linalg.norm(shown - imported, axis=-1).max() <= 5e-3 + ROUNDING
-    with extension():
-        open_again(made)
-        (rig,) = bpy.data.objects
-        keyed = [bone for bone in rig.pose.bones if len(key_frames(bone))]
-        assert sum(len(key_frames(bone)) for bone in keyed) < len(keyed) * len(shown)
-        moving = [bone for bone in keyed if len(key_frames(bone)) > 1]
-        assert moving
-        assert {mode for bone in moving for mode in modes_of(bone, key_frames(bone)[:-1])} == {"motor_spline"}
-        assert len(bpy.data.actions) == 1, "the recording has the dense keys, and this file need not"
-
-
-def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
-    write_body(tmp_path / "body.bvh", moves=False)
-    assert run(tmp_path / "body.bvh") == 0
-    assert "nothing of this body moves; left alone" in capsys.readouterr().err
-    assert os.listdir(tmp_path) == ["body.bvh"]
-
-
-def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
-    path = tmp_path / "balloon.csv"
-    times, poses = write_csv(path)
-    sizes = 1.0 + 0.3 * np.sin(times)
-    header, *lines = path.read_text().splitlines()
-    rows = [f"{line},{size!r}" for line, size in zip(lines, sizes.tolist(), strict=True)]
-    path.write_text("\n".join([f"{header},scale", *rows]))
-    assert run(path, "--tolerance", "5mm", "--blend") == 0
-    assert (tmp_path / "balloon-keys.csv").read_text().startswith("t,x,y,z,qw,qx,qy,qz,s\n")
-    worlds = worlds_of(poses)
-    worlds[:, :3, :3] *= sizes[:, None, None]
-    frames = np.arange(1.0, len(times) + 1.0)
-    shown = played_on_a_farm(tmp_path / "balloon-keys.blend", ["balloon"], frames)[1][0]
-    assert displacement(shown, worlds) <= 5e-3 + ROUNDING
-
-
-def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
-    source = hand_made(tmp_path)
-    assert run(f"{source}:LeftHand", "--tolerance", "1cm") == 0
-    assert (tmp_path / "body-LeftHand-keys.csv").is_file()
-    assert run(f"{source}:*", "--tolerance", "1cm", "--output", tmp_path / "all") == 0
-    assert sorted(os.listdir(tmp_path / "all")) == [f"body-{name}-keys.csv" for name in ("Head", "Hips", "LeftHand")]
-
-
-def test_an_object_of_a_blend_file_is_a_recording_where_it_is_named(tmp_path):
-    path = object_file(tmp_path / "shot.blend")
-    assert run(f"{path}:Tool") == 0
-    assert len(read_table(tmp_path / "shot-Tool-keys.csv")[0]) < len(FRAMES) / 3
-
-
-def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, capsys):
-    path = tmp_path / "hand.csv"
-    write_csv(path)
-    header, *lines = path.read_text().splitlines()
-    cells = [line.split(",") for line in lines]
-    path.write_text("\n".join([header, *(",".join([t, f"{float(x) + 1e6!r}", *rest]) for t, x, *rest in cells)]))
-    assert run(path) == 0
-    assert run(path, "--blend", "--overwrite") == 1
-    assert f"{path}: this is up to 1e+06 m from its origin" in capsys.readouterr().err
 
 
 # What is left alone, and how it ends
