@@ -1,4 +1,4 @@
-"""Few keys for what has too many, in .blend files and of recordings, without a window."""
+"""Keep the few keys that a motion needs, in .blend files and of recordings, without a window."""
 
 import sys
 from pathlib import Path

@@ -1,7 +1,8 @@
-"""Few keys for what has too many: in .blend files what Reduce Keys to Poses does in Blender's window, and of recordings
-the few samples that a mode needs as keys.
+"""Keep the few keys that a motion needs, in .blend files and of recordings, without a window.
 
-Nothing is off by more than the tolerance on any frame. What is written is new; the files themselves stay as they are.
+In .blend files the program does what *Reduce Keys to Poses* does in Blender's window, for objects and whole rigs. Of a
+recording it finds the few samples that a mode needs as keys, and writes them as a table or as a .blend file. No point
+is off by more than the tolerance on any frame. The result is a new file; the input stays as it is.
 """
 
 from __future__ import annotations
@@ -53,34 +54,36 @@ examples:
   blender --background --python scripts/reduce.py -- shot.blend
 
 .blend files:
-  Every object, and all bones of a rig together, that has more than two keys of location or rotation gets the keys that
-  the mode needs, and the mode on them. The dense keys stay in the file for Restore Keys, unless --discard leaves them
-  out. Of bones the tolerance holds in the rig's space, through all that they hang on, and feet that stand keep to a
-  quarter of it; where the rig itself has keys, what it is off by comes on top. What needs the keys that it has is left
-  as it is. Without --radius, objects and bones have the size that they are.
+  The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation. It
+  keeps the keys that the mode needs, and sets the mode on them. The dense keys stay in the file, so that Restore Keys
+  brings them back; with --discard they do not. For bones, the tolerance holds in the rig's space, through all parents;
+  if the rig itself has keys, its own error comes on top. Feet that stand on the ground keep to a quarter of the
+  tolerance. An object that needs all of its keys stays as it is. Without --radius, the radius is the size of the object
+  or the length of the bone.
 
 recordings:
-  CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and bodies of .blend files (shot.blend:Camera), as `compare` reads
-  them; FILE:BODY takes one body of several, FILE:* all. A rigid motion becomes a table of its keys, t,x,y,z,qw,qx,qy,qz
-  in the axes and units of the recording, and with --blend a .blend file too, in which axes move by these keys; a whole
-  body becomes a .blend file with a rig. These are in metres and Blender's axes, have the mode on their keys, and play
-  in any Blender, with or without the extension. Frame 1 is the first sample.
+  The program reads what compare.py reads: CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and animated objects and
+  rigs of .blend files (shot.blend:Camera). FILE:BODY takes one body of several, FILE:* all. For a rigid motion it
+  writes a table of the keys, t,x,y,z,qw,qx,qy,qz, in the axes and units of the recording. With --blend it also writes
+  a .blend file in which an empty moves by these keys. For a whole body it writes a .blend file with a rig. These files
+  are in metres and Blender's axes, with the mode on the keys; they play in any Blender, with or without the extension.
+  The first sample is on frame 1.
 
 what is written:
-  NAME-reduced.blend of a .blend file, NAME-keys.csv and NAME-keys.blend of a recording, beside it or in --output. A
-  file takes its place when it is whole. One that is there already is left alone without --overwrite. With --in-place
-  a .blend file itself is replaced, and the one before kept as NAME.blend1. What was written is printed on the standard
-  output at the end, a path a line; everything else is on the standard error: of each object and rig how many keys it
-  had and has, and the largest error.
+  NAME-reduced.blend for a .blend file, NAME-keys.csv and NAME-keys.blend for a recording, beside it or in --output. A
+  file is moved into place when it is complete, and replaces an existing one only with --overwrite. With --in-place the
+  program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were
+  written are printed on standard output, one a line. Everything else goes to standard error: for each object and rig
+  the number of keys before and after, and the largest error.
 
 what is run:
-  Nothing of the files: scripts and Python expressions in them stay switched off, and stay in them.
+  Nothing in the files: scripts and Python expressions stay in them, switched off.
 
 exit code:
   0    all done, or nothing to do
   1    some objects, bones or files could not be done, and are named with the reason. The others are done.
   2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM: the files that were written by then are whole, nothing else was touched
+  130  stopped by Ctrl-C, and 143 by SIGTERM: the files written by then are complete, nothing else was changed
 """
 
 
@@ -92,34 +95,36 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         epilog=as_called(EPILOG, SCRIPT),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="+", metavar="INPUT", help=".blend files, and recordings")
+    parser.add_argument("inputs", nargs="+", metavar="INPUT", help=".blend files and recordings")
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")
     keys.add_argument(
         "--tolerance",
         type=_tolerance,
         metavar="LENGTH",
-        help="how far off anything may be on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file "
-        f"(in .blend files 1mm, and {OF_A_RIG:.1%}% of the size of a rig; of recordings {TOLERANCE.written})",
+        help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
+        f"files 1mm for objects and {OF_A_RIG:.1%}% of the size of a rig; for recordings {TOLERANCE.written})",
     )
-    keys.add_argument("--mode", choices=KEYFRAME_MODES, default=MODE, help="what fills in between them (%(default)s)")
+    keys.add_argument("--mode", choices=KEYFRAME_MODES, default=MODE, help="mode between the keys (%(default)s)")
     keys.add_argument(
         "--radius",
         type=_radius,
         metavar="M",
-        help="in metres, how far out from its origin nothing of a thing may be off by more (in .blend files and of "
-        f"bones its own size, of rigid recordings {RIGID})",
+        help="metres around the origin within which no point is off by more (the size of an object, the length of a "
+        f"bone; for rigid recordings {RIGID})",
     )
     keys.add_argument(
-        "--shared", action="store_true", help="key poses: all bones of a rig have their keys on the same frames"
+        "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
     )
     keys.add_argument(
-        "--discard", action="store_true", help="leave the dense keys out of what is written: no Restore Keys there"
+        "--discard",
+        action="store_true",
+        help="leave the dense keys out of the file, which then has no Restore Keys",
     )
     recordings = parser.add_argument_group("recordings")
-    recordings.add_argument("--blend", action="store_true", help="write rigid motions as .blend files, too")
+    recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
     recordings.add_argument(
-        "--fps", type=_fps, metavar="N", help="frames a second of .blend files (those of the recording)"
+        "--fps", type=_fps, metavar="N", help="frames a second of .blend files (the rate of the recording)"
     )
     recordings.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
     add_reading_options(parser)

@@ -96,7 +96,7 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float) -> str:
     told += off(tolerance, reduction.largest_error * unit, unit)
     if rig and rig.slide_before > 0.0:
         before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
-        told += f"; feet slide {after} where they slid {before}"
+        told += f"; feet slide {after}, and {before} before"
     return told
 
 
