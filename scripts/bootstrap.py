@@ -12,6 +12,7 @@
     python scripts/bootstrap.py openjd run template.json    such a job, on this machine
     python scripts/bootstrap.py benchmark
     python scripts/bootstrap.py build                       dist/rigid_motion-VERSION.zip, the extension to install
+    python scripts/bootstrap.py docs                        dist/site, the documentation as pages for a browser
 
 The packages go into .venv/ of this checkout; the first run downloads about 400 MB. What is behind the command goes to
 it: `python scripts/bootstrap.py compare --help` shows the options of compare.
@@ -35,7 +36,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
-    "test": (["-m", "pytest"], ("test", "farm")),
+    "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
@@ -43,6 +44,7 @@ COMMANDS = {
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
+    "docs": ([ROOT / "scripts" / "build_site.py"], ("test", "docs")),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 
