@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 ASSETS = Path(__file__).resolve().parent
-sys.path.insert(0, str(ASSETS.parent))
+sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
-from assets.making.motions import MOTIONS
-from assets.making.tracking import tick, track
+from rigid_motion_batch.making.motions import MOTIONS
+from rigid_motion_batch.making.tracking import tick, track
 
 SEED = 2021
 HEADER = "t,x,y,z,qx,qy,qz,qw"
@@ -65,7 +65,7 @@ def main(arguments: list[str] | None = None) -> None:
     if bpy.app.version[:2] != MODELS_BLENDER:
         print(f"models.blend is left as it is: older versions cannot open what {bpy.app.version_string} writes")
         return
-    from assets.making.library import write_models
+    from rigid_motion_batch.making.library import write_models
 
     write(output / "models.blend", write_models)
 

@@ -11,13 +11,13 @@ from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
-sys.path[:0] = [str(ROOT), str(DOCS)]
+sys.path[:0] = [str(ROOT / "addon"), str(ROOT / "scripts"), str(DOCS)]
 
-_project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+_manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 project = "Rigid Motion"
-author = "the authors of Rigid Motion"
-version = release = _project["version"]
+author = _manifest["maintainer"]
+version = release = _manifest["version"]
 
 extensions = [
     "myst_parser",
@@ -35,7 +35,10 @@ extensions = [
 templates_path = ["templates"]
 exclude_patterns = ["**/__pycache__", "extensions", "templates"]
 nitpicky = True
-nitpick_ignore_regex = [("py:.*", r"(collections|numpy|typing)\..*"), ("py:class", r"addon\.motion\.segments\..*")]
+nitpick_ignore_regex = [
+    ("py:.*", r"(collections|numpy|typing)\..*"),
+    ("py:class", r"rigid_motion\.motion\.segments\..*"),
+]
 """What other people's documentation has, where a link would be none without a network, and what no caller needs."""
 
 myst_enable_extensions = ["attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]

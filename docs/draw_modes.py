@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from addon.motion import MODES, Poses, interpolate
-from scripts.comparison.palette import THEMES, colour_of, colour_on
-from scripts.comparison.report.markup import Markup, element
-from scripts.files import write_text
+from rigid_motion.motion import MODES, Poses, interpolate
+from rigid_motion_batch.comparison.palette import THEMES, colour_of, colour_on
+from rigid_motion_batch.comparison.report.markup import Markup, element
+from rigid_motion_batch.files import write_text
 
 TIMES = np.array((0.0, 1.0, 2.0))
 POINTS = np.array(((0.0, 0.0), (1.0, 0.35), (2.0, 0.0)))
@@ -86,7 +86,9 @@ def path_of(mode: str) -> list[Markup]:
     """The way of the body's middle, and the body at even times, thick on the keys."""
     way = interpolate(TIMES, keys(), moments(FINE), mode)
     bodies = interpolate(TIMES, keys(), moments(STEPS), mode)
-    dots = [element("circle", cx=x, cy=y, r=2.5, class_="dot") for x, y in _on_paper(bodies.positions).round(1).tolist()]
+    dots = [
+        element("circle", cx=x, cy=y, r=2.5, class_="dot") for x, y in _on_paper(bodies.positions).round(1).tolist()
+    ]
     return [
         element("path", d=bars(bodies), class_="mode body"),
         element("path", d=polyline(_on_paper(way.positions)), class_="mode path"),

@@ -12,11 +12,11 @@ from unittest import mock
 import numpy as np
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from addon.motion import Poses, curves, interpolate
-from scripts.comparison.report.markup import Markup, element
-from scripts.files import write_text
+from rigid_motion.motion import Poses, curves, interpolate
+from rigid_motion_batch.comparison.report.markup import Markup, element
+from rigid_motion_batch.files import write_text
 
 FRAMES = np.array((1.0, 13.0, 14.0, 26.0, 38.0))
 POINTS = np.array(((0.0, 0.0), (0.25, 0.16), (0.5, 0.2), (0.75, 0.16), (1.0, 0.0)))

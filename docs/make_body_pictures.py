@@ -16,18 +16,18 @@ import bpy
 import numpy as np
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from addon import animation
-from scripts import compare
-from scripts.comparison.report.body_charts import heat_map_alone
-from scripts.comparison.stage.film import render_still
-from scripts.comparison.stage.materials import surface
-from scripts.comparison.study.bodies import reconstruct_body
-from scripts.comparison.study.body_metrics import measure_modes
-from scripts.comparison.study.choices import Uniform
-from scripts.comparison.study.radii import JOINT
-from scripts.comparison.study.reading import read_clips
+from rigid_motion import animation
+from rigid_motion_batch import compare
+from rigid_motion_batch.comparison.report.body_charts import heat_map_alone
+from rigid_motion_batch.comparison.stage.film import render_still
+from rigid_motion_batch.comparison.stage.materials import surface
+from rigid_motion_batch.comparison.study.bodies import reconstruct_body
+from rigid_motion_batch.comparison.study.body_metrics import measure_modes
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.radii import JOINT
+from rigid_motion_batch.comparison.study.reading import read_clips
 from tests.rigs import dancer, figure
 
 RATE, MODES = "4", ("lerp_slerp", "dq_sclerp", "motor_spline")

@@ -17,16 +17,16 @@ import numpy as np
 from mathutils import Euler, Vector
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from addon import animation
-from addon.animation import write_channel
-from scripts.comparison import palette
-from scripts.comparison.stage import captions
-from scripts.comparison.stage.film import render_film, render_still
-from scripts.comparison.stage.materials import ink, surface
-from scripts.comparison.stage.scene import make_lights, set_up_render
-from scripts.comparison.stage.settings import StageSettings
+from rigid_motion import animation
+from rigid_motion.animation import write_channel
+from rigid_motion_batch.comparison import palette
+from rigid_motion_batch.comparison.stage import captions
+from rigid_motion_batch.comparison.stage.film import render_film, render_still
+from rigid_motion_batch.comparison.stage.materials import ink, surface
+from rigid_motion_batch.comparison.stage.scene import make_lights, set_up_render
+from rigid_motion_batch.comparison.stage.settings import StageSettings
 from tests.rigs import dancer, figure
 
 SETTINGS = StageSettings(resolution=(960, 540), antialiasing="5", fps=dancer.FPS)

@@ -2,8 +2,8 @@
 
 python docs/make_mode_loops.py [MODE ...]
 
-A hammer is swung about the end of its handle, flies off, growing, and comes back to where it began, so that the film has no
-end. It writes MODE.mp4, and MODE.png in the middle of the swing, into docs/modes/.
+A hammer is swung about the end of its handle, flies off, growing, and comes back to where it began, so that the film
+has no end. It writes MODE.mp4, and MODE.png in the middle of the swing, into docs/modes/.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ import numpy as np
 from mathutils import Quaternion, Vector
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from addon import animation
-from addon.animation.inbetweens.differences import in_betweens
-from addon.animation.inbetweens.mode_keys import source_of
-from addon.motion import MODES, Poses, interpolate
-from addon.motion.quaternions import align_signs, rotate
-from scripts.comparison import palette
-from scripts.comparison.stage import captions
-from scripts.comparison.stage.film import render_film, render_still
-from scripts.comparison.stage.materials import ink, surface
-from scripts.comparison.stage.scene import make_lights, set_up_render
-from scripts.comparison.stage.settings import StageSettings
+from rigid_motion import animation
+from rigid_motion.animation.inbetweens.differences import in_betweens
+from rigid_motion.animation.inbetweens.mode_keys import source_of
+from rigid_motion.motion import MODES, Poses, interpolate
+from rigid_motion.motion.quaternions import align_signs, rotate
+from rigid_motion_batch.comparison import palette
+from rigid_motion_batch.comparison.stage import captions
+from rigid_motion_batch.comparison.stage.film import render_film, render_still
+from rigid_motion_batch.comparison.stage.materials import ink, surface
+from rigid_motion_batch.comparison.stage.scene import make_lights, set_up_render
+from rigid_motion_batch.comparison.stage.settings import StageSettings
 from tests.rigs import figure
 
 SETTINGS = StageSettings(resolution=(960, 540), antialiasing="5", fps=24)
@@ -117,7 +117,11 @@ def make_camera(scene: bpy.types.Scene) -> None:
 
 def hammer(name: str, material: bpy.types.Material) -> bpy.types.Object:
     """A hammer with its origin in the head."""
-    parts = ((0.0, 0.0, -0.4), (0.09, 0.09, 0.86)), ((0.02, 0.0, 0.04), (0.46, 0.2, 0.2)), ((-0.24, 0.0, 0.04), (0.1,) * 3)
+    parts = (
+        ((0.0, 0.0, -0.4), (0.09, 0.09, 0.86)),
+        ((0.02, 0.0, 0.04), (0.46, 0.2, 0.2)),
+        ((-0.24, 0.0, 0.04), (0.1,) * 3),
+    )
     tool = figure.boxes(name, material, *parts)
     tool.rotation_mode = "QUATERNION"
     return tool
@@ -144,8 +148,8 @@ def key(obj: bpy.types.Object) -> None:
 def by_mode(keyed: bpy.types.Object, mode: str) -> Poses:
     """The poses on all frames by a mode, at the times that the keys of an object ask for.
 
-    Modes for streams are none of Blender's, so all are asked in the same way: how far along a segment the body is, is the
-    share of the straight way that Vector + Quaternion has gone.
+    Modes for streams are none of Blender's, so all are asked in the same way: how far along a segment the body is, is
+    the share of the straight way that Vector + Quaternion has gone.
     """
     keys = key_poses()
     straight = in_betweens(source_of(keyed), FRAMES, "lerp_slerp").wanted.positions

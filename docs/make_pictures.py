@@ -15,14 +15,14 @@ from pathlib import Path
 import bpy
 
 DOCS = Path(__file__).resolve().parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
-from addon.motion import KEYFRAME_MODES
-from scripts import compare
-from scripts.comparison.stage.scene import StageSettings, build_stage
-from scripts.comparison.study.choices import Uniform
-from scripts.comparison.study.reading import read_clips
-from scripts.comparison.study.reconstructions import reconstruct
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch import compare
+from rigid_motion_batch.comparison.stage.scene import StageSettings, build_stage
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
 
 SMOOTH = ("lerp_slerp", "dq_sclerp", "motor_spline")
 

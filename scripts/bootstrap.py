@@ -7,6 +7,7 @@
     python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
     python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
     python scripts/bootstrap.py stream --help               a recording over a network, in real time
+    python scripts/bootstrap.py tasks list renders/hand     the tasks of a comparison, and what is done of them
     python scripts/bootstrap.py dask scheduler              many machines: Dask's own commands
     python scripts/bootstrap.py bundle hand.csv             a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    such a job, on this machine
@@ -37,14 +38,15 @@ COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
     "test": (["-m", "pytest"], ("test", "farm", "docs")),
-    "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("test",)),
+    "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
+    "tasks": (["-m", "rigid_motion_batch.workplan"], ()),
     "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
-    "docs": ([ROOT / "scripts" / "build_site.py"], ("test", "docs")),
+    "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 
@@ -74,10 +76,12 @@ def main(arguments: list[str]) -> int:
     python = install(blender, _requirements(project, blender, extras))
     if python is None or not _blender_starts(python):
         return 1
-    # Paths that a user gives count from where the user is; those of pytest from where its configuration is. Dask has to
-    # find this program as well.
-    folder = ROOT if command in ("test", "dask") else None
-    return subprocess.call([python, *run, *rest], cwd=folder, env=environment(os.environ))
+    # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
+    folder = ROOT if command == "test" else None
+    variables = environment(os.environ)
+    if command in ("dask", "tasks"):
+        variables["PYTHONPATH"] = os.pathsep.join([str(ROOT / "scripts"), *filter(None, [variables.get("PYTHONPATH")])])
+    return subprocess.call([python, *run, *rest], cwd=folder, env=variables)
 
 
 def environment(environ: Mapping[str, str]) -> dict[str, str]:
@@ -121,17 +125,17 @@ def _project() -> dict:
 
 def _requirements(project: dict, blender: str, extras: tuple[str, ...]) -> list[str]:
     """The pinned packages of pyproject.toml, with this Blender."""
-    listed = [r for r in project["project"]["dependencies"] if not r.startswith("bpy==")]
+    listed = [f"bpy=={blender}", f"numpy=={project['tool']['rigid-motion']['numpy'][PYTHON]}"]
     for extra in extras:
         listed += project["project"]["optional-dependencies"][extra]
-    return [f"bpy=={blender}", *listed]
+    return listed
 
 
 def _blender_starts(python: Path) -> bool:
     tried = subprocess.run([str(python), "-c", "import bpy"], capture_output=True, text=True)
     if tried.returncode != 0:
-        sys.path.insert(0, str(ROOT))
-        from scripts.system_libraries import way_out
+        sys.path.insert(0, str(ROOT / "scripts"))
+        from rigid_motion_batch.system_libraries import way_out
 
         last_words = (tried.stderr.strip() or "import bpy failed").splitlines()[-1]
         _fail(f"{last_words}\n{way_out(last_words)}")

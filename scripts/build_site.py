@@ -24,7 +24,7 @@ examples:
   python scripts/bootstrap.py docs
   python scripts/bootstrap.py docs --output ~/rigid-motion-site
 
-A site that is there already is replaced, once the new one is whole; the last line printed is the path of its index.html.
+A site that is there already is replaced, once the new one is whole; the last line printed is the path of index.html.
 Another folder that is there and not empty is left alone.
 Exit code: 0 done, 1 Sphinx warned of something, 2 it could not be built.
 """
@@ -55,7 +55,17 @@ def build(folder: Path) -> Path:
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as beside:
         built, kept = Path(beside) / "site", Path(beside) / "before"
         pages = stage(Path(beside) / "checkout")
-        options = ["-q", "-W", "--keep-going", "-b", "html", "-c", str(ROOT / "docs"), "-d", str(Path(beside) / "known")]
+        options = [
+            "-q",
+            "-W",
+            "--keep-going",
+            "-b",
+            "html",
+            "-c",
+            str(ROOT / "docs"),
+            "-d",
+            str(Path(beside) / "known"),
+        ]
         subprocess.run([sys.executable, "-m", "sphinx", *options, str(pages), str(built)], check=True)
         if folder.exists():
             folder.rename(kept)
@@ -64,7 +74,7 @@ def build(folder: Path) -> Path:
 
 
 def stage(folder: Path) -> Path:
-    """Copy all that pages are made of, and return the copy of docs/: Sphinx writes a page for each public name into it."""
+    """Copy all that pages are made of, and return the copy of docs/: Sphinx adds a page for each public name to it."""
     pages = folder / "docs"
     shutil.copytree(ROOT / "docs", pages, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     for name in BESIDE:

@@ -13,12 +13,16 @@ from pathlib import Path
 import bpy
 import pytest
 
-from scripts.build_extension import build
-from scripts.workplan.processes import processors
+from rigid_motion_batch.build_extension import build
+from rigid_motion_batch.workplan.processes import processors
 from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
 from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.rigs import human as rigify
+
+ROOT = Path(__file__).resolve().parents[1]
+os.environ["PYTHONPATH"] = os.pathsep.join(str(ROOT / folder) for folder in ("", "addon", "scripts"))
+"""Processes that tests start find what the tests find; pytest has put these on the path of its own alone."""
 
 EVERY_TEST = "RIGID_MOTION_EVERY_TEST"
 

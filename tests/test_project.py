@@ -13,8 +13,11 @@ from pathlib import Path
 
 import bpy
 import pytest
+from hatchling.metadata.core import ProjectMetadata
+from hatchling.plugin.manager import PluginManager
 
 ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "addon" / "rigid_motion"
 SOURCES = sorted(path for folder in ("addon", "assets", "scripts") for path in (ROOT / folder).rglob("*.py"))
 
 BLENDER = {"bpy", "bpy_extras", "mathutils"}
@@ -45,7 +48,7 @@ def test_style(command):
 
 def test_the_extension_is_valid_for_blender(tmp_path):
     package = tmp_path / "rigid_motion"
-    shutil.copytree(ROOT / "addon", package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "blender_manifest.toml", package)
     tool = Path(bpy.utils.system_resource("SCRIPTS")) / "addons_core/bl_pkg/cli/blender_ext.py"
     done = subprocess.run([sys.executable, str(tool), "validate", str(package)], capture_output=True, text=True)
@@ -54,17 +57,16 @@ def test_the_extension_is_valid_for_blender(tmp_path):
 
 def test_one_version_everywhere():
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert manifest["version"] == project["project"]["version"]
+    assert ProjectMetadata(str(ROOT), PluginManager()).version == manifest["version"]
     assert f"## {manifest['version']}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("floor", FLOORS)
 def test_the_extension_imports_downwards_and_nothing_else(floor):
     below = set(itertools.takewhile(lambda name: name != floor, FLOORS))
-    for path in (ROOT / "addon" / floor).rglob("*.py"):
+    for path in (PACKAGE / floor).rglob("*.py"):
         # So many dots are the floor itself; one more leads out of it.
-        depth = len(path.relative_to(ROOT / "addon" / floor).parts)
+        depth = len(path.relative_to(PACKAGE / floor).parts)
         for name in imported(path):
             known = name in FLOORS[floor] or name in sys.stdlib_module_names
             dots = len(name) - len(name.lstrip("."))
@@ -75,7 +77,7 @@ def test_the_extension_imports_downwards_and_nothing_else(floor):
 
 def test_the_extension_has_no_way_to_the_network_or_to_a_shell():
     forbidden = {"socket", "http", "urllib", "requests", "subprocess", "ctypes", "pickle", "shelve", "marshal"}
-    for path in (ROOT / "addon").rglob("*.py"):
+    for path in PACKAGE.rglob("*.py"):
         assert not imported(path) & forbidden, path
         assert not re.search(r"\b(eval|exec|__import__)\(|sys\.path", path.read_text(encoding="utf-8")), path
 

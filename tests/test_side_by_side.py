@@ -11,8 +11,6 @@ import pytest
 
 from tests.conftest import EVERY_TEST
 
-ROOT = Path(__file__).resolve().parents[1]
-
 SOUND = "def test_sound(): pass"
 SKIPPED = "import pytest\ndef test_skipped(): pytest.skip()"
 CRASHED = "import ctypes\ndef test_crashed(): ctypes.string_at(0)"
@@ -32,7 +30,7 @@ def run(folder: Path, files: dict[str, str], *options: str) -> subprocess.Comple
     # Nothing of these asserts, so no module has to be made ready for that.
     options = ("-p", "no:cacheprovider", "--assert", "plain", *options)
     command = [sys.executable, "-m", "pytest", "--rootdir", folder, *options, folder]
-    environment = os.environ | {EVERY_TEST: "1", "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {EVERY_TEST: "1"}
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
 
 

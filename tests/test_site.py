@@ -1,4 +1,4 @@
-"""The documentation site: it builds without a warning, is complete in itself, and opens from a folder without a network."""
+"""The documentation site: it builds without a warning, is complete in itself, and opens without a network."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from addon import motion
-from scripts import bootstrap, build_site
+from rigid_motion import motion
+from rigid_motion_batch.commands import COMMANDS
+from scripts import build_site
 
 LOADED = {
     ("audio", "src"),
@@ -128,14 +129,15 @@ def test_every_mode_has_its_film_its_picture_its_formula_and_what_the_table_says
     assert place in conventions.anchors
     for page in (loops, details):
         assert motion.MODES[mode].label in page.text
-        assert motion.MODES[mode].description in page.text.replace("’", "'")
+        assert motion.MODES[mode].description in page.text.replace("\N{RIGHT SINGLE QUOTATION MARK}", "'")
 
 
-def test_every_script_that_the_bootstrap_runs_says_its_options(site, pages):
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_says_its_options(command, site, pages):
     page = pages[site / "commands.html"]
-    for command, ((script, *_), _) in bootstrap.COMMANDS.items():
-        if isinstance(script, Path):
-            assert f"{script.stem}-help" in page.anchors, command
+    module = COMMANDS[command].module.removesuffix(".__main__")
+    assert f"{module}-help" in page.anchors
+    assert f"bootstrap.py {command}" in page.text
 
 
 def test_films_play_by_themselves_without_a_sound(pages):
@@ -173,7 +175,10 @@ def test_what_sphinx_warns_of_is_an_error_and_the_site_before_stays(tmp_path, mo
     monkeypatch.setattr(build_site, "stage", with_a_broken_link)
     assert build_site.main(["--output", str(before)]) == 1
     assert "missing.md" in capfd.readouterr().err
-    assert {path.name: path.read_text() for path in before.iterdir()} == {"index.html": "before", ".buildinfo": "before"}
+    assert {path.name: path.read_text() for path in before.iterdir()} == {
+        "index.html": "before",
+        ".buildinfo": "before",
+    }
     assert list(tmp_path.iterdir()) == [before]
 
 

@@ -1,4 +1,4 @@
-"""The directive `command`: what a script says of itself and of its options when it is asked for --help."""
+"""The directive `command`: what a command says of itself and of its options when it is asked for --help."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import textwrap
 from pathlib import Path
 
 from docutils import nodes
-from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
@@ -23,18 +22,18 @@ TITLE = re.compile(r"(?m)^(\w[\w ,-]*):\n(?=  )")
 
 
 class Command(SphinxDirective):
-    """A script of this checkout, or one of its subcommands: `{command} scripts/stream.py send`."""
+    """A script or a package of this checkout, or one of its subcommands: `{command} scripts/stream.py send`."""
 
     required_arguments = 1
     final_argument_whitespace = True
-    option_spec = {"anchor": directives.unchanged}  # noqa: RUF012 - as docutils has it
 
     def run(self) -> list[nodes.Node]:
-        script, *subcommands = self.arguments[0].split()
-        path = Path(self.config.root_of_project) / script
-        self.env.note_dependency(str(path))
-        told = help_of(path, *subcommands)
-        name = "-".join([path.stem, *subcommands])
+        asked, *subcommands = self.arguments[0].split()
+        root = Path(self.config.root_of_project)
+        if asked.endswith(".py"):
+            self.env.note_dependency(str(root / asked))
+        told = help_of(root, asked, *subcommands)
+        name = "-".join([re.split(r"[./]", asked.removesuffix(".py"))[-1], *subcommands])
         usage = re.sub(r"\n\s+", "\n    ", told["usage"])
         found = [*prose(told["description"]), nodes.literal_block(usage, usage, language="text")]
         for group in told["groups"]:
@@ -48,13 +47,13 @@ def setup(app: Sphinx) -> dict[str, bool]:
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def help_of(script: Path, *subcommands: str) -> dict:
-    """What `help_of.py` finds out about a script."""
-    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1"}
-    run = [sys.executable, str(READER), str(script), *subcommands]
+def help_of(root: Path, asked: str, *subcommands: str) -> dict:
+    """What `help_of.py` finds out about a script or a package of the checkout at `root`."""
+    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONPATH": str(root / "scripts")}
+    run = [sys.executable, str(READER), str(root / asked) if asked.endswith(".py") else asked, *subcommands]
     done = subprocess.run(run, capture_output=True, text=True, encoding="utf-8", env=environment)
     if done.returncode != 0:
-        raise ExtensionError(f"{script.name} has no help to give:\n{done.stderr}")
+        raise ExtensionError(f"{asked} has no help to give:\n{done.stderr}")
     return json.loads(done.stdout.splitlines()[-1])  # Blender may have had something to say before.
 
 

@@ -1,4 +1,4 @@
-"""What a script says of its options, as JSON: `python help_of.py SCRIPT [SUBCOMMAND]` runs it as if for --help.
+"""What a script or a package says of its options, as JSON: `python help_of.py NAME [SUBCOMMAND]` asks it for --help.
 
 So the reference of commands has what they have, without a copy of it that could be wrong.
 """
@@ -13,12 +13,15 @@ import sys
 from pathlib import Path
 
 
-def main(script: str, *subcommands: str) -> None:
+def main(name: str, *subcommands: str) -> None:
     """Print the description of the parser that answers to --help."""
     argparse.ArgumentParser.print_help = print_description
-    sys.argv = [Path(script).name, *subcommands, "--help"]
-    sys.path[0] = str(Path(script).parent)
-    runpy.run_path(script, run_name="__main__")
+    sys.argv = [Path(name).name, *subcommands, "--help"]
+    if name.endswith(".py"):
+        sys.path[0] = str(Path(name).parent)
+        runpy.run_path(name, run_name="__main__")
+    else:
+        runpy.run_module(name, run_name="__main__")
 
 
 def print_description(parser: argparse.ArgumentParser, file: object = None) -> None:

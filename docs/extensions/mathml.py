@@ -28,7 +28,9 @@ def display(translator: nodes.NodeVisitor, node: nodes.math_block) -> None:
     text = node.astext()
     # Several lines that end in \\ are aligned, as in LaTeX; of a single one docutils wants no environment.
     if r"\\" in text and r"\begin" not in text:
-        text = wrap_displaymath(text, None, False).replace(r"\begin{equation}", "").replace(r"\end{equation}", "").strip()
+        text = (
+            wrap_displaymath(text, None, False).replace(r"\begin{equation}", "").replace(r"\end{equation}", "").strip()
+        )
     number = ""
     if node["number"]:
         number = f'<span class="eqno">({get_node_equation_number(translator, node)})</span>'

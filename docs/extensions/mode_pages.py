@@ -1,6 +1,6 @@
 """Directives for the interpolation modes, all made from the table `MODES`: what is said of a mode stands there.
 
-`mode-loops` shows each mode as a film, `mode-details` says what a program needs to know of it, and `mode-table` lists them.
+`mode-loops` shows each mode as a film, `mode-details` says what programs need to know of it, `mode-table` lists them.
 """
 
 from __future__ import annotations
@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from addon.motion import MODES, Mode, Poses, interpolate, shell_error
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
+
+from rigid_motion.motion import MODES, Mode, Poses, interpolate, shell_error
 
 from .videos import make_video
 
@@ -92,7 +93,7 @@ def anchor(mode: str) -> str:
 
 
 def same_motions(modes: Iterable[str]) -> dict[str, list[str]]:
-    """Of each mode those that are the same motion for bodies that keep their size, found out on keys drawn at random."""
+    """Of each mode those that are the same motion for bodies that keep their size, on keys drawn at random."""
     draw = np.random.default_rng(0)
     keys = Poses(draw.normal(size=(8, 3)), draw.normal(size=(8, 4)))
     times = np.linspace(0.0, 7.0, 141)

@@ -1,6 +1,6 @@
 """Docstrings as they are written for people who read the source.
 
-`names` in single backquotes are code, and links where they name what the site documents; bars are the length of a vector.
+`names` in single backquotes are code, and links where they name what the site documents; bars are lengths of vectors.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.roles import XRefRole
-
 
 CODE = re.compile(r"(`[^`]*`)")
 

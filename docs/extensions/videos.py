@@ -1,7 +1,7 @@
 """Films in pages, which show pictures where they are read as files: on the site the pictures move.
 
-A PNG beside which there is an MP4 of the same name becomes that film, with itself as the poster; so does a picture that is a
-link to any film. Other links to films stay links, and the film comes after their paragraph.
+A PNG beside which there is an MP4 of the same name becomes that film, with itself as the poster; so does a picture that
+is a link to any film. Other links to films stay links, and the film comes after their paragraph.
 """
 
 from __future__ import annotations
@@ -14,8 +14,11 @@ from sphinx.application import Sphinx
 from sphinx.util.osutil import relative_uri
 
 
-class video(nodes.General, nodes.Element):  # noqa: N801 - docutils looks for visit_video and depart_video
-    """A film: `film` and `poster` are paths in docs/, the poster may be empty, `label` is what it shows."""
+class video(nodes.General, nodes.Element):
+    """A film: `film` and `poster` are paths in docs/, the poster may be empty, `label` is what it shows.
+
+    In lower case as docutils' own nodes.
+    """
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -7,7 +7,7 @@ import logging
 import bpy
 import pytest
 
-from addon import animation
+from rigid_motion import animation
 from tests.complaints import complaints
 
 

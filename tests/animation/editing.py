@@ -13,7 +13,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from addon import animation
+from rigid_motion import animation
 from tests.animation.edit_steps import Complaints, Edit
 from tests.animation.oracle import (
     MODE_IDS,
@@ -95,7 +95,7 @@ class Editing(RuleBasedStateMachine):
         animation.register()
         self.on = True
         self.complaints = Complaints()
-        logging.getLogger("addon.animation").addHandler(self.complaints)
+        logging.getLogger("rigid_motion.animation").addHandler(self.complaints)
         self.folder = tempfile.TemporaryDirectory()
         self.names: list[Name] = []
         self.owns: dict[Name, Own] = {}
@@ -109,7 +109,7 @@ class Editing(RuleBasedStateMachine):
         if self.on:
             animation.unregister()
         bpy.utils.unregister_class(Edit)
-        logging.getLogger("addon.animation").removeHandler(self.complaints)
+        logging.getLogger("rigid_motion.animation").removeHandler(self.complaints)
         self.folder.cleanup()
 
     # What machines say of their carriers

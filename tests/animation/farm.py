@@ -16,7 +16,7 @@ import numpy as np
 path, found, *names = sys.argv[1:]
 bpy.ops.wm.read_factory_settings(use_empty=True)
 bpy.ops.wm.open_mainfile(filepath=path)
-assert not hasattr(bpy.types.Object, "rigid_motion") and "addon" not in sys.modules
+assert not hasattr(bpy.types.Object, "rigid_motion") and "rigid_motion" not in sys.modules
 graph, scene = bpy.context.evaluated_depsgraph_get(), bpy.context.scene
 worlds = lambda: [bpy.data.objects[name].evaluated_get(graph).matrix_world for name in names]
 opened = np.array(worlds())

@@ -1,7 +1,7 @@
-"""Where objects have to be, worked out apart from `addon.animation`, and where Blender shows them.
+"""Where objects have to be, worked out apart from `rigid_motion.animation`, and where Blender shows them.
 
-`expected_bases` asks Blender's own `FCurve.evaluate` for keys and timing and `addon.motion.interpolate` for the motion
-of each segment. Nothing here looks at delta transforms in the file: the ones an object has of its own are given.
+`expected_bases` asks Blender's own `FCurve.evaluate` for keys and timing and `interpolate` for the motion of
+each segment. Nothing here looks at delta transforms in the file: the ones an object has of its own are given.
 Matrices are (m, 4, 4), frames are the scene's.
 """
 
@@ -16,8 +16,8 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Euler, Quaternion
 
-from addon.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate
-from addon.motion.quaternions import multiply, normalise
+from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate
+from rigid_motion.motion.quaternions import multiply, normalise
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
 """What has location, rotation and scale. Pose bones have no delta transforms of their own."""

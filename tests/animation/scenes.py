@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from addon.animation import write_channel
+from rigid_motion.animation import write_channel
 from tests.animation.oracle import WIDTHS, Own, as_quaternion, rotation_path, unit
 
 FRAMES = (1.0, 11.0, 24.0, 40.0)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from addon.animation import bake, bake_poses, read_poses, set_mode, write_channel
-from addon.motion import KEYFRAME_MODES, Poses, interpolate
-from addon.motion.eulers import ORDERS
-from addon.motion.quaternions import angle_between, multiply, rotate
+from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, write_channel
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion.eulers import ORDERS
+from rigid_motion.motion.quaternions import angle_between, multiply, rotate
 from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds
 from tests.animation.scenes import FRAMES, key, new_object
 

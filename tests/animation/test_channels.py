@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import modes_of, problem_of, refresh, set_mode, write_channel
-from addon.motion import KEYFRAME_MODES
+from rigid_motion.animation import modes_of, problem_of, refresh, set_mode, write_channel
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, curves_of, key_frames, rotation_path, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas, random_values
 

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import set_mode, write_channel
-from addon.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.animation import set_mode, write_channel
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.oracle import (
     curves_of,
     expected_bases,

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import bpy
 import pytest
 
-from addon.animation import key_frames, set_mode
+from rigid_motion.animation import key_frames, set_mode
 from tests.animation.oracle import curves_of, shown_worlds
 from tests.animation.scenes import key, new_object
 

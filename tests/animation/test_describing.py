@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import refresh, set_enabled, set_mode, write_channel
-from addon.animation.inbetweens.describing import frame_in_action, is_up_to_date, segment_at
-from addon.animation.inbetweens.mode_keys import source_of
+from rigid_motion.animation import refresh, set_enabled, set_mode, write_channel
+from rigid_motion.animation.inbetweens.describing import frame_in_action, is_up_to_date, segment_at
+from rigid_motion.animation.inbetweens.mode_keys import source_of
 from tests.animation.scenes import new_object
 
 FRAMES = np.array((1.0, 11.0, 31.0))

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import modes_of, problem_of, refresh, set_mode
+from rigid_motion import animation
+from rigid_motion.animation import modes_of, problem_of, refresh, set_mode
 from tests.animation.oracle import Own, assert_shown, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 

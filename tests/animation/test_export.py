@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import refresh, set_mode
-from addon.motion import KEYFRAME_MODES
+from rigid_motion.animation import refresh, set_mode
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, expected_worlds, matrices, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from addon.animation import problem_of, refresh, set_mode
+from rigid_motion.animation import problem_of, refresh, set_mode
 from tests.animation.oracle import curves_of, snapshot
 from tests.animation.scenes import key, new_object
 

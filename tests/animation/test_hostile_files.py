@@ -16,8 +16,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
+from rigid_motion import animation
+from rigid_motion.animation import MODE_IDS, channelbag_of, modes_of, problem_of, set_mode
 from tests.animation.oracle import WIDTHS, assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, key, new_object
 from tests.blank import blank

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
-from addon.animation import key_frames, set_mode
-from addon.animation.inbetweens.known_sources import MOST_BYTES, known, size_of
+from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.animation.inbetweens.known_sources import MOST_BYTES, known, size_of
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object
 

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import set_mode
-from addon.animation.inbetweens import filling
-from addon.animation.inbetweens.known_sources import changed_range, remember
-from addon.animation.inbetweens.mode_keys import source_of
+from rigid_motion.animation import set_mode
+from rigid_motion.animation.inbetweens import filling
+from rigid_motion.animation.inbetweens.known_sources import changed_range, remember
+from rigid_motion.animation.inbetweens.mode_keys import source_of
 from tests.animation.oracle import WIDTHS, assert_shown, curves_of
 from tests.animation.scenes import key, new_object
 

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import MODE_IDS, Refused, key_frames, modes_of, problem_of, read_poses, set_mode
-from addon.motion import KEYFRAME_MODES, Poses, interpolate
-from addon.motion.eulers import ORDERS
-from addon.motion.quaternions import angle_between, multiply, rotate
+from rigid_motion import animation
+from rigid_motion.animation import MODE_IDS, Refused, key_frames, modes_of, problem_of, read_poses, set_mode
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion.eulers import ORDERS
+from rigid_motion.motion.quaternions import angle_between, multiply, rotate
 
 FRAMES = np.arange(1.0, 42.0)
 KEYS = np.array((1.0, 11.0, 21.0, 31.0, 41.0))

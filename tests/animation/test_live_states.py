@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule
 from mathutils import Euler, Matrix
 
-from addon import animation
+from rigid_motion import animation
 from tests.animation.editing import LAST, ORDERS, Editing, frames_in, goes_on, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import Refused, bake, problem_of, refresh, set_mode
+from rigid_motion.animation import Refused, bake, problem_of, refresh, set_mode
 from tests.animation.oracle import assert_shown, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
 

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import MODE_IDS, is_baked, modes_of, problem_of, refresh, unbake
-from addon.motion import MODES
+from rigid_motion.animation import MODE_IDS, is_baked, modes_of, problem_of, refresh, unbake
+from rigid_motion.motion import MODES
 from tests.animation.oracle import shown_worlds
 from tests.animation.scenes import key
 

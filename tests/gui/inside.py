@@ -16,7 +16,7 @@ from pathlib import Path
 
 import bpy
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path[:0] = [str(Path(__file__).resolve().parents[2] / folder) for folder in ("", "addon", "scripts")]
 
 from tests.gui.driver import QUICK, Hand, run
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses, interpolate
+from rigid_motion.motion import Poses, interpolate
 from tests.motion.test_reduction import wandering
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.motion import Poses
-from addon.motion.quaternions import align_signs, multiply
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import align_signs, multiply
 
 PAIRS = 2000
 

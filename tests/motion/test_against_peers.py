@@ -16,7 +16,7 @@ from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternio
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation, Slerp
 
-from addon.motion import MODES, Poses, interpolate
+from rigid_motion.motion import MODES, Poses, interpolate
 from tests.motion.cases import PAIRS, as_keys, assert_same, corners, pair, shares, size_of
 
 CORNERS = list(corners())

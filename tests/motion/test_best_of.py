@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.motion import (
+from rigid_motion.motion import (
     KEYFRAME_MODES,
     Poses,
     best_modes,
@@ -17,8 +17,8 @@ from addon.motion import (
     reduce_keys,
     twists,
 )
-from addon.motion.best_of import least_errors
-from addon.motion.quaternions import multiply
+from rigid_motion.motion.best_of import least_errors
+from rigid_motion.motion.quaternions import multiply
 from tests.motion.cases import assert_same, random_quaternions
 from tests.motion.test_reduction import shell_errors, wandering
 from tests.thoroughness import tried

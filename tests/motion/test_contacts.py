@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion.contacts import slide, standing
+from rigid_motion.motion.contacts import slide, standing
 
 TIMES = np.arange(90) / 30.0
 HEIGHTS = np.array((1.7, 1.0, 0.05))

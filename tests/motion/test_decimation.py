@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from addon.motion import decimate
+from rigid_motion.motion import decimate
 
 
 def test_every_ninth_sample_of_90_hz_is_10_hz():

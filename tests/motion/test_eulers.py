@@ -9,8 +9,8 @@ import pytest
 from mathutils import Euler
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses, interpolate
-from addon.motion.eulers import ORDERS, extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.eulers import ORDERS, extrinsic_eulers_from_quaternions, quaternions_from_extrinsic_eulers
 from tests.motion.cases import random_quaternions
 
 in_every_order = pytest.mark.parametrize("order", ORDERS)

@@ -7,7 +7,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Poses, decimate, interpolate, measure, reduce_keys, repair
+from rigid_motion.motion import MODES, Poses, decimate, interpolate, measure, reduce_keys, repair
 
 WILD = (
     *(0.0, -0.0, 1.0, -1.0, 1e308, -1e308, 1e-308, 5e-324, -5e-324, 1e155, 1e-160, 1e100, 9e99),

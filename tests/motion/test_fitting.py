@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from addon.motion import MODES, Poses, fit_keys, interpolate, reduce_keys, rms, shell_error
-from addon.motion.quaternions import angle_between, normalise
+from rigid_motion.motion import MODES, Poses, fit_keys, interpolate, reduce_keys, rms, shell_error
+from rigid_motion.motion.quaternions import angle_between, normalise
 from tests.motion.test_reduction import wandering
 from tests.thoroughness import tried
 

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Poses, reduce_keys
-from addon.motion.key_links import _links, _neighbours, _pairs, _shortest, _shortest_of_four
-from addon.motion.key_search import Recording, Search, _spaced
+from rigid_motion.motion import MODES, Poses, reduce_keys
+from rigid_motion.motion.key_links import _links, _neighbours, _pairs, _shortest, _shortest_of_four
+from rigid_motion.motion.key_search import Recording, Search, _spaced
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
 MEMORYLESS = [name for name, mode in MODES.items() if not mode.is_smooth]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses, measure, rms, shell_error
-from addon.motion.quaternions import multiply, normalise
+from rigid_motion.motion import Poses, measure, rms, shell_error
+from rigid_motion.motion.quaternions import multiply, normalise
 from tests.motion.cases import random_quaternions
 
 IDENTITY = [1.0, 0.0, 0.0, 0.0]

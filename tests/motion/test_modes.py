@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from addon.motion import MODES, Poses, interpolate, prepare
-from addon.motion.modes import mode_named
+from rigid_motion.motion import MODES, Poses, interpolate, prepare
+from rigid_motion.motion.modes import mode_named
 
 KEYS = Poses([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [[1.0, 0.0, 0.0, 0.0]] * 2)
 

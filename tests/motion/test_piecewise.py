@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from addon.motion import MODES, Poses, in_betweens, prepare
-from addon.motion.piecewise import blocks, combine, is_dense, multiply_matrices
+from rigid_motion.motion import MODES, Poses, in_betweens, prepare
+from rigid_motion.motion.piecewise import blocks, combine, is_dense, multiply_matrices
 from tests.motion.cases import random_quaternions
 
 

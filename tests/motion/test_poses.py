@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses
-from addon.motion.quaternions import align_signs, angle_between, conjugate, multiply, rotate
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import align_signs, angle_between, conjugate, multiply, rotate
 from tests.motion.cases import random_quaternions
 
 

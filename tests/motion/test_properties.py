@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from addon.motion import KEYFRAME_MODES, MODES, Poses, interpolate
-from addon.motion.quaternions import angle_between, multiply, normalise, rotate
+from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between, multiply, normalise, rotate
 from tests.thoroughness import tried
 
 SCREWS = ["dq_sclerp", "pga_slerp", "cga_slerp", "pga_lerp", "cga_lerp"]

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from addon.motion import MODES, Poses, decimate, interpolate, reduce_keys, repair, twists
-from addon.motion.quaternions import align_signs, normalise
-from scripts.trajectories import read_trajectories
+from rigid_motion.motion import MODES, Poses, decimate, interpolate, reduce_keys, repair, twists
+from rigid_motion.motion.quaternions import align_signs, normalise
+from rigid_motion_batch.trajectories import read_trajectories
 from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
 from tests.thoroughness import sample, tried

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from addon.motion import Poses, interpolate, repair
+from rigid_motion.motion import Poses, interpolate, repair
 from tests.motion.cases import random_quaternions
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import Poses, interpolate, series
-from addon.motion.quaternions import align_signs
+from rigid_motion.motion import Poses, interpolate, series
+from rigid_motion.motion.quaternions import align_signs
 from tests.motion.cases import random_quaternions
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.motion import Poses, Skeleton
-from addon.motion.poses import inverse, placed
+from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.poses import inverse, placed
 from tests.motion.bodies import in_root_space, matrices, random_parents
 from tests.motion.cases import random_quaternions
 from tests.thoroughness import tried

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm, logm
 
-from addon.motion import MODES, Poses, in_betweens, interpolate, twists
-from addon.motion.quaternions import angle_between, multiply, normalise, rotate
+from rigid_motion.motion import MODES, Poses, in_betweens, interpolate, twists
+from rigid_motion.motion.quaternions import angle_between, multiply, normalise, rotate
 from tests.motion.cases import assert_same, random_quaternions
 from tests.motion.test_properties import assert_close, motions, placed, reseated
 from tests.motion.test_twists import pose_matrix

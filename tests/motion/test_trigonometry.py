@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Poses, interpolate, trigonometry
-from addon.motion.trigonometry import NARROW, fill_sine_and_cosine
+from rigid_motion.motion import MODES, Poses, interpolate, trigonometry
+from rigid_motion.motion.trigonometry import NARROW, fill_sine_and_cosine
 from tests.motion.cases import random_quaternions
 
 both_ways = pytest.mark.parametrize("vector_tangent", [False, True], ids=["polynomial", "tangent"])

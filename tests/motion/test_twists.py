@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, logm
 
-from addon.motion import twists
-from addon.motion.quaternions import align_signs
+from rigid_motion.motion import twists
+from rigid_motion.motion.quaternions import align_signs
 from tests.motion.cases import random_quaternions
 
 ANGLES = [0.0, 1e-12, 1e-6, 1e-3, 0.02999, 0.03001, 0.5, 2.0, 3.1, np.pi - 1e-9]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import bpy
 import pytest
 
-from addon import animation
+from rigid_motion import animation
 
 
 @pytest.fixture

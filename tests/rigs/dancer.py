@@ -15,7 +15,7 @@ from itertools import pairwise
 import bpy
 import numpy as np
 
-from addon.animation import write_channel
+from rigid_motion.animation import write_channel
 
 FPS, BEAT = 30, 18.75
 """Frames a second, and a beat."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from addon.animation import write_channel
-from addon.motion.twists import exponential
+from rigid_motion.animation import write_channel
+from rigid_motion.motion.twists import exponential
 
 FRAMES = np.arange(1.0, 91.0)
 NAMES = ("Root", "Spine", "Head", "Arm.L", "Hand.L", "Arm.R", "Hand.R")

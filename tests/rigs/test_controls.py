@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.animation import bake, problem_of, set_mode, unbake
+from rigid_motion.animation import bake, problem_of, set_mode, unbake
 from tests.rigs.human import controls
 from tests.rigs.poses import ends_of_bones, key_at_random
 from tests.thoroughness import sample

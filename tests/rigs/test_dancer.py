@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
+from rigid_motion import animation
 from tests.rigs.dancer import BONES, FPS, FRAMES, dancer
 
 LAST = 60.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from addon import animation
+from rigid_motion import animation
 from tests.rigs import scenes
 
 NOTHING = 2e-4

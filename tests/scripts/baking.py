@@ -9,9 +9,9 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon import animation
-from addon.animation import set_mode
-from scripts import bake
+from rigid_motion import animation
+from rigid_motion.animation import set_mode
+from rigid_motion_batch import bake
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import key, new_object
 from tests.blank import blank

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses
-from scripts.axes import AXES, to_blender
+from rigid_motion.motion import Poses
+from rigid_motion_batch.axes import AXES, to_blender
 
 
 def matrices(poses: Poses) -> np.ndarray:

@@ -13,9 +13,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import is_baked, set_mode
-from scripts import bake
+from rigid_motion import animation
+from rigid_motion.animation import is_baked, set_mode
+from rigid_motion_batch import bake
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import is_baked, set_mode
+from rigid_motion import animation
+from rigid_motion.animation import is_baked, set_mode
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, key, new_object

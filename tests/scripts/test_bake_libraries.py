@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon.animation import is_baked, set_mode
+from rigid_motion.animation import is_baked, set_mode
 from tests.animation.scenes import key, new_object
 from tests.scripts.baking import baked_name, extension, new_file, open_again, run, save
 

@@ -18,8 +18,8 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon import animation
-from scripts import blend_files
+from rigid_motion import animation
+from rigid_motion_batch import blend_files
 from tests.animation.oracle import curves_of
 from tests.scripts.baking import (
     baked_name,

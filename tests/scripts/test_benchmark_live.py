@@ -6,15 +6,24 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import channelbag_of, read_poses
-from scripts import benchmark_live
-from scripts.live_benchmark.baking import long_bakes
-from scripts.live_benchmark.everyday import everyday
-from scripts.live_benchmark.rigs import RigSize, add_skin, edits, rig_of, rigs
-from scripts.live_benchmark.scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
-from scripts.live_benchmark.shots import KEY, SAMPLE, choosing, file_sizes, samples_of, shot, shots, what_is_left
-from scripts.live_benchmark.turns import against, judged, told, told_in_ms
+from rigid_motion import animation
+from rigid_motion.animation import channelbag_of, read_poses
+from rigid_motion_batch import benchmark_live
+from rigid_motion_batch.live_benchmark.baking import long_bakes
+from rigid_motion_batch.live_benchmark.everyday import everyday
+from rigid_motion_batch.live_benchmark.rigs import RigSize, add_skin, edits, rig_of, rigs
+from rigid_motion_batch.live_benchmark.scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
+from rigid_motion_batch.live_benchmark.shots import (
+    KEY,
+    SAMPLE,
+    choosing,
+    file_sizes,
+    samples_of,
+    shot,
+    shots,
+    what_is_left,
+)
+from rigid_motion_batch.live_benchmark.turns import against, judged, told, told_in_ms
 
 SMALL = Size(3, 5, 40)
 SMALL_RIG = RigSize(12, 5, 40, vertices=400)
@@ -83,7 +92,7 @@ def test_shots_are_told_for_every_motion_and_rotation_mode():
 @pytest.mark.usefixtures("live_file")
 def test_a_shot_tells_the_ratios_of_what_stands_beside_them(monkeypatch):
     sizes = iter(((100_000, 1_000_000), (390_000, 6_100_000), (780_000, 24_400_000)))
-    monkeypatch.setattr("scripts.live_benchmark.shots.file_sizes", lambda: next(sizes))
+    monkeypatch.setattr("rigid_motion_batch.live_benchmark.shots.file_sizes", lambda: next(sizes))
     page = list(shot(SMALL, "QUATERNION", "about general axes", 3))
     (rows,) = tables(page).values()
     assert [row[0] for row in rows] == [

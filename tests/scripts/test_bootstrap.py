@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.system_libraries import DEBIAN, missing_for_rendering, way_out
 from scripts import bootstrap
-from scripts.system_libraries import DEBIAN, missing_for_rendering, way_out
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -61,8 +61,9 @@ def test_the_blender_that_is_asked_for_is_the_only_one():
 
 def test_the_default_blender_is_the_one_pinned_for_that_python():
     project = bootstrap._project()
+    pinned = project["project"]["optional-dependencies"]["blender"]
     for python, versions in project["tool"]["rigid-motion"]["blender"].items():
-        assert f"bpy=={versions[0]}; python_version == '{python}'" in project["project"]["dependencies"]
+        assert f"bpy=={versions[0]}; python_version == '{python}'" in pinned
 
 
 @pytest.mark.parametrize("kind", ["", "ImportError: "])

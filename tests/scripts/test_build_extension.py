@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts import build_extension
+from rigid_motion_batch import build_extension
+from rigid_motion_batch.places import EXTENSION, LICENSE, MANIFEST
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -43,7 +44,7 @@ modules = [importlib.import_module(found.name) for found in pkgutil.walk_package
 seen = {
     "enabled": MODULE in preferences.addons,
     "files": [package.__file__, *(module.__file__ for module in modules)],
-    "from the checkout": [name for name in sys.modules if name.split(".")[0] in ("addon", "scripts")],
+    "from the checkout": [name for name in sys.modules if name.split(".")[0] in ("rigid_motion", "rigid_motion_batch")],
 }
 bpy.ops.preferences.addon_disable(module=MODULE)
 seen["disabled"] = MODULE not in preferences.addons
@@ -67,7 +68,7 @@ def names(package: Path) -> list[str]:
 
 
 def test_the_zip_holds_the_modules_the_manifest_and_the_licence_and_nothing_else(extension_zip):
-    modules = {path.relative_to(ROOT / "addon").as_posix() for path in (ROOT / "addon").rglob("*.py")}
+    modules = {path.relative_to(EXTENSION).as_posix() for path in EXTENSION.rglob("*.py")}
     assert set(names(extension_zip)) == modules | {"blender_manifest.toml", "LICENSE"}
     assert len(names(extension_zip)) == len(set(names(extension_zip)))
 
@@ -75,7 +76,7 @@ def test_the_zip_holds_the_modules_the_manifest_and_the_licence_and_nothing_else
 def test_the_files_are_those_of_the_checkout(extension_zip):
     with zipfile.ZipFile(extension_zip) as package:
         for name in package.namelist():
-            source = ROOT / name if name in build_extension.BESIDE else ROOT / "addon" / name
+            source = EXTENSION / name if (EXTENSION / name).is_file() else ROOT / name
             assert package.read(name) == source.read_bytes(), name
 
 
@@ -111,27 +112,26 @@ def test_help_has_examples():
 
 
 def test_what_blender_refuses_is_reported_in_its_words_and_the_old_zip_stays(tmp_path, monkeypatch, capsys):
-    checkout = tmp_path / "checkout"
-    (checkout / "addon").mkdir(parents=True)
-    (checkout / "addon" / "__init__.py").touch()
-    (checkout / "LICENSE").touch()
-    (checkout / "blender_manifest.toml").write_text('schema_version = "1.0.0"\nid = "rigid_motion"\n')
+    package, manifest = tmp_path / "package", tmp_path / "blender_manifest.toml"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    manifest.write_text('schema_version = "1.0.0"\nid = "rigid_motion"\n')
     old = tmp_path / "dist" / "rigid_motion-0.1.0.zip"
     old.parent.mkdir()
     old.write_text("old")
-    monkeypatch.setattr(build_extension, "ROOT", checkout)
+    monkeypatch.setattr(build_extension, "EXTENSION", package)
+    monkeypatch.setattr(build_extension, "BESIDE", (manifest, LICENSE))
     assert build_extension.main(["--output", str(old.parent)]) == 2
     assert 'missing "tagline"' in capsys.readouterr().err
     assert {path.name: path.read_text() for path in old.parent.iterdir()} == {old.name: "old"}
 
 
-@pytest.mark.parametrize("missing", ["LICENSE", "addon"])
+@pytest.mark.parametrize("missing", ["LICENSE", "rigid_motion"])
 def test_a_missing_part_is_named(missing, tmp_path, monkeypatch, capsys):
-    (tmp_path / "addon").mkdir()
-    for name in build_extension.BESIDE:
-        (tmp_path / name).touch()
-    (tmp_path / missing).rename(tmp_path / "elsewhere")
-    monkeypatch.setattr(build_extension, "ROOT", tmp_path)
+    if missing == "LICENSE":
+        monkeypatch.setattr(build_extension, "BESIDE", (MANIFEST, tmp_path / missing))
+    else:
+        monkeypatch.setattr(build_extension, "EXTENSION", tmp_path / missing)
     assert build_extension.main(["--output", str(tmp_path / "dist")]) == 2
     assert str(tmp_path / missing) in capsys.readouterr().err
 

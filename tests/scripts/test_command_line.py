@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from scripts.command_line import as_typed, own_arguments
+from rigid_motion_batch.command_line import as_typed, own_arguments
 
 
 @pytest.mark.parametrize(

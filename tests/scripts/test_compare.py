@@ -20,12 +20,12 @@ import pytest
 from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternions_sclerp, pqs_from_dual_quaternions
 from scipy.spatial.transform import Rotation
 
-from addon.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
-from scripts import compare
-from scripts.comparison.stage import film
-from scripts.comparison.study.reading import folder_names
-from scripts.workplan import Workspace
-from scripts.workplan import __main__ as workplan
+from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
+from rigid_motion_batch import compare
+from rigid_motion_batch.comparison.stage import film
+from rigid_motion_batch.comparison.study.reading import folder_names
+from rigid_motion_batch.workplan import Workspace
+from rigid_motion_batch.workplan import __main__ as workplan
 from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
 
@@ -549,7 +549,7 @@ def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, ca
 
 
 def test_of_many_clips_each_has_a_page_and_one_leads_to_them(short_clip, tmp_path, monkeypatch):
-    monkeypatch.setattr("scripts.comparison.planning.ON_ONE_PAGE", 1)
+    monkeypatch.setattr("rigid_motion_batch.comparison.planning.ON_ONE_PAGE", 1)
     assert run(short_clip, short_clip, "--no-video", "--output", tmp_path, "--rates", "10,20") == 0
     overview = (tmp_path / "report.html").read_text()
     assert "2 recorded clips" in overview
@@ -573,7 +573,7 @@ def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, caps
 
     asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
     with monkeypatch.context() as patch:
-        patch.setattr("scripts.comparison.study.metrics.write_metrics", full)
+        patch.setattr("rigid_motion_batch.comparison.study.metrics.write_metrics", full)
         assert run(*asked) == 2
     said = capsys.readouterr()
     assert "No space left on device; nothing that is done is lost" in said.err

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts import compare
-from scripts.trajectories import read_trajectories
+from rigid_motion_batch import compare
+from rigid_motion_batch.trajectories import read_trajectories
 from tests.blank import blank
 from tests.scripts.comparing import ROOT, write_toss
 from tests.scripts.comparison.study.test_body_metrics import HEADER

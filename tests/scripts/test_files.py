@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.files import clear_beside, replacing, write_text
+from rigid_motion_batch.files import clear_beside, replacing, write_text
 
 
 def test_a_text_is_written_as_utf_8_with_lf_line_ends_and_folders_on_the_way_are_made(tmp_path: Path) -> None:

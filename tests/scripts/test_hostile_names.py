@@ -14,11 +14,11 @@ from urllib.parse import unquote
 
 import pytest
 
-from scripts import compare
-from scripts.comparison.report.pages import ON_ONE_PAGE
-from scripts.comparison.study.reading import DEVICES, NOT_FOLDERS, folder_names
-from scripts.rows import meant
-from scripts.trajectories import TrajectoryError, read_trajectories
+from rigid_motion_batch import compare
+from rigid_motion_batch.comparison.report.pages import ON_ONE_PAGE
+from rigid_motion_batch.comparison.study.reading import DEVICES, NOT_FOLDERS, folder_names
+from rigid_motion_batch.rows import meant
+from rigid_motion_batch.trajectories import TrajectoryError, read_trajectories
 from tests.scripts.trajectories.seeds import SEEDS
 
 FORMULAS = "=+-@\t\r"

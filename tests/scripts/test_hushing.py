@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from scripts.hushing import hushed
+from rigid_motion_batch.hushing import hushed
 
 
 def speak(words: str) -> None:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts import compare, job_bundle
-from scripts.workplan import Plan, Task
+from rigid_motion_batch import compare, job_bundle
+from rigid_motion_batch.workplan import Plan, Task
 from tests.scripts.comparing import outputs, write_toss
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,7 +45,12 @@ def clip(tmp_path: Path) -> Path:
 
 def plan_of(*names: str, after: dict[str, tuple[str, ...]] | None = None) -> Plan:
     tasks = (
-        Task(name, "scripts.comparison.steps:read", outputs=(f"{number}.txt",), after=(after or {}).get(name, ()))
+        Task(
+            name,
+            "rigid_motion_batch.comparison.steps:read",
+            outputs=(f"{number}.txt",),
+            after=(after or {}).get(name, ()),
+        )
         for number, name in enumerate(names)
     )
     return Plan(tasks, "1")
@@ -101,9 +106,9 @@ def test_a_bundle_asks_for_its_places(clip: Path, tmp_path: Path) -> None:
         for name in ("template", "parameter_values", "plan")
     )
     kinds = {one["name"]: one["type"] for one in template["parameterDefinitions"]}
-    assert kinds == {"Checkout": "PATH", "Python": "STRING", "Inputs": "PATH", "Output": "PATH", "Plan": "PATH"}
+    assert kinds == {"Program": "PATH", "Python": "STRING", "Inputs": "PATH", "Output": "PATH", "Plan": "PATH"}
     assert {one["name"]: one["value"] for one in given["parameterValues"]} == {
-        "Checkout": str(ROOT),
+        "Program": str(ROOT / "scripts"),
         "Python": sys.executable,
         "Inputs": str(tmp_path / "takes"),
         "Output": str(tmp_path / "out"),

@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from scripts.progress import Progress
+from rigid_motion_batch.progress import Progress
 
 
 class Clock:

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.motion import shell_error
-from scripts import reduction
-from scripts.trajectories import TrajectoryError
+from rigid_motion import animation
+from rigid_motion.motion import shell_error
+from rigid_motion_batch import reduction
+from rigid_motion_batch.trajectories import TrajectoryError
 from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
 
 TOLERANCE, RADIUS = 0.005, 0.1

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from addon.motion import MODES
-from scripts import reproduce_paper
-from scripts.paper import sending, steps, table, timing
-from scripts.streaming import TWISTS
+from rigid_motion.motion import MODES
+from rigid_motion_batch import reproduce_paper
+from rigid_motion_batch.paper import sending, steps, table, timing
+from rigid_motion_batch.streaming import TWISTS
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 
@@ -38,7 +38,7 @@ def small(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def make_small(root: Path, patch: pytest.MonkeyPatch) -> None:
     """Few clips, few rates, few frames."""
-    patch.setattr(reproduce_paper, "ROOT", root)
+    patch.setattr(reproduce_paper, "ASSETS", root / "assets")
     patch.setattr(table, "STEP", 1.3)
     patch.setattr(table, "TOLERANCES", (0.5, 2.0, 2))
     patch.setattr(sending, "DELAYS", (2.0,))

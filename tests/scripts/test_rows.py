@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scripts.rows import line_of, meant, plain, read_rows, write_rows
+from rigid_motion_batch.rows import line_of, meant, plain, read_rows, write_rows
 
 
 @dataclass

@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import interpolate, shell_error
-from scripts.comparison.study.reading import read_clips
-from scripts.streaming import PACKINGS, TWISTS, Packets, PlayOut
-from scripts.streaming.hearing import Hearing
-from scripts.streaming.limits import EACH, SILENCE, STREAMS, Cookies
-from scripts.streaming.packets import sealed
-from scripts.streaming.relay import USERS, Relay
-from scripts.streaming.wire import BEAT, CHALLENGE, KEY, Terms, beat, bye, challenge, changed, hello, read
+from rigid_motion.motion import interpolate, shell_error
+from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets, PlayOut
+from rigid_motion_batch.streaming.hearing import Hearing
+from rigid_motion_batch.streaming.limits import EACH, SILENCE, STREAMS, Cookies
+from rigid_motion_batch.streaming.packets import sealed
+from rigid_motion_batch.streaming.relay import USERS, Relay
+from rigid_motion_batch.streaming.wire import BEAT, CHALLENGE, KEY, Terms, beat, bye, challenge, changed, hello, read
 from tests.scripts.streaming.motions import swinging
 from tests.thoroughness import THOROUGH
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation.inbetweens.differences import in_betweens
-from addon.animation.inbetweens.mode_keys import source_of
-from addon.motion import KEYFRAME_MODES
-from scripts import subframes
-from scripts.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
+from rigid_motion import animation
+from rigid_motion.animation.inbetweens.differences import in_betweens
+from rigid_motion.animation.inbetweens.mode_keys import source_of
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch import subframes
+from rigid_motion_batch.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
 
 BRISK = Motion("Brisk", turn=90.0, distance=1.0, frames=24)
 

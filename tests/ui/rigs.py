@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import bpy
 import numpy as np
 
-from addon.animation import write_channel
+from rigid_motion.animation import write_channel
 from tests.animation.scenes import new_object
 
 NAMES = ("Hip", "Arm", "Hand")

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import constraint_trouble, mend, modes_of, set_mode
-from addon.animation.inbetweens.outlets.restoring import (
+from rigid_motion import animation
+from rigid_motion.animation import constraint_trouble, mend, modes_of, set_mode
+from rigid_motion.animation.inbetweens.outlets.restoring import (
     CHANGED,
     MUTED,
     NOT_FIRST,
@@ -18,11 +18,20 @@ from addon.animation.inbetweens.outlets.restoring import (
     REMOVED,
     WEAK,
 )
-from addon.animation.transforms import CONSTRAINT, Refused, transform_of
-from addon.ui import menus
-from addon.ui.notes import facts_and_notes
-from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, active_target, modes_meant, scope_for, targets_of
-from addon.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, reduction_rows, spoken_of
+from rigid_motion.animation.transforms import CONSTRAINT, Refused, transform_of
+from rigid_motion.ui import menus
+from rigid_motion.ui.notes import facts_and_notes
+from rigid_motion.ui.targets import (
+    CURRENT,
+    KEY_EDITORS,
+    SELECTED,
+    WHOLE,
+    active_target,
+    modes_meant,
+    scope_for,
+    targets_of,
+)
+from rigid_motion.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, reduction_rows, spoken_of
 from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import keyed

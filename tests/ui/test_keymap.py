@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from addon.ui import keymap
+from rigid_motion.ui import keymap
 
 SHARED = {"Window", "Screen", "Screen Editing", "Frames", "Animation", "Markers", "View2D", "Animation Channels"}
 """Keymaps that are asked in all of the editors, or in parts of them."""

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from addon.animation import MODE_IDS
-from addon.ui import menus
+from rigid_motion.animation import MODE_IDS
+from rigid_motion.ui import menus
 from tests.ui.conftest import select_keys
 
 

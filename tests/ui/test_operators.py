@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import animation
-from addon.animation import (
+from rigid_motion import animation
+from rigid_motion.animation import (
     MODE_IDS,
     bake_poses,
     is_baked,
@@ -18,8 +18,8 @@ from addon.animation import (
     reduction_of,
     set_enabled,
 )
-from addon.motion import MODES, Poses, interpolate, shell_error
-from addon.ui.operators import CLASSES
+from rigid_motion.motion import MODES, Poses, interpolate, shell_error
+from rigid_motion.ui.operators import CLASSES
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys

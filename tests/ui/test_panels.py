@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Quaternion, Vector
 
-from addon.animation import bake, set_enabled, set_mode, unbake
-from addon.ui.notes import facts_and_notes
-from addon.ui.wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS
+from rigid_motion.animation import bake, set_enabled, set_mode, unbake
+from rigid_motion.ui.notes import facts_and_notes
+from rigid_motion.ui.wording import BAKED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import give_own_deltas, key, new_object
 from tests.ui.conftest import keyed

@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-import addon
-from addon.animation import set_mode
-from addon.ui.look import DEFAULT_LOOK
-from addon.ui.preferences import EXTENSION, default_mode, preferences
+import rigid_motion
+from rigid_motion.animation import set_mode
+from rigid_motion.ui.look import DEFAULT_LOOK
+from rigid_motion.ui.preferences import EXTENSION, default_mode, preferences
 from tests.ui.conftest import keyed
 
 
@@ -18,9 +18,9 @@ def chosen(empty_file):
     """The preferences of the extension, switched on as Blender does it."""
     entry = bpy.context.preferences.addons.new()
     entry.module = EXTENSION
-    addon.register()
+    rigid_motion.register()
     yield preferences()
-    addon.unregister()
+    rigid_motion.unregister()
     bpy.context.preferences.addons.remove(entry)
 
 
@@ -62,8 +62,8 @@ def test_without_live_update_edits_wait_until_it_is_on_again(chosen):
 
 def test_live_update_that_was_off_is_off_when_the_extension_is_switched_on(chosen):
     chosen.live_update = False
-    addon.unregister()
-    addon.register()
+    rigid_motion.unregister()
+    rigid_motion.register()
     obj = keyed("Tool")
     obj.rigid_motion.mode = "BLENDER"
     set_mode(obj, "dq_sclerp")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-import addon
-from addon.ui import keymap, menus
+import rigid_motion
+from rigid_motion.ui import keymap, menus
 
 
 def footprint():
@@ -27,11 +27,11 @@ def footprint():
 def test_switched_off_it_leaves_nothing_behind_however_often(empty_file):
     before = footprint()
     for _ in range(2):
-        addon.register()
+        rigid_motion.register()
         on = footprint()
         assert on["operators"]
         assert on["keymaps"] == [count + 1 for count in before["keymaps"]]
         assert on["menus"] == [count + 1 for count in before["menus"]]
         assert on["handlers"] != before["handlers"]
-        addon.unregister()
+        rigid_motion.unregister()
         assert footprint() == before

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 import bpy
 import pytest
 
-from addon.animation import modes_of
-from addon.animation.transforms import transform_of
-from addon.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, scope_for, targets_of
+from rigid_motion.animation import modes_of
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, scope_for, targets_of
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
 

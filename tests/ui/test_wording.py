@@ -8,9 +8,9 @@ from math import radians
 import bpy
 import pytest
 
-from addon.animation import Reduction
-from addon.animation.inbetweens.describing import SegmentFacts
-from addon.ui.wording import cautions, degrees, length, listed, reduction_summary, wrapped
+from rigid_motion.animation import Reduction
+from rigid_motion.animation.inbetweens.describing import SegmentFacts
+from rigid_motion.ui.wording import cautions, degrees, length, listed, reduction_summary, wrapped
 
 PLAIN = SegmentFacts(
     first=1.0,

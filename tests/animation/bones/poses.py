@@ -1,4 +1,4 @@
-"""Where bones have to be in the armature's space, worked out apart from `addon.animation`, and where Blender has them.
+"""Where bones have to be in the armature's space, worked out apart from the program, and where Blender has them.
 
 What moves a bone in the space of its channels is `oracle.expected_bases`; what its place at rest, its parents and its
 settings make of that is here, in NumPy. Matrices are (m, 4, 4) in the armature's space, frames are the scene's.

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from hypothesis.stateful import invariant, precondition
 
-from addon import animation
+from rigid_motion import animation
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import CONSTRAINT, Rest
 from tests.animation.editing import Editing, goes_on

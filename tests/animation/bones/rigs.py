@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from addon.animation import set_mode, write_channel
+from rigid_motion.animation import set_mode, write_channel
 from tests.animation.oracle import WIDTHS, expected_bases, rotation_path
 from tests.thoroughness import THOROUGH
 

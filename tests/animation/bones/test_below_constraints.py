@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import problem_of, set_mode, write_channel
+from rigid_motion.animation import problem_of, set_mode, write_channel
 from tests.animation.bones.poses import assert_same_poses, shown_poses
 from tests.animation.bones.rigs import FRAMES, ORDERS, PLAYED, in_turn, key_all, key_wanted, new_rig, twin_of
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import bake, is_baked, problem_of, refresh, set_mode, unbake
+from rigid_motion.animation import bake, is_baked, problem_of, refresh, set_mode, unbake
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import (
     ARM,

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import refresh, set_mode
-from addon.motion import KEYFRAME_MODES
+from rigid_motion.animation import refresh, set_mode
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_wanted, new_rig, wanted_bases
 from tests.animation.oracle import snapshot

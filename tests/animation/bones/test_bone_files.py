@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import bake, is_baked, modes_of, problem_of, refresh, set_enabled, set_mode, unbake
-from addon.motion import KEYFRAME_MODES
+from rigid_motion.animation import bake, is_baked, modes_of, problem_of, refresh, set_enabled, set_mode, unbake
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, names_of, shown_poses
 from tests.animation.bones.rigs import (
     FRAMES,

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import modes_of, problem_of, set_mode
-from addon.motion import KEYFRAME_MODES
+from rigid_motion.animation import modes_of, problem_of, set_mode
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import (
     FRAMES,

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
-from addon import animation
+from rigid_motion import animation
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rig_editing import (
     BONES,

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import key_frames, modes_of, problem_of, refresh, set_mode
+from rigid_motion.animation import key_frames, modes_of, problem_of, refresh, set_mode
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import (
     ORDERS,

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import bake, problem_of, set_mode
+from rigid_motion.animation import bake, problem_of, set_mode
 from tests.animation.bones.poses import assert_posed
 from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, with_edit_bones, write_bone
 from tests.animation.oracle import curves_of, expected_bases

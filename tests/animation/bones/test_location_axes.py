@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
-from addon import animation
-from addon.motion import KEYFRAME_MODES
+from rigid_motion import animation
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.oracle import curves_of
 from tests.rigs import scenes
 

@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import Refused, key_frames, problem_of, reduce_keys_of, set_mode, total_reduction
-from addon.motion import KEYFRAME_MODES
+from rigid_motion.animation import Refused, key_frames, problem_of, reduce_keys_of, set_mode, total_reduction
+from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import in_turn
 from tests.animation.bones.test_rig_reducing import largest, matrices

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import modes_of, problem_of, refresh, set_enabled, set_mode
+from rigid_motion.animation import modes_of, problem_of, refresh, set_enabled, set_mode
 from tests.animation.bones.poses import assert_posed, assert_same_poses, names_of, shown_poses
 from tests.animation.bones.rigs import (
     ARM,

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import (
+from rigid_motion.animation import (
     Refused,
     is_reduced,
     key_frames,

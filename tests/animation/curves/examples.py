@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from hypothesis import strategies as st
 
-from addon.animation.curves import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys, evaluate, read_keys
+from rigid_motion.animation.curves import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys, evaluate, read_keys
 
 CODES = {name: code for code, name in INTERPOLATIONS.items()}
 MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")

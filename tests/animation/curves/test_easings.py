@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.animation.curves.easings import EASE_IN, ease, elastic
+from rigid_motion.animation.curves.easings import EASE_IN, ease, elastic
 
 U = np.linspace(0.0, 1.0, 1001)
 EASINGS = ("AUTO", "EASE_IN", "EASE_OUT", "EASE_IN_OUT")

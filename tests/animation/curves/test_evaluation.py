@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.animation.curves import EASINGS, INTERPOLATIONS, Keys, cycled, cyclic_times, evaluate
+from rigid_motion.animation.curves import EASINGS, INTERPOLATIONS, Keys, cycled, cyclic_times, evaluate
 from tests.animation.curves.examples import (
     CODES,
     all_cycles,

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.animation.curves import EASINGS, Cycles, Keys, evaluate
-from addon.animation.curves.grouping import BLOCK, Group, blocks, group_by_timing
-from addon.animation.curves.spans import Spans
+from rigid_motion.animation.curves import EASINGS, Cycles, Keys, evaluate
+from rigid_motion.animation.curves.grouping import BLOCK, Group, blocks, group_by_timing
+from rigid_motion.animation.curves.spans import Spans
 from tests.animation.curves.examples import all_cycles, curves, evaluate_one, frames_about, joined, keys_of
 from tests.thoroughness import tried
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from addon.animation import curves
+from rigid_motion.animation import curves
 
 FOLDER = Path(curves.__file__).parent
 ORDER = ("keys", "easings", "solvers", "reading", "cycles", "spans", "grouping", "evaluation")

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation.curves import BEZIER, CONSTANT, ELASTIC, INTERPOLATIONS, LINEAR, Cycles, evaluate
+from rigid_motion.animation.curves import BEZIER, CONSTANT, ELASTIC, INTERPOLATIONS, LINEAR, Cycles, evaluate
 from tests.animation.curves.examples import as_fcurve, evaluate_one, joined, keys_of, read_one
 
 EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {

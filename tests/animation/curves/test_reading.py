@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.animation.curves import Cycles, read_keys
+from rigid_motion.animation.curves import Cycles, read_keys
 from tests.animation.curves.examples import as_fcurve, keys_of, read_one
 
 

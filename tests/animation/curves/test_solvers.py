@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from addon.animation.curves.solvers import bezier_cubics, solve_cubics
+from rigid_motion.animation.curves.solvers import bezier_cubics, solve_cubics
 
 T = np.linspace(0.0, 1.0, 1001)
 

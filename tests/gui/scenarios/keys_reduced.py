@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from addon.animation import key_frames, modes_of
-from addon.motion import Poses, interpolate_by_segments
+from rigid_motion.animation import key_frames, modes_of
+from rigid_motion.motion import Poses, interpolate_by_segments
 from tests.animation.oracle import curves_of, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps

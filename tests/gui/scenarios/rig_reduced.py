@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from addon import animation
+from rigid_motion import animation
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from addon.motion import Poses
-from scripts.comparison.study.clips import Clip
-from scripts.figures import Figure
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.figures import Figure
 
 BONES = {
     "Hips": (None, (0, 90, 0)),

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from addon.motion import Poses
-from addon.motion.poses import placed
-from addon.motion.quaternions import normalise
-from scripts.comparison.study.clips import Clip
-from scripts.figures import Figure, Skin
+from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import placed
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.figures import Figure, Skin
 
 JOINTS = ("Hips", "Spine", "Head", "Left leg", "Right leg", "Left foot")
 PARENTS = (-1, 0, 1, 0, 0, 3)

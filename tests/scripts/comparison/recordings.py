@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure
-from scripts.comparison.study.choices import Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reconstructions import Reconstruction
+from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reconstructions import Reconstruction
 
 
 def swinging_clip(

@@ -12,23 +12,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses
-from scripts import compare, decimated_bodies, graph_decimate
-from scripts.axes import AXES
-from scripts.comparison import steps
-from scripts.comparison.decimating import DecimatedBody, beside_decimate, frames_of
-from scripts.comparison.planning import MOST_DECIMATED, Study, comparison_tasks, reading_tasks
-from scripts.comparison.report.decimated_table import decimated_table
-from scripts.comparison.study.bodies import BodyReconstruction, reconstruct_body
-from scripts.comparison.study.body_decimated import DECIMATE, OWN, SHARED, KeysOfBody
-from scripts.comparison.study.body_metrics import measure_modes
-from scripts.comparison.study.choices import Budget, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.storage import ClipReference
-from scripts.decimated_bodies import Decimations, Left
-from scripts.figures import Figure
-from scripts.job_bundle import _kind_of
-from scripts.workplan import Task
+from rigid_motion.motion import Poses
+from rigid_motion_batch import compare, decimated_bodies, graph_decimate
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.comparison import steps
+from rigid_motion_batch.comparison.decimating import DecimatedBody, beside_decimate, frames_of
+from rigid_motion_batch.comparison.planning import MOST_DECIMATED, Study, comparison_tasks, reading_tasks
+from rigid_motion_batch.comparison.report.decimated_table import decimated_table
+from rigid_motion_batch.comparison.study.bodies import BodyReconstruction, reconstruct_body
+from rigid_motion_batch.comparison.study.body_decimated import DECIMATE, OWN, SHARED, KeysOfBody
+from rigid_motion_batch.comparison.study.body_metrics import measure_modes
+from rigid_motion_batch.comparison.study.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.storage import ClipReference
+from rigid_motion_batch.decimated_bodies import Decimations, Left
+from rigid_motion_batch.figures import Figure
+from rigid_motion_batch.job_bundle import _kind_of
+from rigid_motion_batch.workplan import Task
 from tests.balls import largest_displacements
 from tests.scripts.comparison.test_planning import WANTED
 

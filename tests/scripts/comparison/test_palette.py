@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from addon.motion import MODES
-from scripts.comparison import palette
-from scripts.comparison.study.modes import BEST_OF
+from rigid_motion.motion import MODES
+from rigid_motion_batch.comparison import palette
+from rigid_motion_batch.comparison.study.modes import BEST_OF
 
 # Machado, Oliveira, Fernandes 2009, severity 1: what people with one kind of cone missing see, in linear RGB.
 VISION = {

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.motion import MODES
-from scripts.comparison import steps
-from scripts.comparison.planning import (
+from rigid_motion.motion import MODES
+from rigid_motion_batch.comparison import steps
+from rigid_motion_batch.comparison.planning import (
     MOST_POSES,
     PIECE,
     Study,
@@ -21,16 +21,24 @@ from scripts.comparison.planning import (
     reading_tasks,
     without_films,
 )
-from scripts.comparison.report.pages import ON_ONE_PAGE, Settings
-from scripts.comparison.stage.settings import StageSettings
-from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform, choice_from, choice_parts, fewest_keys
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.radii import Radii
-from scripts.comparison.study.reading import folder_names
-from scripts.comparison.study.reconstructions import reconstruct
-from scripts.comparison.study.storage import ClipReference, file_names, write_recording
-from scripts.trajectories import ReadingOptions
-from scripts.workplan import Plan, Task
+from rigid_motion_batch.comparison.report.pages import ON_ONE_PAGE, Settings
+from rigid_motion_batch.comparison.stage.settings import StageSettings
+from rigid_motion_batch.comparison.study.choices import (
+    Budget,
+    Choice,
+    Tolerance,
+    Uniform,
+    choice_from,
+    choice_parts,
+    fewest_keys,
+)
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.radii import Radii
+from rigid_motion_batch.comparison.study.reading import folder_names
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
+from rigid_motion_batch.comparison.study.storage import ClipReference, file_names, write_recording
+from rigid_motion_batch.trajectories import ReadingOptions
+from rigid_motion_batch.workplan import Plan, Task
 from tests.scripts.comparison.recordings import swinging_clip
 from tests.thoroughness import tried
 

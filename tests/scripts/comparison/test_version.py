@@ -9,8 +9,8 @@ from importlib.metadata import PackageNotFoundError
 
 import bpy
 
-from scripts.comparison.version import blender_version, program_version
-from scripts.workplan.tasks import ROOT
+from rigid_motion_batch.comparison.version import blender_version, program_version
+from tests.scripts.comparing import ROOT
 
 
 def test_the_version_of_blender_is_that_which_would_be_loaded() -> None:
@@ -21,16 +21,16 @@ def test_a_blender_that_was_not_installed_by_pip_is_asked_itself(monkeypatch) ->
     def nothing_known(name: str) -> str:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("scripts.comparison.version.version", nothing_known)
+    monkeypatch.setattr("rigid_motion_batch.comparison.version.version", nothing_known)
     assert blender_version() == ".".join(map(str, bpy.app.version))
 
 
 def test_numbers_are_compared_without_loading_blender(tmp_path) -> None:
     script = """
 import json, sys
-from scripts import compare
+from rigid_motion_batch import compare
 code = compare.main(["assets/throw.csv", "--no-video", "--rates", "5", "--jobs", "0", "--output", sys.argv[1]])
-from scripts.comparison.version import program_version
+from rigid_motion_batch.comparison.version import program_version
 print(json.dumps({"code": code, "loaded": "bpy" in sys.modules, "version": program_version()}))
 """
     done = subprocess.run(

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.motion import Poses
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reading import read_clips
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reading import read_clips
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
 

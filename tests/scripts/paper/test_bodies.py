@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import MODES as ALL_MODES
-from addon.motion import Poses, interpolate
-from scripts.comparison.study.bodies import moving
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.metrics import NOTHING
-from scripts.comparison.study.needed import evenly_spaced
-from scripts.paper import bodies
-from scripts.paper.bodies import ALONE, BODY, IN_PARENTS, KeysOfBody, Limb
-from scripts.trajectories import TrajectoryError
+from rigid_motion.motion import MODES as ALL_MODES
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.comparison.study.bodies import moving
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.metrics import NOTHING
+from rigid_motion_batch.comparison.study.needed import evenly_spaced
+from rigid_motion_batch.paper import bodies
+from rigid_motion_batch.paper.bodies import ALONE, BODY, IN_PARENTS, KeysOfBody, Limb
+from rigid_motion_batch.trajectories import TrajectoryError
 from tests.motion.bodies import body_errors, in_root_space
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body

@@ -8,11 +8,22 @@ from pathlib import Path
 
 import pytest
 
-from scripts.paper.bodies import ALONE, BODY, IN_PARENTS, LIMBS, MODES, Apart, Body, ErrorOfBody, KeysOfBody, Limb
-from scripts.paper.bodies_section import FILES, HEADING, BodyResults, bodies_section, quoted
-from scripts.paper.page import with_section, write_page
-from scripts.paper.results import Results
-from scripts.rows import write_rows
+from rigid_motion_batch.paper.bodies import (
+    ALONE,
+    BODY,
+    IN_PARENTS,
+    LIMBS,
+    MODES,
+    Apart,
+    Body,
+    ErrorOfBody,
+    KeysOfBody,
+    Limb,
+)
+from rigid_motion_batch.paper.bodies_section import FILES, HEADING, BodyResults, bodies_section, quoted
+from rigid_motion_batch.paper.page import with_section, write_page
+from rigid_motion_batch.paper.results import Results
+from rigid_motion_batch.rows import write_rows
 
 FACTORS = {"lerp_slerp": 1.0, "dq_sclerp": 1.25, "pga_lerp": 1.25, "motor_spline": 0.5}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scripts.paper.bows import RATES, bows_of
+from rigid_motion_batch.paper.bows import RATES, bows_of
 from tests.scripts.comparison.recordings import swinging_clip
 from tests.scripts.paper.clips import circling, spinning_straight
 

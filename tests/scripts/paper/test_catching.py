@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from addon.motion import MODES
-from addon.motion.quaternions import angle_between, rotate
-from scripts.paper import catching
-from scripts.paper.catching import CATCH, GRIP, LINK, RATES, RELEASE, View
+from rigid_motion.motion import MODES
+from rigid_motion.motion.quaternions import angle_between, rotate
+from rigid_motion_batch.paper import catching
+from rigid_motion_batch.paper.catching import CATCH, GRIP, LINK, RATES, RELEASE, View
 from tests.scripts.paper.clips import thrown
 
 

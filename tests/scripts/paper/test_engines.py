@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from addon.motion import MODES
-from addon.motion.modes import Mode
-from scripts.paper import engines
-from scripts.streaming import PACKINGS
+from rigid_motion.motion import MODES
+from rigid_motion.motion.modes import Mode
+from rigid_motion_batch.paper import engines
+from rigid_motion_batch.streaming import PACKINGS
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -39,7 +39,7 @@ def test_a_mode_that_is_added_to_the_table_is_drawn(monkeypatch: pytest.MonkeyPa
     def reference(first, second, u):
         raise NotImplementedError
 
-    reference.__module__ = "addon.motion.algebras.octonions"
+    reference.__module__ = "rigid_motion.motion.algebras.octonions"
     added: Mode = replace(MODES["dq_sclerp"], label="Octonions", reference=reference)
     monkeypatch.setitem(MODES, "octo", added)
     words = words_of(engines.draw())

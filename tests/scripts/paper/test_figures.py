@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from scripts.comparison.stage.film import render_still
-from scripts.paper import claims, picture, strips, triangle
-from scripts.paper.catching import build, views
+from rigid_motion_batch.comparison.stage.film import render_still
+from rigid_motion_batch.paper import claims, picture, strips, triangle
+from rigid_motion_batch.paper.catching import build, views
 from tests.scripts.paper.clips import thrown
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.paper.motions import RECORDINGS, REST, read_motion, recordings_in, spread
-from scripts.trajectories import TrajectoryError, read_trajectories
+from rigid_motion_batch.paper.motions import RECORDINGS, REST, read_motion, recordings_in, spread
+from rigid_motion_batch.trajectories import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS as FOLDER
 from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
 

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from scripts.paper import claims, table, triangle, wording
-from scripts.paper.bandwidths import Bandwidth
-from scripts.paper.bows import Bow
-from scripts.paper.catching import View
-from scripts.paper.motions import ASSETS, RECORDINGS, Motion
-from scripts.paper.page import write_page
-from scripts.paper.results import Results
-from scripts.paper.strips import Instant
-from scripts.paper.table import ADAPTIVE, UNIFORM, LookAhead, Needed
-from scripts.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Timing
-from scripts.rows import write_rows
+from rigid_motion_batch.paper import claims, table, triangle, wording
+from rigid_motion_batch.paper.bandwidths import Bandwidth
+from rigid_motion_batch.paper.bows import Bow
+from rigid_motion_batch.paper.catching import View
+from rigid_motion_batch.paper.motions import ASSETS, RECORDINGS, Motion
+from rigid_motion_batch.paper.page import write_page
+from rigid_motion_batch.paper.results import Results
+from rigid_motion_batch.paper.strips import Instant
+from rigid_motion_batch.paper.table import ADAPTIVE, UNIFORM, LookAhead, Needed
+from rigid_motion_batch.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Timing
+from rigid_motion_batch.rows import write_rows
 
 MODES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
 

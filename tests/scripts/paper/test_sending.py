@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.motion import rms
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.modes import REFERENCE
-from scripts.paper import claims, sending
-from scripts.paper.page import with_section
-from scripts.paper.sending import Sent, SentNeeded, at_delay, mean_sending, packet_bytes, sending_needed
-from scripts.paper.sending_section import HEADING, in_short, sending_section
-from scripts.paper.table import UNIFORM, YARDSTICKS, Point
-from scripts.streaming import PACKINGS, TWISTS, Packets
-from scripts.streaming.needed import send_when_needed
+from rigid_motion.motion import rms
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.modes import REFERENCE
+from rigid_motion_batch.paper import claims, sending
+from rigid_motion_batch.paper.page import with_section
+from rigid_motion_batch.paper.sending import Sent, SentNeeded, at_delay, mean_sending, packet_bytes, sending_needed
+from rigid_motion_batch.paper.sending_section import HEADING, in_short, sending_section
+from rigid_motion_batch.paper.table import UNIFORM, YARDSTICKS, Point
+from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets
+from rigid_motion_batch.streaming.needed import send_when_needed
 from tests.scripts.streaming.motions import swinging
 
 

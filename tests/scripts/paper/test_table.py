@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import MODES
-from scripts.paper import claims, table
-from scripts.paper.table import ADAPTIVE, UNIFORM, Needed, Point
+from rigid_motion.motion import MODES
+from rigid_motion_batch.paper import claims, table
+from rigid_motion_batch.paper.table import ADAPTIVE, UNIFORM, Needed, Point
 from tests.scripts.paper.clips import circling, spinning_straight
 
 FIRST = next(iter(table.YARDSTICKS))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import MODES
-from scripts.paper import claims, timing
-from scripts.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Work
+from rigid_motion.motion import MODES
+from rigid_motion_batch.paper import claims, timing
+from rigid_motion_batch.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Work
 from tests.scripts.paper.clips import circling
 
 CLIP = circling(turns=0.7, rate=90.0, seconds=1.0)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.motion import Poses, interpolate
-from addon.motion.quaternions import angle_between, normalise
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reading import read_clips
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between, normalise
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reading import read_clips
 from tests.recordings import RECORDINGS
 
 FRAME = 1.0 / 60.0

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Poses
-from scripts.streaming import Link, PlayOut, What, receive, send
+from rigid_motion.motion import MODES, Poses
+from rigid_motion_batch.streaming import Link, PlayOut, What, receive, send
 from tests.scripts.streaming.motions import FRAME, SOURCES, clips, fastest, steps, swinging
 from tests.thoroughness import sample, tried
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import MODES
-from scripts.streaming.known_keys import NONE, KnownKeys
+from rigid_motion.motion import MODES
+from rigid_motion_batch.streaming.known_keys import NONE, KnownKeys
 from tests.scripts.streaming.motions import swinging
 
 ALL_KNOWN = 100.0

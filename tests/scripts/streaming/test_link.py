@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scripts.streaming import Link, send
+from rigid_motion_batch.streaming import Link, send
 from tests.scripts.streaming.motions import swinging
 
 COUNT = 20_000

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.motion import MODES
-from addon.motion.quaternions import angle_between
-from scripts.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive, send
-from scripts.streaming.live import MOST_PACKETS, LiveReceiver
-from scripts.streaming.packets import HEADER, sealed
-from scripts.streaming.wire import Terms, beat, changed
+from rigid_motion.motion import MODES
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.streaming import PACKINGS, TWISTS, Link, Packets, Playback, PlayOut, What, receive, send
+from rigid_motion_batch.streaming.live import MOST_PACKETS, LiveReceiver
+from rigid_motion_batch.streaming.packets import HEADER, sealed
+from rigid_motion_batch.streaming.wire import Terms, beat, changed
 from tests.scripts.streaming.motions import swinging
 from tests.thoroughness import THOROUGH, sample, tried
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import Poses, interpolate
-from addon.motion.quaternions import angle_between
-from scripts.streaming import PACKINGS, Packets, bandwidth, send
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.streaming import PACKINGS, Packets, bandwidth, send
 from tests.scripts.streaming.motions import swinging
 
 

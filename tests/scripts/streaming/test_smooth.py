@@ -7,10 +7,10 @@ import pytest
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses, interpolate
-from addon.motion.quaternions import angle_between
-from scripts.streaming import PACKINGS, TWISTS, Packets, receive
-from scripts.streaming.smooth import between, fitted, moved
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets, receive
+from rigid_motion_batch.streaming.smooth import between, fitted, moved
 from tests.scripts.streaming.motions import swinging
 
 

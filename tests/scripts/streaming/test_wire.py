@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from addon.motion import MODES
-from scripts.streaming import PACKINGS, TWISTS, Packets, PlayOut
-from scripts.streaming.packets import HEADER, KEY, sealed
-from scripts.streaming.wire import (
+from rigid_motion.motion import MODES
+from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets, PlayOut
+from rigid_motion_batch.streaming.packets import HEADER, KEY, sealed
+from rigid_motion_batch.streaming.wire import (
     BEAT,
     BYE,
     CHALLENGE,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.trajectories import ReadingOptions, TrajectoryError, read_trajectories
+from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError, read_trajectories
 
 
 @pytest.fixture

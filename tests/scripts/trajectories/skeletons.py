@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.hushing import hushed
+from rigid_motion_batch.hushing import hushed
 from tests.blank import blank
 from tests.scripts.trajectories.blends import key, rig
 

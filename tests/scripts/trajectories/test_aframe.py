@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scripts.trajectories import read_trajectories
+from rigid_motion_batch.trajectories import read_trajectories
 
 
 def device(offset: float = 0.0, **extra: object) -> dict:

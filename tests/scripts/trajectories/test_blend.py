@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.trajectories import read_trajectories
+from rigid_motion_batch.trajectories import read_trajectories
 from tests.scripts.trajectories.blends import FPS, empty, key
 
 bpy = pytest.importorskip("bpy")

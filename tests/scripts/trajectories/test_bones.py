@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scripts.trajectories import Trajectory, read_trajectories
+from rigid_motion_batch.trajectories import Trajectory, read_trajectories
 from tests.scripts.trajectories.blends import FPS, empty, key, rig
 
 bpy = pytest.importorskip("bpy")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.trajectories import TrajectoryError, bvh, read_trajectories, tables
+from rigid_motion_batch.trajectories import TrajectoryError, bvh, read_trajectories, tables
 from tests.scripts.trajectories.seeds import COUNT, SEEDS, repeated
 
 SIZE = 200_000

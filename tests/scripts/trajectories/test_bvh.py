@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion.quaternions import angle_between
-from scripts.trajectories import read_trajectories
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.trajectories import read_trajectories
 from tests.scripts.trajectories import seeds
 
 ARM = f"""{seeds.ARM}Frames: 2

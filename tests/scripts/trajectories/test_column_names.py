@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from scripts.trajectories import ReadingOptions
-from scripts.trajectories.column_names import ColumnName, column_name, unit_in
-from scripts.trajectories.columns import layout_of
+from rigid_motion_batch.trajectories import ReadingOptions
+from rigid_motion_batch.trajectories.column_names import ColumnName, column_name, unit_in
+from rigid_motion_batch.trajectories.columns import layout_of
 from tests.scripts.trajectories import logs
 
 

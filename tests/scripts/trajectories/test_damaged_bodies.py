@@ -12,7 +12,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from scripts.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.choices import Uniform
 from tests.blank import blank
 from tests.scripts.trajectories.mutations import NUMBERS, WORDS, in_place, mutated
 from tests.scripts.trajectories.skeletons import body, export, skinned

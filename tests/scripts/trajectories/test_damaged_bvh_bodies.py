@@ -16,14 +16,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from addon.motion import KEYFRAME_MODES
-from scripts.comparison.report.body_charts import body_charts, body_curves
-from scripts.comparison.study.bodies import reconstruct_body
-from scripts.comparison.study.body_metrics import measure_modes
-from scripts.comparison.study.choices import Choice, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reading import read_source
-from scripts.trajectories import TrajectoryError
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.comparison.report.body_charts import body_charts, body_curves
+from rigid_motion_batch.comparison.study.bodies import reconstruct_body
+from rigid_motion_batch.comparison.study.body_metrics import measure_modes
+from rigid_motion_batch.comparison.study.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reading import read_source
+from rigid_motion_batch.trajectories import TrajectoryError
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.mutations import mutated
 from tests.scripts.trajectories.test_fuzz import PATIENCE, assert_is_one_line

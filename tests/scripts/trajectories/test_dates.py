@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scripts.trajectories import ReadingOptions, read_trajectories
+from rigid_motion_batch.trajectories import ReadingOptions, read_trajectories
 
 POSE = "1,2,3,0,0,0,1"
 

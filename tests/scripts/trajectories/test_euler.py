@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion.quaternions import angle_between
-from scripts.trajectories.euler import quaternions_from_intrinsic_eulers
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.trajectories.euler import quaternions_from_intrinsic_eulers
 
 ORDERS = ["".join(order) for count in (1, 2, 3) for order in permutations("XYZ", count)]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scripts.trajectories import read_trajectories
+from rigid_motion_batch.trajectories import read_trajectories
 
 HEADER = (
     "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "

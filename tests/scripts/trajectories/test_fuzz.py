@@ -21,13 +21,13 @@ from random import Random
 import numpy as np
 import pytest
 
-from addon.motion import MODES, interpolate, measure, reduce_keys
-from scripts.comparison.study.bodies import reconstruct_body
-from scripts.comparison.study.body_metrics import measure_modes
-from scripts.comparison.study.choices import Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reading import make_clip
-from scripts.trajectories import TrajectoryError, read_trajectories
+from rigid_motion.motion import MODES, interpolate, measure, reduce_keys
+from rigid_motion_batch.comparison.study.bodies import reconstruct_body
+from rigid_motion_batch.comparison.study.body_metrics import measure_modes
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reading import make_clip
+from rigid_motion_batch.trajectories import TrajectoryError, read_trajectories
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.mutations import in_place, mutated
 from tests.scripts.trajectories.seeds import SEEDS

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import Poses
-from addon.motion.poses import inverse, placed
-from addon.motion.quaternions import rotate
-from scripts.hushing import hushed
-from scripts.trajectories import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
-from scripts.trajectories.fbx_records import FIRST
+from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.trajectories import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
+from rigid_motion_batch.trajectories.fbx_records import FIRST
 from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.blends import empty, key, rig
@@ -133,7 +133,7 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
 
 def test_too_many_vertices_are_no_skin(exported, monkeypatch: pytest.MonkeyPatch) -> None:
     path, _ = exported(".fbx")
-    monkeypatch.setattr("scripts.trajectories.skins.MOST_VERTICES", 3)
+    monkeypatch.setattr("rigid_motion_batch.trajectories.skins.MOST_VERTICES", 3)
     assert whole(path).figure.skin is None
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from scripts.trajectories import ReadingOptions, read_trajectories
+from rigid_motion_batch.trajectories import ReadingOptions, read_trajectories
 from tests.scripts.trajectories import logs
 from tests.scripts.trajectories.logs import MOTIONS, assert_is_the_motion, log, names, spellings
 from tests.thoroughness import tried

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scripts.trajectories import read_trajectories
+from rigid_motion_batch.trajectories import read_trajectories
 
 SETTINGS = (
     "Format Version,1.23,Take Name,Take 3,Capture Frame Rate,120.000000,Export Frame Rate,120.000000,"

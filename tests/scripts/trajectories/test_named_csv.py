@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scripts.trajectories import ReadingOptions, read_trajectories
-from scripts.trajectories.sense import FEWEST
+from rigid_motion_batch.trajectories import ReadingOptions, read_trajectories
+from rigid_motion_batch.trajectories.sense import FEWEST
 from tests.thoroughness import tried
 
 HEADER = "t,x,y,z,qx,qy,qz,qw"

@@ -8,8 +8,8 @@ from dataclasses import asdict
 
 import pytest
 
-from scripts.trajectories import ReadingOptions
-from scripts.trajectories.arguments import add_reading_options, reading_options
+from rigid_motion_batch.trajectories import ReadingOptions
+from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
 
 SAID = ["--columns", "t=when, x=a,device=who", "--time-unit", "ms", "--scale", "0.01", "--euler", "zxy", "--degrees"]
 MEANT = ReadingOptions((("t", "when"), ("x", "a"), ("device", "who")), "ms", 0.01, "zxy", True)

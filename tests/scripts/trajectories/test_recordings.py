@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion.quaternions import angle_between
-from scripts.trajectories import read_trajectories
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.trajectories import read_trajectories
 from tests.recordings import RECORDINGS
 
 FILES = sorted(path for path in RECORDINGS.glob("*") if path.suffix != ".md")

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.motion import Poses
-from scripts.figures import Figure
-from scripts.trajectories import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
-from scripts.trajectories.sense import doubts, require_one_body
-from scripts.trajectories.times import typical_interval
+from rigid_motion.motion import Poses
+from rigid_motion_batch.figures import Figure
+from rigid_motion_batch.trajectories import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
+from rigid_motion_batch.trajectories.sense import doubts, require_one_body
+from rigid_motion_batch.trajectories.times import typical_interval
 from tests.recordings import RECORDINGS
 
 COUNT = 90

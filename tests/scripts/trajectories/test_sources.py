@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.trajectories import TrajectoryError, read_trajectories
-from scripts.trajectories.reading import FORMATS, files_of, split_source
-from scripts.trajectories.recordings import listed, unique
+from rigid_motion_batch.trajectories import TrajectoryError, read_trajectories
+from rigid_motion_batch.trajectories.reading import FORMATS, files_of, split_source
+from rigid_motion_batch.trajectories.recordings import listed, unique
 
 CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
 BVH = """HIERARCHY
@@ -168,7 +168,7 @@ def test_text_formats_need_no_blender(write) -> None:
     """Only .blend does: elsewhere reading works where bpy cannot even be imported."""
     script = (
         "import sys; sys.modules['bpy'] = None\n"
-        "from scripts.trajectories import read_trajectories, TrajectoryError\n"
+        "from rigid_motion_batch.trajectories import read_trajectories, TrajectoryError\n"
         "for source in sys.argv[1:3]: read_trajectories(source)\n"
         "try: read_trajectories(sys.argv[3])\n"
         "except TrajectoryError as error: print(error)\n"

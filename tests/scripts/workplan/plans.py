@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from scripts.workplan import Executor, Outcome, Plan, ProcessExecutor, SerialExecutor, State, Task, Workspace, run
+from rigid_motion_batch.workplan import (
+    Executor,
+    Outcome,
+    Plan,
+    ProcessExecutor,
+    SerialExecutor,
+    State,
+    Task,
+    Workspace,
+    run,
+)
 
 STEPS = "tests.scripts.workplan.steps"
 

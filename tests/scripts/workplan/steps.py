@@ -9,7 +9,7 @@ import signal
 import time
 from pathlib import Path
 
-from scripts.workplan import Job, TaskError, step
+from rigid_motion_batch.workplan import Job, TaskError, step
 
 
 @step

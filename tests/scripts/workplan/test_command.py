@@ -1,4 +1,4 @@
-"""`python -m scripts.workplan`: one task of a plan that another program has written."""
+"""`python -m rigid_motion_batch.workplan`: one task of a plan that another program has written."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts.workplan import Plan
-from scripts.workplan.__main__ import main
+from rigid_motion_batch.workplan import Plan
+from rigid_motion_batch.workplan.__main__ import main
 from tests.scripts.workplan.plans import STEPS, contents, done, joining, run_in, states, task, up_to_date
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -50,7 +50,7 @@ def test_tasks_are_done_one_by_one_and_a_later_run_knows(planned: Path, capsys: 
 
 def test_it_works_from_another_folder_as_a_process_of_its_own(planned: Path, tmp_path: Path) -> None:
     Path("in.csv").write_text("1")
-    command = [sys.executable, "-m", "scripts.workplan", "run", str(planned), "a"]
+    command = [sys.executable, "-m", "rigid_motion_batch.workplan", "run", str(planned), "a"]
     assert subprocess.run(command, cwd=ROOT, timeout=60, capture_output=True).returncode == 0
     assert contents(planned)["a.txt"] == "1"
 
@@ -143,4 +143,4 @@ def test_a_plan_from_a_stranger_runs_nothing_but_steps(planned: Path, capsys: py
     path = planned / ".workplan" / "plan.json"
     path.write_text(path.read_text().replace("tests.scripts.workplan.steps:copy", "os:system"))
     assert run_one(planned, "a") == 1
-    assert "this checkout has no module os" in capsys.readouterr().err
+    assert "this program has no module os" in capsys.readouterr().err

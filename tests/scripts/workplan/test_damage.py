@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scripts.workplan import Plan, Task
-from scripts.workplan.__main__ import main
-from scripts.workplan.manifest import Manifest
+from rigid_motion_batch.workplan import Plan, Task
+from rigid_motion_batch.workplan.__main__ import main
+from rigid_motion_batch.workplan.manifest import Manifest
 from tests.scripts.workplan.plans import contents, done, joining, run_in, states, task, up_to_date
 from tests.thoroughness import tried
 

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from scripts import compare
-from scripts.workplan import ExecutorError, Plan, Workspace, run
-from scripts.workplan.dask_executor import DaskExecutor
-from scripts.workplan.running import order_for
+from rigid_motion_batch import compare
+from rigid_motion_batch.workplan import ExecutorError, Plan, Workspace, run
+from rigid_motion_batch.workplan.dask_executor import DaskExecutor
+from rigid_motion_batch.workplan.running import order_for
 from tests.scripts.comparing import outputs, write_toss
 from tests.scripts.workplan.plans import STEPS, contents, done, joining, run_in, states, task
 from tests.thoroughness import THOROUGH
@@ -28,6 +28,9 @@ ROOT = Path(__file__).resolve().parents[3]
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/task").exists(), reason="kills, and looks for processes where Linux shows them"
 )
+
+PATH = os.environ["PYTHONPATH"]
+"""Of modules: this program, and the steps of the tests."""
 
 
 class Cluster:
@@ -47,10 +50,10 @@ class Cluster:
         """Those that live."""
         return [process for process in self.processes[1:] if process.poll() is None]
 
-    def add_worker(self, checkout: Path = ROOT) -> subprocess.Popen:
+    def add_worker(self, program: str | Path = PATH) -> subprocess.Popen:
         options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
         command = ("worker", self.address, *options, "--local-directory", self.folder)
-        return self._start(*command, checkout=checkout)
+        return self._start(*command, program=program)
 
     def stop(self) -> None:
         for process in self.processes:
@@ -58,11 +61,11 @@ class Cluster:
         for process in self.processes:
             process.wait()
 
-    def _start(self, *command: object, checkout: Path = ROOT) -> subprocess.Popen:
+    def _start(self, *command: object, program: str | Path = PATH) -> subprocess.Popen:
         process = subprocess.Popen(
             [sys.executable, "-m", "dask", *map(str, command)],
             cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(checkout)},
+            env=os.environ | {"PYTHONPATH": str(program)},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
@@ -169,11 +172,11 @@ def test_workers_of_another_version_are_left_out(cluster: Cluster, tmp_path: Pat
 def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, tmp_path: Path) -> None:
     connecting = Connecting(tmp_path, cluster.address)
     with Workspace(tmp_path), connecting.executor as executor:
-        stranger = cluster.add_worker(checkout=tmp_path)
+        stranger = cluster.add_worker(program=tmp_path)
 
         def left_out() -> bool:
             executor.wait(lambda _: None, 0.1)
-            return any("it cannot import scripts.workplan.dask_worker" in note for note in connecting.notes)
+            return any("it cannot import rigid_motion_batch.workplan.dask_worker" in note for note in connecting.notes)
 
         wait_for(left_out)
         assert len(executor.workers) == 2

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from addon.motion import MODES
-from scripts.comparison.planning import Study, Wanted, comparison_tasks, reading_tasks
-from scripts.comparison.report.pages import Settings
-from scripts.comparison.study.choices import Uniform
-from scripts.comparison.study.radii import Radii
-from scripts.comparison.study.storage import ClipReference
-from scripts.progress import Progress
-from scripts.workplan import Plan, SerialExecutor, Workspace
-from scripts.workplan.running import RETRIES, _Run
+from rigid_motion.motion import MODES
+from rigid_motion_batch.comparison.planning import Study, Wanted, comparison_tasks, reading_tasks
+from rigid_motion_batch.comparison.report.pages import Settings
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.radii import Radii
+from rigid_motion_batch.comparison.study.storage import ClipReference
+from rigid_motion_batch.progress import Progress
+from rigid_motion_batch.workplan import Plan, SerialExecutor, Workspace
+from rigid_motion_batch.workplan.running import RETRIES, _Run
 
 CLIPS = 200
 

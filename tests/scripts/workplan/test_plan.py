@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.workplan import Plan, PlanError, Task
+from rigid_motion_batch.workplan import Plan, PlanError, Task
 from tests.scripts.workplan.plans import joining, task
 
 

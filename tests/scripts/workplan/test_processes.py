@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.workplan import Plan, ProcessExecutor, Workspace, run
+from rigid_motion_batch.workplan import Plan, ProcessExecutor, Workspace, run
 from tests.scripts.workplan.plans import STEPS, contents, done, joining, run_in, states, task
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -49,7 +49,9 @@ def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(tmp_pat
 
 
 def test_the_last_words_of_a_worker_are_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("scripts.workplan.processes._command", lambda: [sys.executable, "-c", "raise SystemExit('no')"])
+    monkeypatch.setattr(
+        "rigid_motion_batch.workplan.processes._command", lambda: [sys.executable, "-c", "raise SystemExit('no')"]
+    )
     outcome = run_in(tmp_path, task("a"), executor=ProcessExecutor(1), retries=0)
     assert outcome.failures["a"] == "a: its process died (exit code 1): no; given up after 1 attempts"
 
@@ -97,7 +99,7 @@ RUN = f"""
 import sys
 from pathlib import Path
 sys.path.insert(0, {str(ROOT)!r})
-from scripts.workplan import Plan, ProcessExecutor, Task, Workspace, run
+from rigid_motion_batch.workplan import Plan, ProcessExecutor, Task, Workspace, run
 tasks = [
     Task(str(n), "{STEPS}:sleep", {{"path": f"{{n}}.txt", "seconds": 60}}, outputs=(f"{{n}}.txt",)) for n in range(2)
 ]

@@ -13,9 +13,19 @@ from pathlib import Path
 
 import pytest
 
-from scripts.progress import Progress
-from scripts.workplan import FolderInUse, ManifestError, Outcome, Plan, SerialExecutor, State, Task, Workspace, run
-from scripts.workplan.hashing import code_version
+from rigid_motion_batch.progress import Progress
+from rigid_motion_batch.workplan import (
+    FolderInUse,
+    ManifestError,
+    Outcome,
+    Plan,
+    SerialExecutor,
+    State,
+    Task,
+    Workspace,
+    run,
+)
+from rigid_motion_batch.workplan.hashing import code_version
 from tests.scripts.workplan.plans import (
     EXECUTORS,
     STEPS,
@@ -184,8 +194,8 @@ def test_another_version_of_the_program_redoes_everything(output: Path, log: Log
 
 
 def test_the_version_is_that_of_the_source_files() -> None:
-    assert code_version("scripts/workplan") == code_version("scripts/workplan")
-    assert code_version("scripts/workplan") != code_version("scripts/workplan", "scripts/bootstrap.py")
+    plan, more = "rigid_motion_batch/workplan", "rigid_motion_batch/files.py"
+    assert code_version(plan) == code_version(plan) != code_version(plan, more)
 
 
 @pytest.mark.parametrize("damage", ["missing", "cut", "other content", "longer"])

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from scripts.comparison import steps
-from scripts.comparison.version import step_versions
-from scripts.workplan.module_text import read_module
-from scripts.workplan.sources import SourceReader
-from scripts.workplan.tasks import ROOT
+from rigid_motion_batch.comparison import steps
+from rigid_motion_batch.comparison.version import step_versions
+from rigid_motion_batch.places import NAMED
+from rigid_motion_batch.workplan.module_text import read_module
+from rigid_motion_batch.workplan.sources import SourceReader
+from tests.scripts.comparing import ROOT
 
 STEPS = ("read", "measure", "count_keys", "tabulate", "tabulate_keys", "build", "render", "encode")
 REPORTS = ("report", "clip_page", "overview")
@@ -36,23 +37,24 @@ def watch(event, arguments):
     if event == "open" and isinstance(arguments[0], str) and arguments[0].startswith(str(root)):
         opened.add(arguments[0])
 sys.addaudithook(watch)
-from scripts.workplan.tasks import find_step
-from scripts.workplan.performing import Made, Order, perform
+from rigid_motion_batch.places import name_of
+from rigid_motion_batch.workplan.tasks import find_step
+from rigid_motion_batch.workplan.performing import Made, Order, perform
 done = perform(Order(**fields), lambda message: None)
 assert isinstance(done, Made), done
 loaded = {module.__file__ for module in sys.modules.values() if getattr(module, "__file__", None)}
 named = {source_from_cache(path) if path.endswith(".pyc") else path for path in opened | loaded}
-own = [p for p in named if p.startswith(str(root) + "/") and not p.startswith(sys.prefix + "/")]
-print(json.dumps(sorted(Path(p).relative_to(root).as_posix() for p in own)))
+own = {name_of(Path(p)) for p in named if p.startswith(str(root) + "/") and not p.startswith(sys.prefix + "/")}
+print(json.dumps(sorted(own - {None})))
 """
 
 
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, object]]:
     """A comparison with films, whose tasks can be done again: for every step the order of a task."""
-    from scripts import compare
-    from scripts.workplan import Plan
-    from scripts.workplan.running import order_for
+    from rigid_motion_batch import compare
+    from rigid_motion_batch.workplan import Plan
+    from rigid_motion_batch.workplan.running import order_for
     from tests.scripts.comparing import write_toss
 
     output = tmp_path_factory.mktemp("compared")
@@ -89,8 +91,9 @@ def test_no_step_imports_or_opens_a_file_of_this_program_that_it_is_not_known_to
     )
     assert done.stdout, done.stderr
     used = set(json.loads(done.stdout.splitlines()[-1]))
-    plan = {file for file in used if file.startswith("scripts/workplan/")}
-    assert used - plan - {"scripts/comparison/steps.py", "scripts/progress.py"} - files[name] == set()
+    plan = {file for file in used if file.startswith("rigid_motion_batch/workplan/")}
+    own = {"rigid_motion_batch/comparison/steps.py", "rigid_motion_batch/progress.py"}
+    assert used - plan - own - files[name] == set()
     assert files[name] & used
 
 
@@ -128,7 +131,9 @@ TEXT = '''
 from __future__ import annotations
 import os.path
 from typing import TYPE_CHECKING
+from rigid_motion_batch.places import ASSETS
 from .near import one, two
+MODELS = ASSETS / "models.blend"
 if TYPE_CHECKING:
     from never import Type
 try:
@@ -148,7 +153,7 @@ def later():
 def test_imports_are_found_wherever_they_are_and_files_by_their_way_from_the_module(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("scripts.workplan.module_text.ROOT", tmp_path)
+    monkeypatch.setitem(NAMED, "top", tmp_path)
     (tmp_path / "package" / "near" / "page").mkdir(parents=True)
     (tmp_path / "data.txt").touch()
     path = tmp_path / "package" / "module.py"
@@ -158,13 +163,14 @@ def test_imports_are_found_wherever_they_are_and_files_by_their_way_from_the_mod
         ("__future__", ("annotations",)),
         ("os.path", ()),
         ("typing", ("TYPE_CHECKING",)),
+        ("rigid_motion_batch.places", ("ASSETS",)),
         ("top.package.near", ("one", "two")),
         ("perhaps", ()),
         ("top", ("instead",)),
     }
     assert set(module.at_once) == at_once
     assert set(module.imports) == at_once | {("far.off", ("thing",)), ("deep", ())}
-    assert module.places == ("data.txt", "package/near/page")
+    assert set(module.places) == {"assets/models.blend", "top/data.txt", "top/package/near/page"}
 
 
 def test_what_was_found_is_kept_and_looked_for_again_where_it_is_damaged(
@@ -177,6 +183,6 @@ def test_what_was_found_is_kept_and_looked_for_again_where_it_is_damaged(
     found = first.sources_of(wanted)
     first.keep()
     text = kept.read_text()
-    for content in (text, text[: len(text) // 2], '{"addon/motion/poses.py": [1]}'):
+    for content in (text, text[: len(text) // 2], '{"rigid_motion/motion/poses.py": [1]}'):
         kept.write_text(content)
         assert SourceReader(kept).sources_of(wanted) == found

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from scripts.workplan import Plan, Task, Workspace
-from scripts.workplan.__main__ import main
-from scripts.workplan.status import Status, explain
+from rigid_motion_batch.workplan import Plan, Task, Workspace
+from rigid_motion_batch.workplan.__main__ import main
+from rigid_motion_batch.workplan.status import Status, explain
 from tests.scripts.workplan.plans import STEPS, done, joining, run_in, states, task
 
 

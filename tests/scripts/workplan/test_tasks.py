@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from scripts.workplan import Job, Task
-from scripts.workplan.tasks import find_step
+from rigid_motion_batch.workplan import Job, Task
+from rigid_motion_batch.workplan.tasks import find_step
 from tests.scripts.workplan import steps
 from tests.scripts.workplan.plans import STEPS
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import pytest
 
-import addon
-from addon.ui.overlay import drawing
+import rigid_motion
+from rigid_motion.ui.overlay import drawing
 from tests.complaints import complaints
 
 
@@ -17,9 +17,9 @@ def scene(
     """The scene of a new file without objects."""
     # What was complained of before is complained of again.
     monkeypatch.setattr(drawing, "_complaint", "")
-    addon.register()
+    rigid_motion.register()
     try:
         yield empty_file.scene
     finally:
-        addon.unregister()
+        rigid_motion.unregister()
     assert complaints(caplog) == []

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import set_mode
-from addon.animation.transforms import transform_of
-from addon.ui.overlay import drawing
-from addon.ui.overlay.bones import space_of_bone
-from addon.ui.overlay.cache import notice_selection, paths_of
+from rigid_motion.animation import set_mode
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.ui.overlay import drawing
+from rigid_motion.ui.overlay.bones import space_of_bone
+from rigid_motion.ui.overlay.cache import notice_selection, paths_of
 from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
 
 WHOLE = np.arange(FRAMES[0], FRAMES[-1] + 1.0)

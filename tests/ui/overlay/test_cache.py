@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import set_mode
-from addon.ui.overlay import cache
-from addon.ui.overlay.cache import SPARE, keep_only, notice_selection, path_of
+from rigid_motion.animation import set_mode
+from rigid_motion.ui.overlay import cache
+from rigid_motion.ui.overlay.cache import SPARE, keep_only, notice_selection, path_of
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import key, new_object
 

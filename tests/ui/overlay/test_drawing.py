@@ -6,7 +6,7 @@ import logging
 
 import bpy
 
-from addon.ui.overlay import drawing
+from rigid_motion.ui.overlay import drawing
 from tests.animation.scenes import key, new_object
 from tests.complaints import complaints
 

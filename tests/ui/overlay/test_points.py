@@ -8,12 +8,12 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.animation import MODE_IDS, set_mode
-from addon.animation.inbetweens.mode_keys import source_of
-from addon.animation.transforms import ROWS
-from addon.motion import KEYFRAME_MODES, Poses, interpolate
-from addon.ui.overlay.cache import path_of
-from addon.ui.overlay.points import (
+from rigid_motion.animation import MODE_IDS, set_mode
+from rigid_motion.animation.inbetweens.mode_keys import source_of
+from rigid_motion.animation.transforms import ROWS
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.ui.overlay.cache import path_of
+from rigid_motion.ui.overlay.points import (
     AXES,
     FINENESS,
     MOST,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.ui.overlay.points import Path
-from addon.ui.overlay.spacing import CLEAR, TICK_GAP, on_screen, readable
+from rigid_motion.ui.overlay.points import Path
+from rigid_motion.ui.overlay.spacing import CLEAR, TICK_GAP, on_screen, readable
 
 SIZE = (1000.0, 500.0)
 

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from addon.motion import Poses
-from scripts.comparison.palette import ERROR_COLOURS, NEARLY_ALL
-from scripts.comparison.report.body_charts import (
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.palette import ERROR_COLOURS, NEARLY_ALL
+from rigid_motion_batch.comparison.report.body_charts import (
     LONGEST_NAME,
     MOST_ROWS,
     SHADES,
@@ -22,12 +22,12 @@ from scripts.comparison.report.body_charts import (
     heat_map_alone,
     short_names,
 )
-from scripts.comparison.report.markup import Markup
-from scripts.comparison.study.bodies import reconstruct_body
-from scripts.comparison.study.body_metrics import MeasuredBody, measure_modes
-from scripts.comparison.study.choices import Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.figures import Figure
+from rigid_motion_batch.comparison.report.markup import Markup
+from rigid_motion_batch.comparison.study.bodies import reconstruct_body
+from rigid_motion_batch.comparison.study.body_metrics import MeasuredBody, measure_modes
+from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.figures import Figure
 from tests.scripts.comparison.bodies import JOINTS, still_body, swinging_body
 
 MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scripts.comparison.report.charts import (
+from rigid_motion_batch.comparison.report.charts import (
     GRID_X,
     GRID_Y,
     HEIGHT,

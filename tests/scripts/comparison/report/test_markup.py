@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
-from scripts.comparison.report.markup import element, escape, join
+from rigid_motion_batch.comparison.report.markup import element, escape, join
 
 
 def test_a_string_is_text_and_an_element_is_markup() -> None:

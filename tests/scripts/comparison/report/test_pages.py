@@ -16,19 +16,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import KEYFRAME_MODES
-from scripts.comparison.palette import colour_of
-from scripts.comparison.report.charts import GRID_X, GRID_Y
-from scripts.comparison.report.clip_section import COLUMNS
-from scripts.comparison.report.error_charts import errors_over_time
-from scripts.comparison.report.pages import Settings, write_clip_page, write_overview, write_report
-from scripts.comparison.study.choices import Tolerance, Uniform
-from scripts.comparison.study.metrics import measure_reconstruction
-from scripts.comparison.study.modes import BEST_OF, label_of
-from scripts.comparison.study.needed import KeysNeeded, OfRigidBody, keys_needed
-from scripts.comparison.study.reconstructions import Reconstruction
-from scripts.comparison.study.reconstructions import reconstruct as choose
-from scripts.comparison.study.results import ClipFacts, ClipResults, Result
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.comparison.palette import colour_of
+from rigid_motion_batch.comparison.report.charts import GRID_X, GRID_Y
+from rigid_motion_batch.comparison.report.clip_section import COLUMNS
+from rigid_motion_batch.comparison.report.error_charts import errors_over_time
+from rigid_motion_batch.comparison.report.pages import Settings, write_clip_page, write_overview, write_report
+from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
+from rigid_motion_batch.comparison.study.metrics import measure_reconstruction
+from rigid_motion_batch.comparison.study.modes import BEST_OF, label_of
+from rigid_motion_batch.comparison.study.needed import KeysNeeded, OfRigidBody, keys_needed
+from rigid_motion_batch.comparison.study.reconstructions import Reconstruction
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct as choose
+from rigid_motion_batch.comparison.study.results import ClipFacts, ClipResults, Result
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 VOID = {"meta", "link", "br", "img", "input", "hr", "source"}

@@ -9,20 +9,20 @@ from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 from scipy.spatial.transform import Rotation
 
-from addon import animation
-from addon.motion import KEYFRAME_MODES, MODES, Poses
-from addon.motion.quaternions import angle_between
-from scripts.axes import to_blender
-from scripts.comparison.palette import full_colour
-from scripts.comparison.stage.armature import Rest, Rig
-from scripts.comparison.stage.bodies import ERROR, SHADES, flashes
-from scripts.comparison.stage.body_scene import build_body_stage
-from scripts.comparison.stage.film import save_blend
-from scripts.comparison.stage.physique import BONE
-from scripts.comparison.stage.settings import StageSettings
-from scripts.comparison.stage.timeline import Timeline
-from scripts.comparison.study.bodies import BodyReconstruction, reconstruct_body
-from scripts.comparison.study.choices import Tolerance, Uniform
+from rigid_motion import animation
+from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.comparison.palette import full_colour
+from rigid_motion_batch.comparison.stage.armature import Rest, Rig
+from rigid_motion_batch.comparison.stage.bodies import ERROR, SHADES, flashes
+from rigid_motion_batch.comparison.stage.body_scene import build_body_stage
+from rigid_motion_batch.comparison.stage.film import save_blend
+from rigid_motion_batch.comparison.stage.physique import BONE
+from rigid_motion_batch.comparison.stage.settings import StageSettings
+from rigid_motion_batch.comparison.stage.timeline import Timeline
+from rigid_motion_batch.comparison.study.bodies import BodyReconstruction, reconstruct_body
+from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
 from tests.scripts.comparison.dancers import JOINTS, dancing_clip
 from tests.scripts.comparison.stage.test_scene import evaluated_points
 from tests.thoroughness import sample

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import Poses
-from scripts.comparison.stage.deviations import largest_deviation, magnification, magnified
-from scripts.comparison.stage.layout import swept_points
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.stage.deviations import largest_deviation, magnification, magnified
+from rigid_motion_batch.comparison.stage.layout import swept_points
 
 RANDOM = np.random.default_rng(8)
 MIDDLE = np.array((0.03, -0.1, 0.05))

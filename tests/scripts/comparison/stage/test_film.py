@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 import pytest
 
-from scripts.comparison.stage.film import join_pieces, render_film, render_piece, save_blend
-from scripts.comparison.stage.scene import build_stage
-from scripts.comparison.stage.settings import StageSettings
+from rigid_motion_batch.comparison.stage.film import join_pieces, render_film, render_piece, save_blend
+from rigid_motion_batch.comparison.stage.scene import build_stage
+from rigid_motion_batch.comparison.stage.settings import StageSettings
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 SETTINGS = StageSettings(resolution=(160, 90), fps=10)

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import Poses
-from scripts.comparison.stage.framing import Framing, Jointed, Solid
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.stage.framing import Framing, Jointed, Solid
 
 CUBE = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
 STILL = (1.0, 0.0, 0.0, 0.0)

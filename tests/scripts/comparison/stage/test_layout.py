@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from addon.motion import Poses
-from addon.motion.quaternions import rotate
-from scripts.comparison.stage import layout
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.comparison.stage import layout
 
 SHAPES = {"wide": (3.0, 0.4), "tall": (0.3, 2.0), "square": (1.0, 1.0), "tiny": (1e-3, 2e-3), "huge": (400.0, 90.0)}
 ASPECTS = {"16:9": 16 / 9, "4:3": 4 / 3, "portrait": 9 / 16}

@@ -9,19 +9,19 @@ import pytest
 from bpy_extras.object_utils import world_to_camera_view
 from mathutils import Vector
 
-from addon.animation import channelbag_of, read_poses
-from addon.motion import KEYFRAME_MODES, Poses, interpolate
-from addon.motion.quaternions import angle_between, conjugate, multiply, rotate
-from scripts.axes import to_blender
-from scripts.comparison.stage import layout
-from scripts.comparison.stage.nodes import input_path
-from scripts.comparison.stage.scene import build_stage
-from scripts.comparison.stage.settings import StageSettings
-from scripts.comparison.stage.subject import vertices_of
-from scripts.comparison.stage.timeline import Timeline
-from scripts.comparison.study.choices import Tolerance
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reconstructions import reconstruct as choose
+from rigid_motion.animation import channelbag_of, read_poses
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.comparison.stage import layout
+from rigid_motion_batch.comparison.stage.nodes import input_path
+from rigid_motion_batch.comparison.stage.scene import build_stage
+from rigid_motion_batch.comparison.stage.settings import StageSettings
+from rigid_motion_batch.comparison.stage.subject import vertices_of
+from rigid_motion_batch.comparison.stage.timeline import Timeline
+from rigid_motion_batch.comparison.study.choices import Tolerance
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 from tests.thoroughness import sample
 

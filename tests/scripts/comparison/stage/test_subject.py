@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 import pytest
 
-from scripts.comparison.stage.settings import MODELS, SubjectError
-from scripts.comparison.stage.subject import load_subject, shrink, tinted_slots, vertices_of
+from rigid_motion_batch.comparison.stage.settings import MODELS, SubjectError
+from rigid_motion_batch.comparison.stage.subject import load_subject, shrink, tinted_slots, vertices_of
 
 
 def painted(picture: Path) -> bpy.types.Material:

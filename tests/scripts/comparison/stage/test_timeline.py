@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from addon.motion import Poses, interpolate
-from scripts.comparison.stage.timeline import ShownMotion, Timeline
-from scripts.comparison.study.choices import Uniform
-from scripts.comparison.study.modes import BEST_OF
-from scripts.comparison.study.reconstructions import reconstruct as choose
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.comparison.stage.timeline import ShownMotion, Timeline
+from rigid_motion_batch.comparison.study.choices import Uniform
+from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 

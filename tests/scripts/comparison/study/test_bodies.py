@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from addon.motion import KEYFRAME_MODES, Poses
-from scripts.comparison.study import bodies
-from scripts.comparison.study.bodies import (
+from rigid_motion.motion import KEYFRAME_MODES, Poses
+from rigid_motion_batch.comparison.study import bodies
+from rigid_motion_batch.comparison.study.bodies import (
     BodyErrors,
     BodyReconstruction,
     Ground,
@@ -22,9 +22,9 @@ from scripts.comparison.study.bodies import (
     rms_of_body,
     same_body_motions,
 )
-from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.reconstructions import reconstruct
+from rigid_motion_batch.comparison.study.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
 from tests.motion.bodies import body_errors
 from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
 from tests.scripts.comparison.recordings import swinging_clip

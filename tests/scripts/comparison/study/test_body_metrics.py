@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import KEYFRAME_MODES
-from scripts.comparison.study import bodies
-from scripts.comparison.study.bodies import Ground, measure_body, reconstruct_body
-from scripts.comparison.study.body_metrics import (
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.comparison.study import bodies
+from rigid_motion_batch.comparison.study.bodies import Ground, measure_body, reconstruct_body
+from rigid_motion_batch.comparison.study.body_metrics import (
     COLUMNS,
     MeasuredBody,
     join_tables,
@@ -23,10 +23,10 @@ from scripts.comparison.study.body_metrics import (
     write_joint_metrics,
     write_key_tables,
 )
-from scripts.comparison.study.body_storage import read_body_keys, write_body_keys
-from scripts.comparison.study.choices import Choice, Tolerance, Uniform
-from scripts.comparison.study.metrics import body_table_names, write_metrics
-from scripts.rows import meant
+from rigid_motion_batch.comparison.study.body_storage import read_body_keys, write_body_keys
+from rigid_motion_batch.comparison.study.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.metrics import body_table_names, write_metrics
+from rigid_motion_batch.rows import meant
 from tests.scripts.comparison.bodies import JOINTS, swinging_body
 
 HEADER = (

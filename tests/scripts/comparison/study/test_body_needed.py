@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.motion import Poses
-from scripts.comparison.study.body_needed import NEAR, OfBody
-from scripts.comparison.study.metrics import NOTHING
-from scripts.comparison.study.needed import RATES, KeysNeeded, evenly_spaced, from_json, keys_needed, to_json
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.study.body_needed import NEAR, OfBody
+from rigid_motion_batch.comparison.study.metrics import NOTHING
+from rigid_motion_batch.comparison.study.needed import RATES, KeysNeeded, evenly_spaced, from_json, keys_needed, to_json
 from tests.motion.bodies import body_errors
 from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from addon.motion import KEYFRAME_MODES, Poses, interpolate
-from scripts.comparison.study.choices import Budget, Choice, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.modes import BEST_OF
-from scripts.comparison.study.reconstructions import reconstruct
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion_batch.comparison.study.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
 from tests.balls import largest_displacements
 from tests.scripts.comparison.recordings import swinging_clip
 

@@ -16,14 +16,14 @@ import pytest
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation, Slerp
 
-from scripts.comparison.study.bodies import reconstruct_body
-from scripts.comparison.study.body_metrics import MeasuredBody, measure_modes
-from scripts.comparison.study.choices import Choice, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.metrics import measure_reconstruction
-from scripts.comparison.study.reading import read_source
-from scripts.comparison.study.reconstructions import reconstruct
-from scripts.hushing import hushed
+from rigid_motion_batch.comparison.study.bodies import reconstruct_body
+from rigid_motion_batch.comparison.study.body_metrics import MeasuredBody, measure_modes
+from rigid_motion_batch.comparison.study.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.metrics import measure_reconstruction
+from rigid_motion_batch.comparison.study.reading import read_source
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
+from rigid_motion_batch.hushing import hushed
 from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.thoroughness import THOROUGH

@@ -7,13 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import KEYFRAME_MODES, Errors, Poses
-from scripts.comparison.study.choices import Budget, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.metrics import measure_reconstruction, write_metrics, write_poses, write_reconstruction
-from scripts.comparison.study.modes import BEST_OF
-from scripts.comparison.study.reconstructions import Reconstruction
-from scripts.comparison.study.reconstructions import reconstruct as choose
+from rigid_motion.motion import KEYFRAME_MODES, Errors, Poses
+from rigid_motion_batch.comparison.study.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.metrics import (
+    measure_reconstruction,
+    write_metrics,
+    write_poses,
+    write_reconstruction,
+)
+from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch.comparison.study.reconstructions import Reconstruction
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct as choose
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 COLUMNS = (

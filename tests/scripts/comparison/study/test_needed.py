@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.needed import (
+from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.needed import (
     RATES,
     TABLE_RATES,
     KeysNeeded,

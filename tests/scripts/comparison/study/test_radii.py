@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scripts.comparison.study.radii import EVERYWHERE, JOINT, MOST_BYTES, RIGID, Radii, read_radii
-from scripts.rows import line_of
+from rigid_motion_batch.comparison.study.radii import EVERYWHERE, JOINT, MOST_BYTES, RIGID, Radii, read_radii
+from rigid_motion_batch.rows import line_of
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import Poses
-from scripts.comparison.study import reading as study
-from scripts.trajectories import Recording, Trajectory, TrajectoryError
+from rigid_motion.motion import Poses
+from rigid_motion_batch.comparison.study import reading as study
+from rigid_motion_batch.trajectories import Recording, Trajectory, TrajectoryError
 
 
 def body(name: str, sound: int, lost: int = 0) -> Trajectory:

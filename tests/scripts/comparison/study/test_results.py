@@ -2,12 +2,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from addon.motion import MODES
-from scripts.comparison.study.choices import Tolerance, Uniform
-from scripts.comparison.study.modes import BEST_OF
-from scripts.comparison.study.needed import OfRigidBody, from_json, keys_needed, to_json, write_keys_needed
-from scripts.comparison.study.reconstructions import joint_groups, reconstruct
-from scripts.comparison.study.results import ClipFacts, Result, read_result, write_result
+from rigid_motion.motion import MODES
+from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
+from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch.comparison.study.needed import OfRigidBody, from_json, keys_needed, to_json, write_keys_needed
+from rigid_motion_batch.comparison.study.reconstructions import joint_groups, reconstruct
+from rigid_motion_batch.comparison.study.results import ClipFacts, Result, read_result, write_result
 from tests.scripts.comparison.recordings import swinging_clip
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.motion import MODES, Poses
-from scripts.comparison.study.choices import Choice, Tolerance, Uniform
-from scripts.comparison.study.clips import Clip
-from scripts.comparison.study.modes import BEST_OF
-from scripts.comparison.study.reconstructions import reconstruct
-from scripts.comparison.study.storage import (
+from rigid_motion.motion import MODES, Poses
+from rigid_motion_batch.comparison.study.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch.comparison.study.reconstructions import reconstruct
+from rigid_motion_batch.comparison.study.storage import (
     ClipReference,
     file_names,
     read_clip,

@@ -1,0 +1,289 @@
+"""Reducing keys: from a recording with a key on every frame to the few poses that a mode needs to tell its motion.
+
+A recording is whatever an object's channels say: imported mocap, a baked simulation, a solved camera. Its poses are
+those in the space of the channels, with the object's own delta transforms. The few keys go into a copy of the Action;
+the original stays in the file, for `restore_keys`. Frames are those of the Action, lengths are the scene's units.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...motion import KEYFRAME_MODES
+from ...motion.modes import no_such_mode
+from ..actions.channels import replace_keys
+from ..actions.slots import places_of, slots_of, transforms_in
+from ..actions.sources import MODE_NAMES, distinct
+from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
+from ..inbetweens.mode_keys import segment_modes, set_mode_in
+from ..transforms import Refused, Transform, is_ours, transform_of
+from .bake import go_back
+from .copies import REDUCED, entries_in_use, entries_of
+from .fewer_keys import FewerKeys, WholeRig, fewer_keys
+from .fewer_rig_keys import Plans, fewer_keys_of_rigs
+from .originals import (
+    discard_originals,
+    has_original,
+    move_by_copy,
+    refuse_tweak_mode,
+    refuse_without_original,
+)
+from .sizes import radius_of
+
+SOLVED = {"CAMERA_SOLVER", "OBJECT_SOLVER", "FOLLOW_TRACK"}
+"""Constraints that have a button of their own for turning them into keys."""
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What became of the keys of an object: how many there were, how many are left, and the largest shell error."""
+
+    before: int
+    after: int
+    largest_error: float
+    segments: dict[str, int]
+    """How many segments each mode has by now."""
+
+    rig: WholeRig | None = None
+    """What became of the rig, where it is a bone's."""
+
+
+def reduce_keys_of(
+    targets: Targets,
+    mode: str = "motor_spline",
+    tolerance: float = 0.001,
+    radius: float | None = None,
+    *,
+    best_of: bool = False,
+    shared: bool = False,
+    hold: bool = True,
+    refused: list[Refused] | None = None,
+) -> Reduction | None:
+    """Leave only the keys that a mode needs to show the same motion.
+
+    A key is a pose: location, rotation and, where it is even, scale have keys on the same frames, with the values that
+    the recording has there. A scale that differs from axis to axis as it changes keeps the keys it has, and so does
+    everything else in the Action. Bones of one rig are reduced together: what moves one moves all below it.
+
+    Parameters
+    ----------
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    mode : str
+        What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is keyed with them.
+    tolerance : float
+        The largest shell error on any frame, in the scene's units. Of bones it is that in the rig's space, through all
+        that they hang on, and holds for every bone that hangs on a target too.
+    radius : float, optional
+        Of the shell, in the scene's units. `radius_of` each target, otherwise.
+    best_of : bool
+        Give each segment between these keys the mode with the least RMS shell error there that keeps to the tolerance;
+        of equally good ones `mode`.
+    shared : bool
+        Give all bones of a rig keys on the same frames: key poses.
+    hold : bool
+        Keep bones that stand on the ground to a quarter of the tolerance while they do.
+    refused : list, optional
+        Takes the refusals, and all other targets are reduced.
+
+    Returns
+    -------
+    Reduction or None
+        That of the last target which did not refuse.
+
+    Raises
+    ------
+    Refused
+        Where there are no keys, or no fewer will do, or rigid motion cannot act on a target, and there is no list to
+        take that. Nothing is changed then.
+    """
+    if mode not in KEYFRAME_MODES:
+        raise Refused(no_such_mode(mode, KEYFRAME_MODES))
+    if not 0.0 < tolerance < math.inf:
+        raise Refused(f"the tolerance has to be a number above zero, not {tolerance:g}")
+
+    of_rigs: Plans = {}
+
+    def survey(readings: Mapping[Transform, Readings]) -> None:
+        wishes = {"shared": shared, "hold": hold, "best_of": best_of}
+        of_rigs.update(fewer_keys_of_rigs(readings, mode, tolerance, radius, **wishes))
+
+    def plan(transform: Transform, readings: Readings) -> list[FewerKeys]:
+        refuse_tweak_mode(transform)
+        keyed = [(place, source) for place, source in readable(transform, readings) if source.channels]
+        if not keyed:
+            raise Refused(_why_nothing_is_keyed(transform, 0))
+        if transform.prefix:
+            found = of_rigs.get(transform, [])
+            if isinstance(found, Refused):
+                raise found
+            if not found:
+                before = sum(len(distinct(source.keyed_frames)) for _, source in keyed)
+                raise Refused(_why_no_fewer(transform, before, keeps_scale=False))
+            return found
+        size = radius or radius_of(transform.carrier)
+        found = [fewer_keys(transform, *one, mode, tolerance, size, best_of=best_of) for one in keyed]
+        fewer = [reduced for reduced in found if len(reduced.key_frames) < reduced.before]
+        if not fewer:
+            before, keeps_scale = sum(kept.before for kept in found), any(kept.keeps_scale for kept in found)
+            raise Refused(_why_no_fewer(transform, before, keeps_scale=keeps_scale))
+        return fewer
+
+    def act(transform: Transform, fewer: list[FewerKeys]) -> None:
+        for reduced in fewer:
+            _write(transform, reduced)
+
+    done = act_on(targets, plan, act, refused, survey=survey)
+    return reduction_of(list(done)[-1]) if done else None
+
+
+def reduction_of(target: Target) -> Reduction | None:
+    """What became of the keys that something moves by when they were reduced. None where they were not."""
+    transform = transform_of(target)
+    if not len(transform.motion.bakes):
+        return None
+    places = places_of(transform)
+    entries = _reduced(entries_in_use(transform, places))
+    reduced = {entry.changed for entry in entries}
+    modes = [mode for place in places if place.slot.action in reduced for mode in segment_modes(place)]
+    return _summed(entries, entries if transform.prefix else [], dict(Counter(modes)))
+
+
+_Entries = list[bpy.types.PropertyGroup]
+
+
+def _reduced(entries: Iterable[bpy.types.PropertyGroup]) -> _Entries:
+    return [entry for entry in entries if entry.kind == REDUCED]
+
+
+def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> Reduction | None:
+    """All of these notes together; None where there are none. What they say of a rig is that with the most frames."""
+    if not entries:
+        return None
+    rig = max(of_bones, key=lambda entry: entry.frames_after, default=None)
+    return Reduction(
+        sum(entry.keys_before for entry in entries),
+        sum(entry.keys_after for entry in entries),
+        max(entry.largest_error for entry in entries),
+        segments,
+        None if rig is None else WholeRig(rig.frames_after, rig.slide_before, rig.slide_after),
+    )
+
+
+def total_reduction(targets: Targets) -> Reduction | None:
+    """What became of the keys of several targets together, without their modes. None where none were reduced."""
+    of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
+    of_bones = [entry for transform, entries in of_each if transform.prefix for entry in entries]
+    return _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
+
+
+def is_reduced(target: Target) -> bool:
+    """Whether something moves by an Action with reduced keys, and its original is still in the file."""
+    return has_original(transform_of(target), REDUCED)
+
+
+def restore_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Give all the keys back that there were before they were reduced, to the last handle.
+
+    Parameters
+    ----------
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    refused : list, optional
+        Takes the refusals, and all other targets get their keys back.
+
+    Raises
+    ------
+    Refused
+        Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
+    """
+    go_back(targets, REDUCED, refused)
+
+
+def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Remove the keys from the file that there were before they were reduced.
+
+    Parameters
+    ----------
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    refused : list, optional
+        Takes the refusals, and the dense keys of all other targets are removed.
+
+    Raises
+    ------
+    Refused
+        Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
+    """
+    act_on(
+        targets,
+        lambda transform, _: refuse_without_original(transform, REDUCED),
+        lambda transform, _: discard_originals(transform, REDUCED),
+        refused,
+    )
+
+
+def _write(transform: Transform, fewer: FewerKeys) -> None:
+    copy = move_by_copy(transform, fewer.place, REDUCED)
+    entry = transform.motion.bakes[-1]
+    entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
+    entry.largest_error = fewer.largest_error
+    if fewer.rig is not None:
+        entry.frames_after = fewer.rig.frames
+        entry.slide_before, entry.slide_after = fewer.rig.slide_before, fewer.rig.slide_after
+    fcurves = copy.channelbag.fcurves
+    for (path, index), values in fewer.values.items():
+        fcurve = copy.curves.get((path, index)) or fcurves.new(path, index=index)
+        replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
+        fcurve.mute = False
+    copy = copy.read_again()
+    if transform.mode_channel in copy.curves:
+        fcurves.remove(copy.curves.pop(transform.mode_channel))
+    for mode in np.unique(fewer.modes):
+        set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
+
+
+def _why_no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> str:
+    if count <= 2:
+        return _why_nothing_is_keyed(transform, count)
+    if keeps_scale:
+        return (
+            f"{transform.name} keeps its {count} keys: its scale changes differently along its axes, which is no "
+            "part of a pose; move that animation to a child, or remove keys of the scale by hand"
+        )
+    return f"{transform.name} needs its {count} keys to stay within the tolerance: allow a larger one"
+
+
+def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
+    """What moves something that has hardly a key, and how that becomes keys."""
+    obj = transform.carrier
+    has = f"{transform.name} has {count or 'no'} key{'s' * (count != 1)} of location, rotation or scale"
+    constraints = {constraint.type for constraint in obj.constraints if constraint.enabled and not is_ours(constraint)}
+    if not transform.prefix and obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
+        return f"{has}, a simulation moves it: bake that first (Object > Rigid Body > Bake to Keyframes)"
+    if constraints & SOLVED:
+        return (
+            f"{has}, a camera solution moves it: turn that into keys first "
+            "(Object Constraint Properties, Constraint to F-Curve)"
+        )
+    if constraints or _is_driven(transform):
+        menu = "Pose" if transform.prefix else "Object"
+        return (
+            f"{has}, constraints or drivers move it: bake them first "
+            f"({menu} > Animation > Bake Action, with Visual Keying)"
+        )
+    if not transform.prefix and any(
+        place.prefix for slot in slots_of([transform.animated]) for place in transforms_in(slot)
+    ):
+        return f"{has}, its bones have: select those in Pose mode, and reduce theirs"
+    return f"{has}: there is nothing to reduce"
+
+
+def _is_driven(transform: Transform) -> bool:
+    data = transform.animated.animation_data
+    paths = [driver.data_path for driver in (data.drivers if data else ())]
+    begins = tuple(transform.prefix + name for name in ("location", "rotation", "scale"))
+    return any(path.startswith(begins) for path in paths)

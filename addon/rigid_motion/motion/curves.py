@@ -1,0 +1,267 @@
+"""The fast forms: what each mode makes of the segments between keys, in the terms of `rigid_motion.motion.segments`.
+
+With D the chord, n the axis and h a quarter of the angle turned, positions relative to the centre are
+
+    lerp_slerp              D s / 2
+    dq_sclerp, pga_slerp    D_along s / 2 + D_across a + (n x D) b,       psi = s h
+    pga_lerp, cga_lerp      D a + (n x D) b,                              tan(psi) = s tan(h)
+
+    a = sin(psi) cos(psi) / sin(2 h),    b = sin(psi)^2 / sin(2 h) - tan(h) / 2
+
+so that the normalised blend of motors, which needs no sine, is the screw's own curve but for its uneven speed and for
+its advance along the axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from .segments import SMALLEST_ANGLE, Curves, Segments
+from .trigonometry import fill_sine_and_cosine
+
+LATE = 2.0
+"""How many times as long as the segment before one may take for a stream, before its key counts as late."""
+
+
+def lerp_slerp(segments: Segments) -> Curves:
+    """Straight line and great arc."""
+
+    def basis(s, parameters, narrow):
+        rows = np.empty((4, s.size))
+        _slerp(s, parameters[0], narrow, rows[:2])
+        rows[2], rows[3] = 1.0, s
+        return rows, _geometric_scales(s, parameters)
+
+    return _curves(segments, (segments.centre, 0.5 * segments.chord), (segments.quarter_angle,), basis)
+
+
+def screw(segments: Segments) -> Curves:
+    """The screw motion from key to key: ScLERP, and the SLERP of motors."""
+
+    def basis(s, parameters, narrow):
+        rows = np.empty((6, s.size))
+        _slerp(s, parameters[0], narrow, rows[:2])
+        rows[2], rows[3] = 1.0, s
+        np.multiply(rows[1], rows[:2], out=rows[4:])
+        return rows, _geometric_scales(s, parameters)
+
+    along, across, around = segments.decompose()
+    sine = np.sin(2.0 * segments.quarter_angle)
+    offset = segments.centre - 0.5 * np.tan(segments.quarter_angle) * around
+    return _curves(segments, (offset, 0.5 * along, across / sine, around / sine), (segments.quarter_angle,), basis)
+
+
+def motor_lerp(segments: Segments) -> Curves:
+    """The normalised blend of two motors: of PGA, of CGA without scale, or of dual quaternions."""
+
+    def basis(s, parameters, narrow):
+        rows = np.empty((5, s.size))
+        _lerp(s, parameters[0], rows[:2])
+        rows[2] = 1.0
+        np.multiply(rows[1], rows[:2], out=rows[3:])
+        return rows, _geometric_scales(s, parameters)
+
+    _, _, around = segments.decompose()
+    tangent, sine = np.tan(segments.quarter_angle), np.sin(2.0 * segments.quarter_angle)
+    return _curves(
+        segments,
+        (segments.centre - 0.5 * tangent * around, segments.chord / sine, around / sine),
+        (tangent,),
+        basis,
+    )
+
+
+def motor_spline(segments: Segments) -> Curves:
+    """A screw from key to key, bent so that its twist goes on through every key.
+
+    A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their
+    segment, and none has any where the body rests before or after.
+    """
+
+    def at_keys(twists, before, after, rests):
+        share = _shares(before, after)
+        inner = share * twists[..., :-1] + (1.0 - share) * twists[..., 1:]
+        inner[:, rests[:, :-1] | rests[:, 1:]] = 0.0
+        return np.concatenate((twists[..., :1], inner, twists[..., -1:]), axis=-1)
+
+    return _bent(segments, at_keys)
+
+
+def motor_spline_causal(segments: Segments) -> Curves:
+    """The same for streams, from no key after the segment.
+
+    A key has the twist of the screw that led to it, and half of what the same share of the screw before would add: all
+    of it overshoots. A rest is kept, although nothing told of it when the body arrived there. Nor did anything tell
+    that the next key comes late: where a segment takes more than `LATE` times as long as the one before, the twist
+    that it is left with dies away in that time, and the screw goes on alone.
+    """
+
+    def at_keys(twists, before, after, rests):
+        share = np.minimum(after / (before + after), before / after)
+        inner = twists[..., 1:] + 0.5 * share * (twists[..., 1:] - twists[..., :-1])
+        inner[:, rests[:, 1:]] = 0.0
+        return np.concatenate((twists[..., :1], twists[..., :1], inner), axis=-1)
+
+    duration = (2.0 / segments.rate).reshape(-1, segments.keys.shape[-1] - 1)
+    before = np.concatenate((duration[:, :1], duration[:, :-1]), axis=1)
+    fades = np.minimum(LATE * before / duration, 1.0).ravel()
+    return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
+
+
+def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """What the twist before a key counts for that of the key; the twist after it counts for the rest.
+
+    The parabola through the key and its neighbours would have
+
+        h1 / (h0 + h1)
+
+    for segments of durations h0 and h1: nearly all for the shorter one, whose twist, kept up for as long as the longer
+    one takes, leads any distance away. So the shorter one's share is at most short / long: neither segment, in its own
+    time, is then given more than |r0| + |r1| of the two screws, wherever on the body that is measured. Durations alone
+    decide, for a screw has no length that is the same for all choices of the body's origin.
+    """
+    return np.clip(after / (before + after), 1.0 - after / before, before / after)
+
+
+def _bent(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
+    """A screw from key to key, bent so that the body has certain twists at the keys.
+
+    Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
+
+        M exp(u r) exp(u (1 - u)^2 (w - r) - u^2 (1 - u) (w' - r))
+
+    Each factor is a function of twists in the body's own axes, so that neither the axes of the world nor those of the
+    body matter. Where twists at keys do not tell before from after, it is the same motion backwards.
+
+    `at_keys` makes the twists at the n + 1 keys (7, objects, n + 1) from those of the screws of n segments, from how
+    long the segments but the last and those but the first take, and from where the body rests (objects, n).
+    """
+    count = segments.keys.shape[-1] - 1
+    screws = segments.screws.reshape(7, -1, count)
+    duration = (2.0 / segments.rate).reshape(-1, count)
+    rests = segments.is_still.reshape(-1, count)
+    twists = at_keys(screws / duration, duration[:, :-1], duration[:, 1:], rests)
+    ends = np.stack((twists[..., :-1], twists[..., 1:]), axis=1) * duration - screws[:, None]
+    ends[..., rests] = 0.0
+    return replace(screw(segments), bends=ends.reshape(7, 2, -1))
+
+
+def similarity_slerp(segments: Segments) -> Curves:
+    """The geodesic of similarities: an even rate of turning, of advance and of growth. A screw where nothing grows."""
+    if segments.scales is None:
+        return screw(segments)
+
+    def basis(s, parameters, narrow):
+        quarter_angle, half_growth, mean = parameters
+        rows = np.empty((6, s.size))
+        _slerp(s, quarter_angle, narrow, rows[:2])
+        rows[2] = 1.0
+        growth = s * half_growth
+        np.expm1(growth, out=rows[3])
+        grown = np.exp(growth, out=growth)
+        np.multiply(rows[1], rows[:2], out=rows[4:])
+        rows[4:] *= grown
+        return rows, mean * grown
+
+    # Of the way along the axis, with z the growth of log scale, and of that across, with z + 4 i h, there is done
+    #     (exp(z u) - exp(z / 2)) / (exp(z) - 1) = (exp(z s / 2) - 1) / (2 sinh(z / 2)) - tanh(z / 4) / 2.
+    # Across, exp(z s / 2) - 1 = e + 2 (1 + e) (i sin(psi) cos(psi) - sin(psi)^2), where e is that of the growth alone.
+    # See `algebras.cga`.
+    h, half_growth = segments.quarter_angle, 0.5 * np.log(segments.scales[1] / segments.scales[0])
+    half_growth = np.where(half_growth == 0.0, SMALLEST_ANGLE, half_growth)
+    along, across, around = segments.decompose()
+    (rate, middle), (turned_rate, turned_middle) = _growing_share(half_growth), _growing_share(half_growth + 2.0j * h)
+    outward = turned_rate.real * across + turned_rate.imag * around
+    sideward = turned_rate.real * around - turned_rate.imag * across
+    centre = segments.centre - middle.real * along - turned_middle.real * across - turned_middle.imag * around
+    return Curves(
+        quaternions=np.stack((segments.middle, segments.difference), axis=1),
+        positions=np.stack((centre, rate.real * along + outward, 2.0 * sideward, -2.0 * outward), axis=1),
+        parameters=np.stack((h, half_growth, np.sqrt(segments.scales[0]) * np.sqrt(segments.scales[1]))),
+        basis=basis,
+    )
+
+
+def similarity_lerp(segments: Segments) -> Curves:
+    """The projected blend of two versors of CGA. A motor's where nothing grows."""
+    if segments.scales is None:
+        return motor_lerp(segments)
+
+    def basis(s, parameters, narrow):
+        cosine, *roots = parameters
+        # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse
+        # for the weight of its rotor. See `algebras.cga.extract`.
+        shares = np.stack((1.0 - s, 1.0 + s))
+        shrinking, growing = shares / roots, shares * roots
+        rotor = 0.5 * (shrinking + growing)
+
+        def dot(a, b):
+            return a[0] * b[0] + a[1] * b[1] + cosine * (a[0] * b[1] + a[1] * b[0])
+
+        weight = dot(shrinking, shrinking)
+        rows = np.empty((5, s.size))
+        rows[:2] = rotor / np.sqrt(dot(rotor, rotor))
+        rows[2] = 1.0
+        rows[3] = (shrinking[1] ** 2 - shrinking[0] ** 2) / (2.0 * weight)
+        rows[4] = -shrinking[0] * shrinking[1] / weight
+        return rows, dot(rotor, growing) / dot(rotor, shrinking)
+
+    h = segments.quarter_angle
+    _, _, around = segments.decompose()
+    ends = segments.middle * np.cos(h), segments.difference * np.sin(h)
+    return Curves(
+        quaternions=np.stack((ends[0] - ends[1], ends[0] + ends[1]), axis=1),
+        positions=np.stack((segments.centre, segments.chord, np.sin(2.0 * h) * around), axis=1),
+        parameters=np.stack((np.cos(2.0 * h), *np.sqrt(segments.scales))),
+        basis=basis,
+    )
+
+
+def _curves(segments: Segments, positions: tuple, parameters: tuple, basis) -> Curves:
+    """Curves that turn about one axis and, where there are scales, grow geometrically."""
+    if segments.scales is not None:
+        logarithms = np.log(segments.scales)
+        parameters = (*parameters, logarithms[1] - logarithms[0], 0.5 * (logarithms[0] + logarithms[1]))
+    return Curves(
+        quaternions=np.stack((segments.middle, segments.difference), axis=1),
+        positions=np.stack(positions, axis=1),
+        parameters=np.stack(parameters),
+        basis=basis,
+    )
+
+
+def _slerp(s: np.ndarray, quarter_angle: np.ndarray, narrow: bool, turn: np.ndarray) -> None:
+    """cos(psi) and sin(psi) of psi = s h, which is `narrow` where it is at most 60 degrees."""
+    fill_sine_and_cosine(s * quarter_angle, turn[1], turn[0], narrow=narrow)
+
+
+def _lerp(s: np.ndarray, tangent: np.ndarray, turn: np.ndarray) -> None:
+    """cos(psi) and sin(psi) of tan(psi) = s tan(h)."""
+    cosine, sine = turn
+    np.multiply(s, tangent, out=sine)
+    np.multiply(sine, sine, out=cosine)
+    cosine += 1.0
+    np.sqrt(cosine, out=cosine)
+    np.reciprocal(cosine, out=cosine)
+    sine *= cosine
+
+
+def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray | None:
+    """Growth at an even rate, from the logarithms that `_curves` has put last; None where there are no scales."""
+    if len(parameters) < 3:
+        return None
+    growth, middle = parameters[-2:]
+    return np.exp(middle + 0.5 * s * growth)
+
+
+def _growing_share(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """1 / (2 sinh(w)) and tanh(w / 2) / 2."""
+    return 0.5 / _sinh(w), 0.5 * _sinh(0.5 * w) / np.cosh(0.5 * w)
+
+
+def _sinh(z: np.ndarray) -> np.ndarray:
+    """Of complex z, with both parts accurate where they are small."""
+    return np.sinh(z.real) * np.cos(z.imag) + 1j * np.cosh(z.real) * np.sin(z.imag)

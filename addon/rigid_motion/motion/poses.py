@@ -1,0 +1,136 @@
+"""Poses: where a rigid body is and how it is turned, for many moments at once.
+
+Positions are in the units of their source, quaternions are unit, scalar first (w, x, y, z) as in `mathutils`, and
+scales are uniform and positive. All arrays are float64 and share their leading axes; the last of those is time, so
+one object has arrays of shape (n, 3) and (n, 4), and many objects have (objects, n, 3) and (objects, n, 4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .quaternions import conjugate, multiply, rotate
+
+LIMIT = 1e40
+"""A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
+
+SHORTEST = 1e-30
+"""Between two moments, for the same reason: what happens in less has a speed that is no float."""
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Positions, rotations and, where the body grows or shrinks, scales.
+
+    Parameters
+    ----------
+    positions : array-like, shape (..., n, 3)
+    quaternions : array-like, shape (..., n, 4)
+        w, x, y, z. Kept as given: neither normalised nor checked for signs (see `rigid_motion.motion.repair`).
+    scales : array-like, shape (..., n), optional
+        Uniform scales. None means 1 everywhere, and is what every mode runs fastest with.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes do not fit one another.
+    """
+
+    positions: np.ndarray
+    quaternions: np.ndarray
+    scales: np.ndarray | None = None
+
+    def __init__(self, positions: ArrayLike, quaternions: ArrayLike, scales: ArrayLike | None = None) -> None:
+        positions = np.asarray(positions, dtype=np.float64)
+        quaternions = np.asarray(quaternions, dtype=np.float64)
+        if positions.shape[-1:] != (3,):
+            raise ValueError(f"positions need the shape (..., 3), not {positions.shape}")
+        if quaternions.shape != (*positions.shape[:-1], 4):
+            raise ValueError(f"quaternions need the shape {(*positions.shape[:-1], 4)}, not {quaternions.shape}")
+        if scales is not None:
+            scales = np.asarray(scales, dtype=np.float64)
+            if scales.shape != positions.shape[:-1]:
+                raise ValueError(f"scales need the shape {positions.shape[:-1]}, not {scales.shape}")
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "quaternions", quaternions)
+        object.__setattr__(self, "scales", scales)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The leading axes: (n,) for one object, (objects, n) for many."""
+        return self.positions.shape[:-1]
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, index: Any) -> Poses:
+        """The poses at `index` of the leading axes, by NumPy's rules: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""
+        whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
+        return Poses(
+            self.positions[whole], self.quaternions[whole], None if self.scales is None else self.scales[index]
+        )
+
+    def __setitem__(self, index: Any, poses: Poses) -> None:
+        """Put others in the place of those at `index`, in the same arrays. Scales only where both have some."""
+        whole = (*(index if isinstance(index, tuple) else (index,)), slice(None))
+        self.positions[whole], self.quaternions[whole] = poses.positions, poses.quaternions
+        if self.scales is not None and poses.scales is not None:
+            self.scales[index] = poses.scales
+
+    def copy(self) -> Poses:
+        """The same in arrays of their own."""
+        return Poses(
+            self.positions.copy(), self.quaternions.copy(), None if self.scales is None else self.scales.copy()
+        )
+
+
+class PackedPoses:
+    """Poses (..., n) whose components are apart in memory, as what is picked from them is: quicker to work on."""
+
+    def __init__(self, poses: Poses) -> None:
+        rows = [np.moveaxis(poses.positions, -1, 0), np.moveaxis(poses.quaternions, -1, 0)]
+        if poses.scales is not None:
+            rows.append(poses.scales[None])
+        self._rows = np.concatenate(rows)
+
+    def __getitem__(self, samples: np.ndarray) -> Poses:
+        """Those at some numbers (m,) of the last axis, shape (..., m)."""
+        rows = self._rows.take(samples, axis=-1)
+        return Poses(np.moveaxis(rows[:3], 0, -1), np.moveaxis(rows[3:7], 0, -1), rows[7] if len(rows) > 7 else None)
+
+
+def placed(above: Poses, poses: Poses) -> Poses:
+    """Where poses (...) are that are given in the space of others (...), with a scale where either has one.
+
+    What has fewer leading axes is the same along the others.
+    """
+    arms = rotate(above.quaternions, poses.positions)
+    scales = poses.scales if above.scales is None else above.scales
+    if above.scales is not None:
+        arms *= above.scales[..., None]
+        scales = above.scales if poses.scales is None else above.scales * poses.scales
+        scales = np.broadcast_to(scales, arms.shape[:-1])
+    return Poses(above.positions + arms, multiply(above.quaternions, poses.quaternions), scales)
+
+
+def inverse(poses: Poses) -> Poses:
+    """What takes poses (...) back to where they came from."""
+    back = conjugate(poses.quaternions)
+    arms = -rotate(back, poses.positions)
+    if poses.scales is None:
+        return Poses(arms, back)
+    return Poses(arms / poses.scales[..., None], back, 1.0 / poses.scales)
+
+
+def beyond(last: Poses, before: Poses) -> Poses:
+    """Where a motion gets that goes on from `last` (...) as it went there from `before` (...): last before^-1 last."""
+    turn = multiply(last.quaternions, conjugate(before.quaternions))
+    return Poses(
+        last.positions + rotate(turn, last.positions - before.positions),
+        multiply(turn, last.quaternions),
+        None if last.scales is None else last.scales * last.scales / before.scales,
+    )

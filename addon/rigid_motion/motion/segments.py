@@ -1,0 +1,386 @@
+"""Segments: everything between two successive keys that does not depend on the moment, worked out once.
+
+Both keys of a segment are described from the pose half-way, with s = 2 u - 1 from -1 to 1 instead of u from 0 to 1. Of
+the quaternions q0 and q1 on either side, the sum and the difference are orthogonal: with their directions m and d and
+with h, a quarter of the angle turned, every mode's rotation is
+
+    q = m cos(psi) + d sin(psi),        psi = s h (slerp)  or  tan(psi) = s tan(h) (normalised lerp),
+
+the axis of the turn is n = d m*, and every position is a sum of a few fixed vectors, each times a function of psi and
+s. Nothing is divided by an angle that may vanish but together with the sine of that same angle: there is no special
+case for small turns, and none at 180 degrees.
+
+A mode's fast form is a function from `Segments` to `Curves`; they are in `rigid_motion.motion.curves`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from . import series, twists
+from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrices
+from .poses import Poses
+from .quaternions import align_signs, cross, multiply, rotate
+
+STILL = 1e-12
+"""Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
+
+TURN = 1.5
+"""Radians that a piece of a bent curve may turn by at most, for a series to be the same but for rounding."""
+
+ROWS = 8
+"""Position, quaternion and scale. Also where there is no scale: matrices of eight rows are multiplied quicker."""
+
+NARROW = 4.0 / 3.0
+"""The largest |s| at which psi, 45 degrees at the keys, is no more than the 60 of `trigonometry.NARROW`."""
+
+SMALLEST_ANGLE = 1e-150
+"""Stands for an angle of zero, where only ratios of angles count; its square is still above the smallest float."""
+
+MOST_GROWTH = 50.0
+"""The logarithm of what a bend may grow or shrink by: after a sudden growth splines shoot further than floats go."""
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """S segments, one after the other along the last axis of each array."""
+
+    start: np.ndarray
+    """Shape (S,), seconds."""
+
+    rate: np.ndarray
+    """Change of s in a second, shape (S,)."""
+
+    centre: np.ndarray
+    """Half-way between the positions, shape (3, S)."""
+
+    chord: np.ndarray
+    """From the first position to the second, shape (3, S)."""
+
+    middle: np.ndarray
+    """m, the rotation half-way, shape (4, S)."""
+
+    difference: np.ndarray
+    """d, the direction from the first quaternion to the second, shape (4, S); zero where they are equal."""
+
+    quarter_angle: np.ndarray
+    """h, from 0 to pi / 4, a quarter of the angle between the rotations, shape (S,)."""
+
+    scales: np.ndarray | None
+    """The scales at both ends, shape (2, S), or None."""
+
+    keys: Poses
+    """All keys of each object, shape (..., n)."""
+
+    @classmethod
+    def between(cls, key_times: np.ndarray, keys: Poses) -> Segments:
+        """The n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
+        shape = (*keys.shape[:-1], keys.shape[-1] - 1)
+        first, second = _components(keys.quaternions[..., :-1, :]), _components(keys.quaternions[..., 1:, :])
+        begin, end = _components(keys.positions[..., :-1, :]), _components(keys.positions[..., 1:, :])
+        total, change = first + second, second - first
+        total_length, change_length = _length(total), _length(change)
+        middle, difference = total / total_length, change / np.maximum(change_length, SMALLEST_ANGLE)
+        return cls(
+            start=np.broadcast_to(key_times[..., :-1], shape).ravel(),
+            rate=np.broadcast_to(2.0 / np.diff(key_times), shape).ravel(),
+            centre=0.5 * (begin + end),
+            chord=end - begin,
+            middle=middle,
+            difference=difference,
+            quarter_angle=np.maximum(np.arctan2(change_length, total_length), SMALLEST_ANGLE),
+            scales=None
+            if keys.scales is None
+            else np.stack((keys.scales[..., :-1].ravel(), keys.scales[..., 1:].ravel())),
+            keys=keys,
+        )
+
+    @property
+    def is_still(self) -> np.ndarray:
+        """Whether nothing moves from one key to the next, but for rounding, shape (S,)."""
+        size = np.abs(self.centre).max(axis=0) + SMALLEST_ANGLE
+        still = (self.quarter_angle < STILL) & (np.abs(self.chord).max(axis=0) < STILL * size)
+        return still if self.scales is None else still & (np.abs(np.log(self.scales[1] / self.scales[0])) < STILL)
+
+    @cached_property
+    def screws(self) -> np.ndarray:
+        """The twists that lead from one key to the next in one unit of time, and the growth of log scale: (7, S)."""
+        rows = np.zeros((7, self.start.size))
+        first, second = self.keys[..., :-1], self.keys[..., 1:]
+        rows[:6] = twists.between(
+            first.positions.reshape(-1, 3),
+            first.quaternions.reshape(-1, 4),
+            second.positions.reshape(-1, 3),
+            second.quaternions.reshape(-1, 4),
+        )
+        if self.scales is not None:
+            rows[6] = np.log(self.scales[1] / self.scales[0])
+        return rows
+
+    def decompose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The chord's part along the axis n, its part across, and n x D, each of shape (3, S).
+
+        Where nothing turns there is no axis: n is zero, and the whole chord is across.
+        """
+        (mw, *m), (dw, *d) = self.middle, self.difference
+        n = mw * np.stack(d) - dw * np.stack(m) - cross(d, m)
+        along = n * np.einsum("ks,ks->s", n, self.chord)
+        return along, self.chord - along, cross(n, self.chord)
+
+
+Basis = Callable[[np.ndarray, list[np.ndarray], bool], tuple[np.ndarray, "np.ndarray | None"]]
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """What a mode makes of S segments: quaternion = Q b(s) and position = P c(s), with b and c of the mode's choice."""
+
+    quaternions: np.ndarray
+    """Q, shape (4, 2, S): b has two functions."""
+
+    positions: np.ndarray
+    """P, shape (3, functions in c, S)."""
+
+    parameters: np.ndarray
+    """The numbers of each segment that b and c need, shape (parameters, S)."""
+
+    basis: Basis
+    """From s (n,), parameters of (n,) each and whether |s| <= NARROW to b above c, (., n), and scales (n,) or None."""
+
+    bends: np.ndarray | None = None
+    """What is to be added to the twist at either end, with the growth of log scale, shape (7, 2, S), or None."""
+
+    fades: np.ndarray | None = None
+    """In what part of each segment the bend at its beginning dies away, shape (S,); None where all of them need all."""
+
+    @cached_property
+    def matrices(self) -> np.ndarray:
+        """P and Q of each segment in one matrix, shape (S, ROWS, functions in b and c)."""
+        functions, segments = self.positions.shape[1:]
+        matrices = np.zeros((segments, ROWS, 2 + functions))
+        matrices[:, :3, 2:] = self.positions.transpose(2, 0, 1)
+        matrices[:, 3:7, :2] = self.quaternions.transpose(2, 0, 1)
+        return matrices
+
+
+def interpolate_along(
+    curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses, times: np.ndarray, extrapolate: bool
+) -> Poses:
+    """Poses of shape (..., m) between at least two keys (..., n), at rising times (..., m).
+
+    `key_times` and `times` may leave out the leading axes, and all objects share them. Quaternions of keys are unit.
+    """
+    shape = keys.shape[:-1] + times.shape[-1:]
+    keys = Poses(
+        keys.positions.reshape(-1, *keys.positions.shape[-2:]),
+        keys.quaternions.reshape(-1, *keys.quaternions.shape[-2:]),
+        None if keys.scales is None else keys.scales.reshape(-1, keys.scales.shape[-1]),
+    )
+    key_times, times = (np.atleast_2d(rows).reshape(-1, rows.shape[-1]) for rows in (key_times, times))
+    result = np.empty((ROWS, len(keys), times.shape[-1]))
+    batch_size = max(1, BLOCK // (key_times.shape[-1] + times.shape[-1]))
+    for first in range(0, len(keys), batch_size):
+        batch = slice(first, first + batch_size)
+        batch_key_times, batch_times = (rows if len(rows) == 1 else rows[batch] for rows in (key_times, times))
+        _fill(curves, batch_key_times, keys[batch], batch_times, extrapolate, result[:, batch])
+    return Poses(
+        np.moveaxis(result[:3], 0, -1).reshape(*shape, 3),
+        np.moveaxis(result[3:7], 0, -1).reshape(*shape, 4),
+        None if keys.scales is None else result[7].reshape(shape),
+    )
+
+
+def _fill(
+    curves: Callable[[Segments], Curves],
+    key_times: np.ndarray,
+    keys: Poses,
+    times: np.ndarray,
+    extrapolate: bool,
+    out: np.ndarray,
+) -> None:
+    """Fill out (ROWS, objects, m) with positions, quaternions and, where the keys have them, scales.
+
+    Key times are (objects or 1, n), keys (objects, n), times (objects or 1, m).
+    """
+    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
+    samples = np.broadcast_to(times, out.shape[1:]).ravel()
+    outside = bool(np.any(times[:, :1] < key_times[:, :1]) or np.any(times[:, -1:] > key_times[:, -1:]))
+
+    def local_time(sample: slice, start: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        s = samples[sample] - start
+        s *= rate
+        s -= 1.0
+        if outside and not extrapolate:
+            np.clip(s, -1.0, 1.0, out=s)
+        return s
+
+    mode, reach = curves(segments), np.inf if outside and extrapolate else 1.0
+    fill, numbers = _filler(mode, reach), np.stack((segments.start, segments.rate))
+    pieces = _pieces(segments, mode.bends) if mode.bends is not None and mode.fades is None and reach <= 1.0 else 0
+    if 0 < DENSE * pieces * segments.start.size <= samples.size:
+        coefficients = _series(mode, pieces)
+        key_times = _divided(key_times, pieces)
+        start = np.broadcast_to(key_times[:, :-1], (len(keys), key_times.shape[-1] - 1)).ravel()
+        numbers = np.stack((start, pieces * segments.rate.repeat(pieces)))
+
+        def fill(piece: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+            multiply_matrices(coefficients[piece], series.powers(s), counts, out)
+
+    _evaluate(fill, numbers, _sample_bounds(key_times, times, len(keys)), local_time, out.reshape(ROWS, -1))
+
+
+Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
+"""What makes poses (m,) of some of the segments, (s,) of them: from how many there are in each, and their progress."""
+
+
+def prepare_within(curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses) -> Within:
+    """What makes poses between keys where each segment says how many there are in it, and each how far it has come.
+
+    `key_times` and keys are (..., n), at least two a row and with unit quaternions; their segments are counted
+    throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both.
+    """
+    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
+    mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
+
+    def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
+        out = np.empty((ROWS, progress.size))
+        reach = float(max(2.0 * progress.max() - 1.0, 1.0 - 2.0 * progress.min())) if progress.size else 0.0
+        fill, first = _filler(mode, reach), selected.start or 0
+
+        def fill_selected(segment: slice, *others: np.ndarray) -> None:
+            fill(slice(first + segment.start, first + segment.stop), *others)
+
+        bounds = np.concatenate(((0,), np.cumsum(counts)))
+        _evaluate(fill_selected, no_numbers[:, selected], bounds, lambda sample: 2.0 * progress[sample] - 1.0, out)
+        return Poses(out[:3].T, out[3:7].T, None if keys.scales is None else out[7])
+
+    return within
+
+
+Fill = Callable[[slice, np.ndarray, np.ndarray, np.ndarray], None]
+"""What fills out (ROWS, n) for some of the segments at s (n,), of which the i-th has counts[i]."""
+
+
+def _evaluate(
+    fill: Fill,
+    numbers: np.ndarray,
+    bounds: np.ndarray,
+    local_time: Callable[..., np.ndarray],
+    out: np.ndarray,
+) -> None:
+    """Fill out (ROWS, m) with what S segments are at the samples between their bounds (S + 1,), a block at once.
+
+    `local_time` gives s of a slice of samples, from the rows of `numbers` (., S) repeated for each of them.
+    """
+    all_counts = np.diff(bounds)
+    for segment, sample in blocks(bounds, BLOCK if is_dense(all_counts) else BLOCK // 2):
+        counts = all_counts[segment]
+        fill(segment, local_time(sample, *np.repeat(numbers[:, segment], counts, axis=1)), counts, out[:, sample])
+
+
+def _filler(mode: Curves, reach: float) -> Fill:
+    """What a mode's curves are, worked out for every sample, where no |s| is larger than `reach`."""
+
+    def fill(segment: slice, s: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+        parameters = np.repeat(mode.parameters[:, segment], counts, axis=1)
+        basis, scales = mode.basis(s, [*parameters], reach <= NARROW)
+        _combine(mode, segment, basis, counts, out)
+        if scales is not None:
+            out[7] = scales
+        if mode.bends is not None:
+            fades = None if mode.fades is None else np.repeat(mode.fades[segment], counts)
+            _bend(mode.bends[..., segment], fades, s, reach <= 1.0, counts, out)
+
+    return fill
+
+
+def _pieces(segments: Segments, bends: np.ndarray) -> int:
+    """How many pieces a segment needs to be cut into for power series."""
+    rates = np.concatenate((segments.screws[:, None], bends), axis=1)
+    turns = np.sqrt(np.einsum("kbs,kbs->bs", rates[:3], rates[:3])) + np.abs(rates[6])
+    return max(1, math.ceil((turns[0] + turns[1:].max(axis=0)).max() / TURN))
+
+
+def _series(mode: Curves, pieces: int) -> np.ndarray:
+    """Every segment's curve in so many pieces as power series, shape (segments * pieces, ROWS, terms)."""
+    count = mode.parameters.shape[1]
+    moments = series.moments(pieces)
+    values = np.zeros((ROWS, count * moments.size))
+    bounds = moments.size * np.arange(count + 1)
+    _evaluate(
+        _filler(mode, 1.0),
+        np.empty((0, count)),
+        bounds,
+        lambda sample: np.resize(moments, sample.stop - sample.start),
+        values,
+    )
+    return series.fit(values)
+
+
+def _divided(key_times: np.ndarray, pieces: int) -> np.ndarray:
+    """Key times (k, n) with so many equal pieces to a segment, shape (k, (n - 1) * pieces + 1)."""
+    starts = key_times[:, :-1, None] + np.diff(key_times)[..., None] * (np.arange(pieces) / pieces)
+    return np.append(starts.reshape(len(key_times), -1), key_times[:, -1:], axis=1)
+
+
+def _sample_bounds(key_times: np.ndarray, times: np.ndarray, objects: int) -> np.ndarray:
+    """Where each segment's samples begin among the samples of all objects, shape (S + 1,)."""
+    starts = np.zeros((objects, key_times.shape[-1] - 1), dtype=np.int64)
+    inner_keys = key_times[:, 1:-1]
+    if inner_keys.size:
+        # One search where all objects share their times, else one for each.
+        for row in range(max(len(inner_keys), len(times))):
+            found = np.searchsorted(times[row % len(times)], inner_keys[row % len(inner_keys)], side="right")
+            starts[row if len(inner_keys) > 1 or len(times) > 1 else slice(None), 1:] = found
+    starts += times.shape[-1] * np.arange(objects)[:, None]
+    return np.append(starts.ravel(), objects * times.shape[-1])
+
+
+def _combine(mode: Curves, segment: slice, basis: np.ndarray, counts: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (ROWS, n) with positions and quaternions: each sample's own coefficients times its basis (., n).
+
+    The i-th of the segments has counts[i] samples, and at least one has any.
+    """
+    if not is_dense(counts):
+        positions, quaternions = mode.positions[..., segment], mode.quaternions[..., segment]
+        np.einsum("kbn,bn->kn", np.repeat(positions, counts, axis=2), basis[2:], out=out[:3])
+        np.einsum("kbn,bn->kn", np.repeat(quaternions, counts, axis=2), basis[:2], out=out[3:7])
+        return
+    multiply_matrices(mode.matrices[segment], basis, counts, out)
+
+
+def _bend(
+    bends: np.ndarray, fades: np.ndarray | None, s: np.ndarray, within: bool, counts: np.ndarray, out: np.ndarray
+) -> None:
+    """Bend poses (ROWS, n) that run from key to key so that they leave and arrive with these twists (7, 2, S) added.
+
+    Nothing is changed at the keys. Beyond them the bend goes on at the twist it has there. At each sample `fades` (n,)
+    is the part of its segment in which the first of the two dies away.
+    """
+    u, left = 0.5 + 0.5 * s, 0.5 - 0.5 * s
+    faded = left if fades is None else 1.0 - np.minimum(u / fades, 1.0)
+    functions = np.stack((u * faded * faded, -u * u * left))
+    if not within:
+        functions = np.where(u < 0.0, ((1.0,), (0.0,)) * u, np.where(left < 0.0, ((0.0,), (-1.0,)) * left, functions))
+    grows = bool(np.any(bends[6]))
+    added = np.empty((7 if grows else 6, s.size))
+    combine(bends[: len(added)], functions, counts, added)
+    turns, advances = twists.exponential(added[:6])
+    out[:3] += rotate(out[3:7].T, advances.T).T
+    out[3:7] = multiply(out[3:7].T, turns.T).T
+    if grows:
+        out[7] *= np.exp(np.clip(added[6], -MOST_GROWTH, MOST_GROWTH, out=added[6]))
+
+
+def _components(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., k) one after the other as components (k, S)."""
+    return np.ascontiguousarray(vectors.reshape(-1, vectors.shape[-1]).T)
+
+
+def _length(components: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("ks,ks->s", components, components))

@@ -1,0 +1,50 @@
+"""Conventions of axes, and how a recording's poses become Blender's: right-handed, z up, y forward, x right.
+
+Each convention is a matrix C of shape (3, 3) that takes a point of the recording to Blender. A rotation R becomes
+C R C^T: the body's own axes change convention together with the world's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+
+AXES: dict[str, np.ndarray] = {
+    # Right-handed, z up, y forward: nothing to do.
+    "blender": np.eye(3),
+    # Right-handed, y up, -z forward: OpenGL, OpenXR, WebXR, A-Frame, Motive, most BVH.
+    "opengl": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))),
+    # Left-handed, y up, z forward.
+    "unity": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))),
+    # Right-handed, z up, x forward (REP 103).
+    "ros": np.array(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+}
+
+
+def to_blender(poses: Poses, axes: str) -> Poses:
+    """The poses in Blender's axes.
+
+    Parameters
+    ----------
+    poses : Poses, shape (..., n)
+    axes : str
+        The convention that `poses` are in: a name in `AXES`.
+
+    Raises
+    ------
+    ValueError
+        Where there is no such convention.
+
+    Notes
+    -----
+    Conjugation by C turns a rotation's axis v into det(C) C v and keeps its angle: a mirror image of a rotation
+    turns the other way. So w stays and the vector part is mapped, whether or not C is a rotation itself.
+    """
+    if axes not in AXES:
+        raise ValueError(f"there are no axes named {axes!r}; known are {', '.join(AXES)}")
+    change = AXES[axes]
+    handedness = np.sign(np.linalg.det(change))
+    quaternions = poses.quaternions.copy()
+    quaternions[..., 1:] = handedness * poses.quaternions[..., 1:] @ change.T
+    return Poses(poses.positions @ change.T, quaternions, poses.scales)

@@ -1,0 +1,181 @@
+"""What `bake.py` bakes or un-bakes in the open file: objects, and the bones of rigs together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+
+import bpy
+
+from rigid_motion import animation
+from rigid_motion.animation import Refused
+from rigid_motion.animation.actions.reading import keyed_in
+from rigid_motion.animation.actions.records import recorded_mode
+from rigid_motion.animation.actions.refusals import refuse_numbers
+from rigid_motion.animation.actions.slots import SlotTransform, slot_transforms_of
+from rigid_motion.animation.actions.sources import Source
+from rigid_motion.animation.inbetweens.mode_keys import segment_modes
+from rigid_motion.animation.transforms import Transform, transform_of
+from rigid_motion.motion import KEYFRAME_MODES
+
+FEW = 4
+"""As many bones are named; of more it is said how many they are."""
+
+
+@dataclass
+class Result:
+    """What came of acting on several targets."""
+
+    done: dict[Transform, str] = field(default_factory=dict)
+    """The modes of each, as menus show them."""
+
+    refused: dict[Transform, str] = field(default_factory=dict)
+    """Why each could not be done, and the way out."""
+
+    span: str = ""
+    """The frames that it was done on."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """What is done to targets: baking, or un-baking."""
+
+    done: str
+    suffix: str
+    concerned: Callable[[Sequence[Transform]], list[Transform]]
+    """Those of several that there is something to do to, possible or not."""
+
+    act: Callable[[Sequence[Transform]], Result]
+    """Do it to several of one object, in one go."""
+
+
+def baking(step: float, first: float | None, last: float | None) -> Action:
+    """Keys on every `step` frames, from `first` to `last`."""
+
+    def bake(targets: Sequence[Transform]) -> Result:
+        problems = {target: problem for target in targets if (problem := animation.problem_of(target))}
+        fit = [target for target in targets if target not in problems]
+        modes, refusals = modes_of(fit), []
+        begin, end = animation.bake(fit, step=step, first=first, last=last, refused=refusals) if fit else (0.0, 0.0)
+        return _result(targets, modes, problems | _by_target(refusals, fit), f"frames {begin:g} to {end:g}")
+
+    return Action("baked", "-baked", with_rigid_segments, bake)
+
+
+def unbaking() -> Action:
+    """The keys from before."""
+
+    def unbake(targets: Sequence[Transform]) -> Result:
+        refusals: list[Refused] = []
+        animation.unbake(targets, refused=refusals)
+        return _result(targets, modes_of(targets), _by_target(refusals, targets))
+
+    return Action("un-baked", "-unbaked", lambda targets: list(filter(animation.is_baked, targets)), unbake)
+
+
+def _result(
+    targets: Sequence[Transform], modes: Mapping[Transform, str], problems: Mapping[Transform, str], span: str = ""
+) -> Result:
+    done = {target: modes[target] for target in targets if target not in problems}
+    return Result(done, {target: text.removeprefix(f"{target.name}: ") for target, text in problems.items()}, span)
+
+
+def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dict[Transform, str]:
+    """Which target each refusal is about: it begins with the name, and of names that begin alike with the longest."""
+    longest_first = sorted(targets, key=lambda target: -len(target.name))
+    found = {}
+    for text in map(str, refusals):
+        target = next(one for one in longest_first if one not in found and text.startswith(one.name))
+        found[target] = text
+    return found
+
+
+def groups_of(obj: bpy.types.Object) -> Iterator[list[Transform]]:
+    """What is done in one go of an object: all bones of a rig, and then its own motion.
+
+    The other way round each bone would be compared with what it was in the Action of which a copy is there already.
+    """
+    if obj.pose is not None and len(obj.pose.bones):
+        yield [transform_of(bone) for bone in obj.pose.bones]
+    yield [transform_of(obj)]
+
+
+def matching(target: Transform, asked: Iterable[str]) -> set[str]:
+    """The names and patterns that a target fits. Those of a rig mean its bones too, and RIG/BONE means a bone."""
+    return {one for one in asked for name in {target.name, target.animated.name} if _fits(name, one)}
+
+
+def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
+    """The names and patterns that an object fits, or may have bones for that nobody can look at."""
+    return {one for one in asked if any(_fits(obj.name, part) for part in (one, *_before_slashes(one)))}
+
+
+def _before_slashes(pattern: str) -> list[str]:
+    return [pattern[:place] for place, letter in enumerate(pattern) if letter == "/"]
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return name == pattern or fnmatchcase(name, pattern)
+
+
+def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
+    """Those that are to move otherwise than by Blender's own in-betweens, in any segment and possible or not."""
+    places = slot_transforms_of(targets)
+    rigid = {
+        user
+        for place, source in zip(places, keyed_in(places), strict=True)
+        if _has_rigid_segments(place, source)
+        for user in place.users
+    }
+    return [target for target in targets if target in rigid]
+
+
+def _has_rigid_segments(place: SlotTransform, source: Source | Refused) -> bool:
+    try:
+        if isinstance(source, Refused):
+            raise source
+        refuse_numbers(place.name, source)
+        return source.is_live
+    except ValueError:
+        return bool(segment_modes(place)) and _has_mode(place)
+
+
+def _has_mode(place: SlotTransform) -> bool:
+    """Whether there is any mode but Blender's own in a slot, also one that this version does not know."""
+    channel = place.curves.get(place.users[0].mode_channel)
+    if channel is None or channel.mute or not len(channel.keyframe_points):
+        return recorded_mode(place) != 0
+    return any(not abs(key.co.y) < 0.5 for key in channel.keyframe_points)
+
+
+def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
+    """The modes of each target's segments as Blender's menus show them, each once."""
+    modes: dict[Transform, dict[str, None]] = {target: {} for target in targets}
+    for place in slot_transforms_of(targets):
+        for user in place.users:
+            if user in modes:
+                modes[user] |= dict.fromkeys(segment_modes(place))
+    return {
+        target: ", ".join(KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in found)
+        for target, found in modes.items()
+    }
+
+
+def title_of(targets: Sequence[Transform]) -> str:
+    """One target by its name, and several bones by how many they are of which rig."""
+    rig = targets[0].animated.name
+    return targets[0].name if len(targets) == 1 else f"{rig}: {len(targets)} bones"
+
+
+def described(modes: Mapping[Transform, str]) -> str:
+    """Which modes targets have: one by itself, several bones by mode, and few of them by name."""
+    if len(modes) == 1:
+        return f", {next(iter(modes.values()))}"
+    if len(modes) > FEW:
+        return "".join(f"; {count} {mode}" for mode, count in Counter(modes.values()).most_common())
+    bones: dict[str, list[str]] = {}
+    for target, mode in modes.items():
+        bones.setdefault(mode, []).append(target.carrier.name)
+    return "".join(f"; {mode}: {', '.join(names)}" for mode, names in bones.items())

@@ -1,0 +1,193 @@
+"""Opening .blend files without running what is in them, what they lack of libraries, and saving them whole."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from rigid_motion_batch.files import written_beside
+from rigid_motion_batch.hushing import hushed
+
+HERE = bpy.app.version[:2]
+"""The Blender that this runs in."""
+
+MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
+"""What .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
+
+CUT_OFF = "it broke off half-way, the disk may be full"
+
+NAMED = 5
+"""As many of the data that are missing from a library are named."""
+
+MAY_HOLD_OBJECTS = (bpy.types.Collection, bpy.types.Scene)
+
+
+class FileProblem(Exception):
+    """Why a file cannot be done, and the way out."""
+
+
+class Unreadable(FileProblem):
+    """Why a file cannot be opened, and the way out."""
+
+
+@dataclass
+class Missing:
+    """What the open file wants of libraries and cannot have."""
+
+    libraries: list[str] = field(default_factory=list)
+    """Of each library that something is missing from: which, what, and the way out."""
+
+    reasons: dict[bpy.types.Object, str] = field(default_factory=dict)
+    """Objects of which one cannot know whether rigid motion moves them, for they or their Actions are missing."""
+
+    hides_objects: bool = False
+    """Whether there may be more of those, in collections or scenes that are missing."""
+
+
+def open_file(path: Path) -> None:
+    """Open a .blend file, without running anything that is in it. Raises `Unreadable`."""
+    if os.path.isdir(path):
+        raise Unreadable(f"this is a folder: name the files in it, as in {path / '*.blend'}")
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise Unreadable("this is no file on a disk: save it as one first")
+    try:
+        with hushed(errors=True):
+            bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=True, use_scripts=False)
+    except RuntimeError as error:
+        said = " ".join(str(error).split()).removeprefix("Error: ")
+        reason = said.rpartition(": ")[2]
+        if "Cannot read file" in said:
+            raise Unreadable(f"this cannot be opened ({reason}): see to its path, and who may read it") from None
+        if "not supported" in said:
+            with path.open("rb") as stream:
+                begin = stream.read(max(map(len, MAGIC)))
+            if not begin.startswith(MAGIC):
+                raise Unreadable(f"this is no .blend file{'' if begin else ', it is empty'}") from None
+            reason = "cut off, or scrambled behind its first bytes"
+        raise Unreadable(
+            f"Blender cannot read this file, which looks damaged ({reason}): take a copy of it, or its NAME.blend1"
+        ) from None
+    if (newer := bpy.data.version[:2]) > HERE:
+        # Blender opens it all the same, and would leave out on saving what it does not know.
+        raise Unreadable(
+            f"this was saved by Blender {named(newer)}, and this is {named(HERE)}: take that one or a later one"
+        )
+
+
+def missing_data() -> Missing:
+    """What the open file wants of libraries and cannot have, which Blender puts nothing but names in the place of."""
+    found = Missing()
+    for library in bpy.data.libraries:
+        blocks = [block for block in library.users_id if block.is_missing]
+        if not blocks:
+            continue
+        path = os.path.normpath(bpy.path.abspath(library.filepath))
+        is_there = os.path.exists(path)
+        wanted = ", ".join(f"{block.bl_rna.name} {block.name}" for block in blocks[:NAMED])
+        more = f" and {len(blocks) - NAMED} more" if len(blocks) > NAMED else ""
+        found.libraries.append(
+            f"library {path} {'cannot be read, or lacks something' if is_there else 'was not found'} ({wanted}{more}): "
+            f"bring {'that' if is_there else 'it'} back, or tell the file where it is now (Outliner, Blender File, "
+            "right-click: Relocate)"
+        )
+        found.reasons |= _reasons(blocks, path)
+        found.hides_objects |= any(isinstance(block, MAY_HOLD_OBJECTS) for block in blocks)
+    return found
+
+
+def _reasons(blocks: list[bpy.types.ID], path: str) -> dict[bpy.types.Object, str]:
+    """Why these objects cannot be known, of which something is among what is missing from a library."""
+    reasons = {block: f"it is missing from {path}" for block in blocks if isinstance(block, bpy.types.Object)}
+    for obj in bpy.data.objects:
+        if obj.override_library is not None and obj.override_library.reference in blocks:
+            # What is changed would not be saved as a change, without that to compare it with.
+            reasons[obj] = f"what it overrides is missing from {path}"
+    actions = [block for block in blocks if isinstance(block, bpy.types.Action)]
+    if actions:
+        for action, users in bpy.data.user_map(subset=actions, value_types={"OBJECT"}).items():
+            for obj in users:
+                if isinstance(obj, bpy.types.Object):
+                    reasons.setdefault(obj, f"its Action {action.name} is missing from {path}")
+    return reasons
+
+
+def only_overridden() -> set[bpy.types.Object]:
+    """The linked objects that are in the open file for the sake of overrides of them, and are not shown themselves."""
+    overrides = [obj.override_library for obj in bpy.data.objects if obj.override_library is not None]
+    linked = {override.reference for override in overrides}
+    instanced = {obj.instance_collection for obj in bpy.data.objects if obj.instance_collection is not None}
+    for shown in (*(scene.collection for scene in bpy.data.scenes), *instanced):
+        linked.difference_update(shown.all_objects)
+    return linked
+
+
+def refuse_to_replace(path: Path, *, overwrite: bool) -> None:
+    """Raise `FileProblem` where there is something already that is not to be replaced."""
+    if os.path.isdir(path):
+        raise FileProblem(f"{path} is a folder: rename it, or give another --output")
+    if os.path.lexists(path) and not overwrite:
+        raise FileProblem(f"{path} is there already: add --overwrite, or another --output")
+
+
+def refuse_read_only(path: Path) -> None:
+    """Raise `FileProblem` where a file or its folder cannot be written: better said before hours go into it."""
+    place = Path(os.path.realpath(path))
+    if not os.path.exists(place):
+        place = next(one for one in place.parents if os.path.exists(one))
+        if not os.path.isdir(place):
+            raise FileProblem(f"{place} is a file, and {path} cannot be written in it: give another --output")
+    elif os.access(place, os.W_OK):
+        place = place.parent
+    if not os.access(place, os.W_OK):
+        raise FileProblem(
+            f"{path} cannot be written, for {place} is read-only: allow it, or write elsewhere with --output"
+        )
+
+
+def write_file(source: Path, output: Path, stop_if_asked: Callable[[], None]) -> None:
+    """Save what is open, whole or not at all; where it is `source` itself, that is kept as NAME.blend1.
+
+    Raises
+    ------
+    FileProblem
+        Where it cannot be written.
+    """
+    try:
+        with hushed(errors=True), written_beside(output) as beside:
+            # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
+            bpy.ops.wm.save_as_mainfile(
+                filepath=str(beside.absolute()), copy=True, check_existing=False, relative_remap=True
+            )
+            refuse_cut_off(beside)
+            stop_if_asked()
+            if output == source:
+                kept = Path(os.path.realpath(source))
+                with written_beside(kept.with_name(f"{kept.name}1")) as copy:
+                    shutil.copy2(source, copy)
+    except RuntimeError as error:
+        said = " ".join(str(error).split()).removeprefix("Error: ")
+        # What it says of a file is of the name that it writes under, and without any it is of no use.
+        reason = said.rpartition(": ")[2].replace(beside.name, output.name) if ": " in said else CUT_OFF
+        raise FileProblem(f"{output} could not be written ({reason}): write elsewhere with --output") from None
+    except OSError as error:
+        place, reason = error.filename or output, error.strerror or error
+        raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
+
+
+def refuse_cut_off(path: Path) -> None:
+    """Raise OSError where a file is not whole: of compressed ones Blender does not notice that a disk is full."""
+    try:
+        with bpy.data.libraries.load(str(path.absolute())):
+            pass
+    except OSError:
+        raise OSError(None, CUT_OFF, str(path)) from None
+
+
+def named(version: tuple[int, int]) -> str:
+    """A version of Blender as people write it."""
+    return ".".join(map(str, version))

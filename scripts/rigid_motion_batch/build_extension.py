@@ -1,0 +1,125 @@
+"""Build the zip that animators install, with the builder that comes with Blender, and let Blender validate it.
+
+What goes in is addon/, blender_manifest.toml and LICENSE, and nothing else. Two runs give the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+from rigid_motion_batch.command_line import as_called, program_of
+from rigid_motion_batch.system_libraries import require_blender
+
+SCRIPT = "build_extension.py"
+PROGRAM = program_of(SCRIPT)
+
+require_blender(SCRIPT)
+
+import bpy
+
+from rigid_motion_batch.files import written_beside
+from rigid_motion_batch.places import CHECKOUT, EXTENSION, LICENSE, MANIFEST
+
+EPILOG = """
+examples:
+  python scripts/build_extension.py
+  python scripts/build_extension.py --output ~/Desktop
+
+It writes OUTPUT/rigid_motion-VERSION.zip, VERSION as in blender_manifest.toml; the last line it prints is that path.
+To install it: drag it into a Blender window, or Edit > Preferences > Get Extensions > Install from Disk.
+Exit code: 0 done, 2 it could not be built, or Blender calls it invalid.
+"""
+
+BESIDE = (MANIFEST, LICENSE)
+"""What goes into the zip beside the package."""
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The time of every file in the zip, the earliest that a zip can hold: the same bytes whenever it is built."""
+
+
+class BuildError(Exception):
+    """Why there is no zip, in words for whoever asked for it."""
+
+
+def build(folder: Path) -> Path:
+    """Make a validated zip of the extension in `folder`, and return its path.
+
+    Raises
+    ------
+    BuildError
+        Where a part of the extension is missing, or Blender's builder or validator refuses it.
+    OSError
+        Where the folder cannot be written.
+    """
+    with tempfile.TemporaryDirectory() as temporary:
+        staged, built = Path(temporary) / "staged", Path(temporary) / "built.zip"
+        _stage(staged)
+        _blender_ext("build", "--source-dir", str(staged), "--output-filepath", str(built))
+        manifest = tomllib.loads((staged / MANIFEST.name).read_text(encoding="utf-8"))
+        package = folder / f"{manifest['id']}-{manifest['version']}.zip"
+        with written_beside(package) as beside:
+            _repack(built, beside)
+            _blender_ext("validate", str(beside))
+    return package
+
+
+def _stage(folder: Path) -> None:
+    """Lay out the extension as it is to be in the zip."""
+    try:
+        shutil.copytree(EXTENSION, folder, ignore=shutil.ignore_patterns("__pycache__", "py.typed"))
+        for path in BESIDE:
+            shutil.copy(path, folder)
+    except FileNotFoundError as error:
+        raise BuildError(f"{error.filename} is missing; `git checkout` brings it back") from error
+
+
+def _blender_ext(*arguments: str) -> None:
+    """Run Blender's own command for extensions."""
+    tool = Path(bpy.utils.system_resource("SCRIPTS")) / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+    done = subprocess.run([sys.executable, str(tool), *arguments], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise BuildError(f"Blender {bpy.app.version_string} refuses the extension:\n{done.stdout}{done.stderr}".strip())
+
+
+def _repack(built: Path, package: Path) -> None:
+    """The same files in order of their names, with one time and one mode: what a file system adds is left out."""
+    with (
+        zipfile.ZipFile(built) as source,
+        zipfile.ZipFile(package, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
+    ):
+        for name in sorted(source.namelist()):
+            entry = zipfile.ZipInfo(name, EPOCH)
+            entry.create_system, entry.external_attr = 3, 0o644 << 16  # Unix, also when built on Windows
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            target.writestr(entry, source.read(name))
+
+
+def main(arguments: list[str]) -> int:
+    """Build, and return the exit code."""
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description=__doc__,
+        epilog=as_called(EPILOG, SCRIPT),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--output", type=Path, default=(CHECKOUT or Path()) / "dist", metavar="DIR", help="folder to write to (dist)"
+    )
+    options = parser.parse_args(arguments)
+    try:
+        package = build(options.output.expanduser())
+    except BuildError as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"{PROGRAM}: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    print(package)
+    return 0

@@ -1,0 +1,60 @@
+"""What command lines have in common, in Python and in Blender."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+INSTALLED = "rigid-motion"
+"""The command that pip installs."""
+
+MOST_INPUTS = 12
+"""Inputs of a command that are worth being read again."""
+
+
+def own_arguments(script: str) -> list[str]:
+    """The arguments that are meant for a script, given its `__file__`.
+
+    In Blender (`blender --background --python SCRIPT -- ARGUMENTS`) what is behind the "--", in Python everything.
+    """
+    if Path(sys.argv[0]).name == Path(script).name:
+        return sys.argv[1:]
+    return sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+
+
+def program_of(script: str) -> str:
+    """What users call a command: its script, "bake.py", or "rigid-motion bake" where they have started it so."""
+    called = Path(sys.argv[0]).name if sys.argv else ""
+    return called if called.startswith(f"{INSTALLED} ") else script
+
+
+def as_called(text: str, script: str) -> str:
+    """A text with examples of `python scripts/...`, in the way in which users have started the command."""
+    program = program_of(script)
+    if program == script:
+        return text
+    lines = (line for line in text.splitlines() if f"blender --background --python scripts/{script}" not in line)
+    return "\n".join(lines).replace(f"python scripts/{script}", program)
+
+
+def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> str:
+    """A command as one would type it: of very many inputs the first few, and how many more there were."""
+    left_out = set(inputs[MOST_INPUTS:]) - set(inputs[:MOST_INPUTS])
+    typed = shlex.join([*program.split(), *(argument for argument in arguments if argument not in left_out)])
+    return f"{typed} # and {len(left_out)} more" if left_out else typed
+
+
+def number(text: str) -> float:
+    """The number that an option says; NaN, which is within no bounds, where it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def printable(text: str) -> str:
+    """The text in one line, without the control characters that a file could smuggle into a terminal."""
+    return "".join(character if character.isprintable() else " " for character in text)

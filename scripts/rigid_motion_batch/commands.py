@@ -1,0 +1,90 @@
+"""Every command, and its start: as `rigid-motion NAME`, or as a script of a checkout, also within Blender."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from .command_line import INSTALLED, own_arguments
+from .places import NAMED, manifest
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of the program."""
+
+    module: str
+    """In this package; it has `main(arguments)`, which returns the exit code. Its script has the same name."""
+
+    about: str
+
+    extra: str = "blender"
+    """Of the distribution: what brings the packages that it needs."""
+
+
+COMMANDS = {
+    "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
+    "bake": Command("bake", "in-betweens of .blend files into real keys, or back"),
+    "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
+    "paper": Command("reproduce_paper", "the paper's figures and its table, reproduced"),
+    "bundle": Command("job_bundle", "a comparison as a job for render farms"),
+    "tasks": Command("workplan.__main__", "single tasks of a comparison: what is done, and why another is not"),
+    "build": Command("build_extension", "the zip that Blender installs"),
+    "benchmark": Command("benchmark", "how fast the modes are, beside other libraries", extra="benchmark"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `rigid-motion COMMAND ...`, and return the exit code."""
+    name, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    if name in ("-h", "--help"):
+        print(_help())
+        return 0
+    if name == "--version":
+        print(f"{INSTALLED} {manifest()['version']}")
+        return 0
+    if name not in COMMANDS:
+        print(f"{INSTALLED}: there is no command {name!r}; the commands are {', '.join(COMMANDS)}", file=sys.stderr)
+        return 2
+    sys.argv = [f"{INSTALLED} {name}", *rest]
+    try:
+        return _run(COMMANDS[name].module, rest)
+    except ModuleNotFoundError as error:
+        if not error.name or error.name.partition(".")[0] in NAMED:
+            raise
+        way_out = f"pip install 'rigid-motion[{COMMANDS[name].extra}]'"
+        print(f"{sys.argv[0]}: {error.name} is not here; {way_out} brings it", file=sys.stderr)
+        return 2
+
+
+def launch(script: str) -> None:
+    """Run the command of a script, given its `__file__`, and end with its exit code."""
+    sys.exit(_run(Path(script).stem, own_arguments(script)))
+
+
+def _run(module: str, arguments: Sequence[str]) -> int:
+    try:
+        return import_module(f"{__package__}.{module}").main(list(arguments))
+    except KeyboardInterrupt:
+        return 130
+
+
+def _help() -> str:
+    width = max(map(len, COMMANDS)) + 2
+    listed = "\n".join(f"  {name:{width}}{command.about}" for name, command in COMMANDS.items())
+    return f"""usage: {INSTALLED} COMMAND ...
+
+Rigid-motion interpolation for keyframes, measured, baked, streamed and rendered.
+
+{listed}
+
+`{INSTALLED} COMMAND --help` shows the options of a command, with examples.
+
+examples:
+  {INSTALLED} compare                                  the motions that come with the program
+  {INSTALLED} compare hand.csv --axes unity
+  {INSTALLED} compare take.csv --decimate adaptive --tolerance 5mm --no-video
+  {INSTALLED} bake shot.blend"""

@@ -1,0 +1,327 @@
+"""The options of a comparison: what compare.py and job_bundle.py take, and what their help says."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigid_motion.motion import KEYFRAME_MODES, MODES
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.command_line import as_called, number, program_of
+from rigid_motion_batch.places import ASSETS, from_here, output_folder
+from rigid_motion_batch.trajectories import files_of
+from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
+
+from .palette import THEMES
+from .stage.settings import ANTIALIASING, ENGINES, StageSettings
+from .study.choices import Budget, Choice, Tolerance, Uniform, distinct
+from .study.modes import BEST_OF, single_modes
+from .study.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
+
+DESCRIPTION = """Compare interpolation modes on recorded trajectories.
+
+Of every recording only a few keys a second are kept, evenly or where the motion needs them; each mode fills them in
+again; what was lost is measured, and shown in a video in which the modes move side by side. Without INPUT, the
+recordings in assets/ are compared.
+"""
+
+RATES = "5,10,15,20"
+"""Keys a second where none are asked for."""
+
+STREAM_MODES = tuple(mode for mode in MODES if mode not in KEYFRAME_MODES)
+
+ALL, DISTINCT = "all", "distinct"
+"""Stand for all modes that keyframes can have, with a lane in the film for each, or for each motion that comes out."""
+
+SCRIPT = "compare.py"
+
+EPILOG = """
+inputs:
+  CSV with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM, EuRoC,
+  Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, FBX, glTF, .blend; a folder stands for the recordings in it.
+  FILE:BODY takes one body of several, FILE:* all. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of it.
+  Of a .blend a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
+  (FILE.blend:RIG), as Blender shows it in the world, with parents, constraints, drivers and NLA strips. FILE.blend:* is
+  every object that is animated.
+
+whole bodies:
+  Each joint has its keys in its parent's space, as a rig has them, and is measured where that puts it. The unit of a
+  body is found by its size, and said; --scale says otherwise. OUTPUT/metrics.csv has the body, its worst joint and how
+  far feet slide that stand, OUTPUT/metrics_joints.csv every joint. In the film each mode moves a rig of its own, which
+  comparison.blend has with the modes on its bones.
+
+examples:
+  python scripts/compare.py
+  python scripts/compare.py hand_left.csv hand_right.csv --axes unity --output renders/hands
+  python scripts/compare.py log.csv:left --columns t=when,device=who --time-unit ms --scale 0.01
+  python scripts/compare.py unity.csv --axes unity --euler YXZ --degrees
+  python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
+  python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
+  python scripts/compare.py dances/ --no-video
+  python scripts/compare.py dance.bvh --decimate adaptive --tolerance 1cm --shared
+  python scripts/compare.py dance.bvh:LeftHand --object controller
+  python scripts/compare.py shot.blend:Camera --no-video
+  python scripts/compare.py shot.blend:Rig/Hand --no-video
+  python scripts/compare.py hand_left.csv --modes all,best_of
+  python scripts/compare.py take.csv --decimate adaptive --tolerance 5mm
+  python scripts/compare.py take.csv --decimate adaptive --budget 5,10 --rates 10
+  blender --background --python scripts/compare.py -- hand_left.csv --axes unity
+
+choosing keys:
+  --decimate uniform keeps --rates keys a second, evenly in time and the same for every mode. With --decimate adaptive
+  each mode gets keys of its own among the recorded samples: the fewest that keep its shell error within --tolerance
+  everywhere, or --budget keys a second, on average over the clip, that make its RMS shell error small. Given neither,
+  --rates are the budgets. Rates that are given beside adaptive keys are kept evenly as well, for comparison. The report
+  then also shows the curve of error over keys, and how many keys every mode needs to be as good as lerp_slerp at 30,
+  20, 15 and 12 a second; that alone takes up to a second for every 100 samples. --fit adds how many it needs where they
+  need not be recorded poses, but are moved to where the motion follows the recording best; two to three times as long.
+
+choosing modes:
+  best_of takes in every segment, from key to key, that of the other modes named which comes closest to the recording
+  there. Evenly spaced keys are the same for all; of adaptive ones it has those of the best single mode. The mode of
+  each segment is a column of best_of.keys.csv.
+
+It writes OUTPUT/report.html (all of it in one file; of more than 24 clips each has a page of its own, beside its
+folders), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv and of whole bodies OUTPUT/decimated.csv, which
+sets them beside Blender's Decimate, and for every clip and choice of keys a folder (OUTPUT/CLIP/10, /budget-10,
+/tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The last
+line it prints is the path of the report.
+
+one folder, one comparison:
+  With the same recordings, more of them or fewer, a second run into a folder goes on. A folder that holds another
+  comparison is refused, and so are files that this program has not written where outputs go: choose another --output,
+  or replace them with --force. Inputs are never replaced. --explain says what a run would do and why, and does nothing.
+
+many clips:
+  The work is done in small tasks, by as many processes as --jobs says. What is done is kept: stopped by Ctrl-C, a full
+  disk or worse, the same command goes on from there, and with other options it does what these ask for anew. A
+  recording that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With
+  --scheduler the processes are on all machines that a Dask scheduler knows; docs/farm.md says how.
+Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could, or a wrong option, 130 stopped by
+Ctrl-C; after that the report holds what was ready.
+"""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = argparse.ArgumentParser(
+        prog=program_of(SCRIPT),
+        description=DESCRIPTION,
+        epilog=as_called(EPILOG, SCRIPT),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings; those in assets/ where none is given")
+    parser.add_argument(
+        "--rates", type=_amounts(Uniform), metavar="HZ,...", help=f"keys a second that are kept ({RATES})"
+    )
+    parser.add_argument(
+        "--modes",
+        type=_modes,
+        default=DISTINCT,
+        metavar="MODE,...",
+        help=f"what fills them in: {DISTINCT} for {', '.join(KEYFRAME_MODES)}, in the film those together that are one "
+        f"motion (the default); {ALL} for each of these on its own; or some of them, {', '.join(STREAM_MODES)} for "
+        f"streams, which know no later keys, and {BEST_OF} for the best of each segment",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_folder,
+        default=output_folder("comparison"),
+        help="folder to write to (renders/comparison)",
+    )
+    parser.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
+    parser.add_argument(
+        "--radius",
+        type=_radii,
+        default=EVERYWHERE,
+        metavar="M|CSV",
+        help=f"of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table joint,radius_m "
+        "for joints by name",
+    )
+    add_reading_options(parser)
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument(
+        "--jobs", type=_jobs, metavar="N", help="processes that work; 0 for none but this one (one for each processor)"
+    )
+    workers.add_argument(
+        "--scheduler", metavar="ADDRESS", help="let the workers of a Dask scheduler do it: tcp://HOST:8786"
+    )
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="do everything again, also what is done already; replace another comparison, and files of other programs",
+    )
+    parser.add_argument("--explain", action="store_true", help="say what would be done and why, and do nothing")
+    keys = parser.add_argument_group("choosing keys")
+    keys.add_argument(
+        "--decimate",
+        choices=("uniform", "adaptive"),
+        default="uniform",
+        help="keep keys evenly in time, or where each mode needs them (%(default)s)",
+    )
+    keys.add_argument(
+        "--tolerance",
+        type=_amounts(Tolerance),
+        metavar="LENGTH,...",
+        help="largest shell error of adaptive keys: 5mm, 0.5cm, 0.005m; a plain number is in the recording's unit",
+    )
+    keys.add_argument(
+        "--budget", type=_amounts(Budget), metavar="HZ,...", help="adaptive keys a second, on average over the clip"
+    )
+    keys.add_argument(
+        "--shared",
+        action="store_true",
+        help="key poses: all joints of a body have their keys at the same times; otherwise each where it needs them",
+    )
+    keys.add_argument("--fit", action="store_true", help="count the keys needed also where they are fitted")
+    video = parser.add_argument_group("video")
+    video.add_argument("--no-video", action="store_true", help="numbers and report only")
+    video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
+    video.add_argument("--resolution", type=_resolution, default="1280x720", metavar="WxH", help="(%(default)s)")
+    video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
+    video.add_argument(
+        "--slow-motion", type=_positive, default=1.0, metavar="N", help="times slower than life (%(default)s)"
+    )
+    video.add_argument(
+        "--object",
+        default="drill",
+        metavar="OBJECT",
+        help="what moves: drill, controller, or FILE.blend:NAME (%(default)s)",
+    )
+    video.add_argument(
+        "--films",
+        choices=("fewest", ALL),
+        default="fewest",
+        help="of each recording the one with the fewest keys, or with every choice of keys (%(default)s)",
+    )
+    video.add_argument("--theme", choices=THEMES, default="dark", help="(%(default)s)")
+    video.add_argument(
+        "--deviation",
+        type=_positive,
+        metavar="N",
+        help="draw what a mode is off by N times as large; 1 as it is (by default a round number that shows it well)",
+    )
+    video.add_argument(
+        "--antialiasing",
+        choices=ANTIALIASING,
+        help="of workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
+    )
+    video.add_argument("--samples", type=int, default=16, help="of eevee and cycles (%(default)s)")
+    options = parser.parse_args(arguments)
+    try:
+        options.stage = StageSettings(
+            engine=options.engine,
+            resolution=options.resolution,
+            fps=options.fps,
+            slow_motion=options.slow_motion,
+            subject=options.object,
+            antialiasing=options.antialiasing,
+            samples=options.samples,
+            theme=options.theme,
+            deviation=options.deviation,
+            distinct=options.modes.distinct,
+        )
+        options.choices = _choices(options)
+        options.reading = reading_options(options)
+    except ValueError as error:
+        parser.error(str(error))
+    if not options.inputs:
+        options.inputs = [str(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
+    options.inputs = [file for source in options.inputs for file in files_of(source)]
+    return options
+
+
+def _choices(options: argparse.Namespace) -> list[Choice]:
+    """All choices of keys of the run. Raises ValueError for options that do not go together."""
+    rates, tolerance, budget, shared = options.rates, options.tolerance, options.budget, options.shared
+    if options.decimate == "uniform":
+        by_motion = (("--tolerance", tolerance), ("--budget", budget), ("--fit", options.fit), ("--shared", shared))
+        for option, given in by_motion:
+            if given:
+                raise ValueError(f"{option} is for keys that are chosen by the motion: add --decimate adaptive")
+        return rates or _amounts(Uniform)(RATES)
+    if tolerance and budget:
+        raise ValueError(
+            "--tolerance and --budget exclude one another: a tolerance decides how many keys there are, a budget how "
+            "large the error is; give one of them"
+        )
+    by_motion = tolerance or budget or [Budget(rate.written) for rate in rates or _amounts(Uniform)(RATES)]
+    return [*(rates or []), *by_motion]
+
+
+def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
+    """How a list of amounts is read: each as a choice of that kind."""
+
+    def parse_amounts(text: str) -> list[Choice]:
+        written = ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]
+        try:
+            return distinct(map(kind, written))
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parse_amounts
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The modes of a run."""
+
+    names: tuple[str, ...]
+    distinct: bool
+    """Whether those that are one motion share a lane."""
+
+
+def _modes(text: str) -> Modes:
+    written = [part.strip() for part in text.split(",") if part.strip()]
+    named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part in (ALL, DISTINCT) else (part,))))
+    modes = single_modes(named)
+    wrong = [mode for mode in modes if mode not in MODES]
+    if wrong or not named:
+        raise argparse.ArgumentTypeError(
+            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, DISTINCT, ALL, BEST_OF))}"
+        )
+    share = DISTINCT in written
+    if BEST_OF not in named:
+        return Modes(tuple(modes), share)
+    if len(modes) < 2:
+        raise argparse.ArgumentTypeError(
+            f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
+        )
+    return Modes((*modes, BEST_OF), share)
+
+
+def _folder(text: str) -> Path:
+    if not text.strip() or "\0" in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
+    return Path(text)
+
+
+def _jobs(text: str) -> int:
+    if not re.fullmatch(r"\d{1,3}", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    positive = number(text)
+    if not 0.0 < positive < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return positive
+
+
+def _radii(text: str) -> Radii:
+    try:
+        return read_radii(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text, re.ASCII)
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} is no resolution; give one such as 1280x720")
+    return int(found[1]), int(found[2])

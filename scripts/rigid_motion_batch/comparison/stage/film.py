@@ -1,0 +1,206 @@
+"""The film: a stage rendered to a video that any browser plays, and saved as the .blend it was rendered from.
+
+A film may be rendered in pieces, by several processes, and joined; that costs it nothing. Every file is written beside
+its place and moved into it when it is whole.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from rigid_motion_batch.files import written_beside
+from rigid_motion_batch.hushing import hushed
+
+LOSSLESS = "HUFFYUV", "MKV", ".mkv"
+"""Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""
+
+
+def render_film(scene: bpy.types.Scene, path: Path, progress: Callable[[int, int], None] | None = None) -> float:
+    """Render all frames of the scene to its MP4.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Set up for video, as `stage.build_stage` leaves it.
+    path : Path
+        Ending in .mp4. A file that is there is replaced, once the new one is whole.
+    progress : callable, optional
+        Called after every frame with the number of frames that are done, and of all.
+
+    Returns
+    -------
+    float
+        The seconds that Blender's renderer and encoder took.
+
+    Raises
+    ------
+    RuntimeError
+        Where Blender cannot render.
+    OSError
+        Where the file cannot be put in its place.
+    KeyboardInterrupt
+        After Ctrl-C, once the frame at hand is done; there is no film then.
+    """
+    total = scene.frame_end - scene.frame_start + 1
+    with written_beside(path) as beside, _interruptible(), _counting(progress, total):
+        kept, scene.render.filepath = scene.render.filepath, str(beside)
+        started = time.perf_counter()
+        try:
+            with hushed():
+                ended = bpy.ops.render.render(animation=True, scene=scene.name)
+        finally:
+            scene.render.filepath = kept
+        seconds = time.perf_counter() - started
+        if "CANCELLED" in ended:
+            raise KeyboardInterrupt
+        if not beside.is_file():
+            raise RuntimeError(f"{path}: Blender rendered no video; is the resolution even, and the disk not full?")
+    return seconds
+
+
+def render_piece(
+    blend: Path, first: int, last: int, path: Path, progress: Callable[[int, int], None] | None = None
+) -> float:
+    """Render the frames from the first to the last of a saved stage, without loss.
+
+    Parameters
+    ----------
+    blend : Path
+        As `save_blend` left it.
+    first, last : int
+        Frames, both included.
+    path : Path
+        Ending as `LOSSLESS` says.
+    progress : callable, optional
+        As of `render_film`, and so is what is returned and raised.
+    """
+    scene = _open(blend)
+    scene.frame_start, scene.frame_end = first, last
+    video = scene.render.ffmpeg
+    video.codec, video.format = LOSSLESS[:2]
+    return render_film(scene, path, progress)
+
+
+def join_pieces(
+    blend: Path, pieces: Sequence[Path], path: Path, progress: Callable[[int, int], None] | None = None
+) -> float:
+    """Encode a film from its pieces, as if it had been rendered in one: the frames are the same to the bit.
+
+    Parameters
+    ----------
+    blend : Path
+        The stage that they are of, which says how it wants to be encoded.
+    pieces : sequence of Path
+        In their order, without gaps.
+    path : Path
+        Ending in .mp4.
+    progress : callable, optional
+        As of `render_film`, and so is what is returned and raised.
+
+    Raises
+    ------
+    RuntimeError
+        Also where the pieces have more or fewer frames than the stage.
+    """
+    scene = _open(blend)
+    strips = scene.sequence_editor_create().strips
+    frame = scene.frame_start
+    for number, piece in enumerate(pieces):
+        strip = strips.new_movie(f"Piece {number}", str(piece), 1, frame, fit_method="ORIGINAL")
+        # Blender 5.2 warns of the name that it had before.
+        frame += strip.content_duration if hasattr(strip, "content_duration") else strip.frame_duration
+    if frame != scene.frame_end + 1:
+        raise RuntimeError(f"{path}: its pieces have {frame - scene.frame_start} frames of {scene.frame_end}")
+    scene.render.use_sequencer = True
+    return render_film(scene, path, progress)
+
+
+def _open(blend: Path) -> bpy.types.Scene:
+    """The scene of a saved stage, which is opened for it. Its scripts, if it has come by any, do not run."""
+    with hushed():
+        bpy.ops.wm.open_mainfile(filepath=str(blend), use_scripts=False, load_ui=False)
+    return bpy.context.scene
+
+
+def render_still(scene: bpy.types.Scene, path: Path) -> None:
+    """Render the frame that the scene is at to a PNG.
+
+    Raises
+    ------
+    RuntimeError
+        Where Blender cannot render.
+    """
+    image = scene.render.image_settings
+    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+        image.media_type = "IMAGE"
+    image.file_format = "PNG"
+    image.compression = 90
+    with written_beside(path) as beside, hushed():
+        scene.render.filepath = str(beside)
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        if not beside.is_file():
+            raise RuntimeError(f"{path}: Blender rendered no picture; is the disk full?")
+
+
+def save_blend(path: Path) -> None:
+    """Save the open file as a compressed .blend. A file that is there is replaced."""
+    with written_beside(path) as beside, hushed():
+        bpy.ops.wm.save_as_mainfile(filepath=str(beside), compress=True, copy=True, check_existing=False)
+
+
+@contextmanager
+def _counting(progress: Callable[[int, int], None] | None, total: int) -> Iterator[None]:
+    if progress is None:
+        yield
+        return
+    done = 0
+
+    def count(*_: object) -> None:
+        nonlocal done
+        done += 1
+        progress(done, total)
+
+    bpy.app.handlers.render_post.append(count)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_post.remove(count)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C end the rendering after the frame at hand, and raise KeyboardInterrupt then.
+
+    Blender swallows what is raised in its handlers, and renders on. So the scene is put on its last frame, and
+    Blender's own loop skips the rest. The Blender program, unlike the module, has an answer to Ctrl-C of its own, which
+    Python cannot see: it cancels the rendering.
+    """
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is None:
+        yield
+        return
+    interrupted = False
+
+    def interrupt(*_: object) -> None:
+        nonlocal interrupted
+        interrupted = True
+
+    def skip(scene: bpy.types.Scene, *_: object) -> None:
+        if interrupted:
+            scene.frame_current = scene.frame_end
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    bpy.app.handlers.render_post.append(skip)
+    try:
+        yield
+    finally:
+        bpy.app.handlers.render_post.remove(skip)
+        signal.signal(signal.SIGINT, before)
+    if interrupted:
+        raise KeyboardInterrupt

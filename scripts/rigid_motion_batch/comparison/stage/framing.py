@@ -1,0 +1,149 @@
+"""Framing: from which side a motion is seen, and whether the camera stays or follows it.
+
+The camera itself never moves: what moves past it is the lane, by the focus, a path in Blender's axes and metres. A
+motion that has room where it is stays there; one that would be small is followed, smoothly, so that its quick turns
+still show. NumPy alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
+
+from . import layout
+
+FOLLOW_GAIN = 1.2
+"""A motion is followed where that shows it so many times larger."""
+
+LEVEL = 0.3
+"""A body whose middle rises and falls by less of its height is followed over the ground alone."""
+
+WALKED = 0.5
+"""A body that gets so far, in units of its height, is seen from the side that it goes past."""
+
+THREE_QUARTER = np.radians(30.0)
+"""By how much it comes nearer to the camera as it goes."""
+
+SMOOTHING = 0.12
+"""Seconds of the film: the standard deviation of the bell by which the focus is smoothed."""
+
+
+class Moving(Protocol):
+    """What is seen at n moments."""
+
+    @property
+    def middle(self) -> np.ndarray:
+        """What may be followed, shape (n, 3)."""
+
+    def around(self, focus: np.ndarray) -> np.ndarray:
+        """Its outermost points at every moment, from the focus (n, 3) on: shape (k, 3)."""
+
+    def heading(self, focus: np.ndarray) -> float:
+        """The yaw in radians from which it is seen well."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A rigid object."""
+
+    poses: Poses
+    """Shape (n,)."""
+
+    outline: np.ndarray
+    """Its outermost points, shape (m, 3)."""
+
+    @property
+    def middle(self) -> np.ndarray:
+        middle = (self.outline.min(axis=0) + self.outline.max(axis=0)) / 2.0
+        return layout.swept_points(self.poses, middle[None])
+
+    def around(self, focus: np.ndarray) -> np.ndarray:
+        poses = Poses(self.poses.positions - focus, self.poses.quaternions, self.poses.scales)
+        return layout.swept_points(poses, self.outline)
+
+    def heading(self, focus: np.ndarray) -> float:
+        """From its broad side."""
+        return layout.heading(self.around(focus))
+
+
+@dataclass(frozen=True, eq=False)
+class Jointed:
+    """A body of joints."""
+
+    places: np.ndarray
+    """Shape (n, m, 3)."""
+
+    @property
+    def middle(self) -> np.ndarray:
+        """The mean of the joints, at one height as long as the body stays about there: a step is no reason to nod."""
+        middle = self.places.mean(axis=1)
+        tall = float(np.ptp(self.places[..., 2], axis=1).max())
+        if np.ptp(middle[:, 2]) < LEVEL * tall:
+            middle[:, 2] = np.median(middle[:, 2])
+        return middle
+
+    def around(self, focus: np.ndarray) -> np.ndarray:
+        return (self.places - focus[:, None]).reshape(-1, 3)
+
+    def heading(self, focus: np.ndarray) -> float:
+        """Of a walk that goes to the right and a little towards the camera; from the broad side of what stays."""
+        middle = self.middle
+        gone = middle[-1, :2] - middle[0, :2]
+        tall = float(np.ptp(self.places[..., 2], axis=1).max())
+        if np.linalg.norm(gone) < WALKED * tall:
+            return layout.heading(self.around(focus))
+        return float(-np.arctan2(gone[1], gone[0]) - THREE_QUARTER)
+
+
+@dataclass(frozen=True, eq=False)
+class Framing:
+    """How a motion of n moments is seen."""
+
+    focus: np.ndarray
+    """What the camera looks at, shape (n, 3)."""
+
+    yaw: float
+    """The turn about z in radians that shows the motion well."""
+
+    follows: bool
+
+    def extent(self, shown: Sequence[Moving]) -> tuple[np.ndarray, np.ndarray]:
+        """The lowest and highest of right, up and away, shape (3,) each, that any of them reaches.
+
+        As `layout.project` has them, from the focus on.
+        """
+        turn = layout.yaw_quaternion(self.yaw)
+        seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in shown]
+        return np.min([points.min(axis=0) for points in seen], axis=0), np.max([p.max(axis=0) for p in seen], axis=0)
+
+    @classmethod
+    def of(cls, recording: Moving, smoothing: float) -> Framing:
+        """What shows a recording well. `smoothing` is `SMOOTHING` in moments of it."""
+        path = _smoothed(recording.middle, smoothing)
+        still = cls._facing(recording, np.zeros_like(path), follows=False)
+        following = cls._facing(recording, path, follows=True)
+        gain = still._height(recording) / following._height(recording)
+        return following if gain > FOLLOW_GAIN else still
+
+    @classmethod
+    def _facing(cls, recording: Moving, focus: np.ndarray, *, follows: bool) -> Framing:
+        return cls(focus, recording.heading(focus), follows)
+
+    def _height(self, recording: Moving) -> float:
+        """What a square picture has to span."""
+        low, high = self.extent([recording])
+        return float((high - low)[:2].max())
+
+
+def _smoothed(path: np.ndarray, deviation: float) -> np.ndarray:
+    """A path (n, 3) smoothed by a bell whose standard deviation is so many samples. It begins and ends where it did."""
+    reach = int(np.ceil(3.0 * deviation))
+    bell = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(deviation, 1e-9)) ** 2)
+    extended = np.pad(path, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.stack([np.convolve(column, bell / bell.sum(), mode="valid") for column in extended.T], axis=-1)

@@ -1,0 +1,188 @@
+"""Layout: where the lanes stand and what the camera frames, in NumPy alone.
+
+Two spaces. The *stage* is Blender's world, in metres, z up; the camera looks along +y and down by `ELEVATION`, through
+parallel rays, so every lane is seen from the same side. The *frame* is what it sees: x right, y up, 0 in the middle,
+in units of the picture's height. `Layout.metres` leads from one to the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
+
+ELEVATION = np.radians(20.0)
+RIGHT = np.array((1.0, 0.0, 0.0))
+UP = np.array((0.0, np.sin(ELEVATION), np.cos(ELEVATION)))
+AWAY = np.array((0.0, np.cos(ELEVATION), -np.sin(ELEVATION)))
+
+MARGIN = 0.022
+HEADER = 0.066
+FOOTER = 0.045
+GAP = 0.014
+PADDING = 0.014
+CAPTION_HEIGHT = 0.3
+"""Of a caption below its view."""
+
+CAPTION_WIDTH = 0.34
+"""Of a caption beside its view, in cells that are wide enough for that."""
+
+WRAP_GAIN = 0.85
+"""A layout of fewer rows, and with captions below, is kept while it shows the motion so large relative to the best."""
+
+DIRECTIONS = 1024
+"""Spread over the sphere as on a sunflower (a spherical Fibonacci lattice)."""
+
+SHOWN_RATIO = 2.5
+"""A path longer than so many times the object makes the object grow for display."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One lane's part of the frame: its card, with the view of the motion and the caption below or beside it."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    beside: bool
+    """Whether the caption stands to the left of the view, and not below it."""
+
+    @property
+    def caption(self) -> tuple[float, float]:
+        """The width and height of the caption, whose lower left corner is that of the card."""
+        if self.beside:
+            return min(CAPTION_WIDTH, 0.4 * self.width), self.height
+        return self.width, min(CAPTION_HEIGHT, 0.4 * self.height)
+
+    @property
+    def view(self) -> np.ndarray:
+        """The middle of the view, shape (2,)."""
+        width, height = self.caption
+        return np.array((self.x + width / 2.0, self.y) if self.beside else (self.x, self.y + height / 2.0))
+
+    @property
+    def room(self) -> np.ndarray:
+        """The width and height that the motion may fill."""
+        width, height = self.caption
+        padding = 2.0 * min(PADDING, 0.1 * self.width, 0.1 * self.height)
+        if self.beside:
+            return np.array((self.width - width - padding / 2.0, self.height - padding))
+        return np.array((self.width - padding, self.height - height - padding))
+
+    @property
+    def left(self) -> float:
+        return self.x - self.width / 2.0
+
+    @property
+    def foot(self) -> float:
+        return self.y - self.height / 2.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The cells of all lanes, and the scale: how many metres the picture's height spans."""
+
+    cells: tuple[Cell, ...]
+    metres: float
+    aspect: float
+
+
+def heading(points: np.ndarray) -> float:
+    """The yaw in radians that brings the longest horizontal extent of `points`, shape (n, 3), across the frame."""
+    flat = points[:, :2] - points[:, :2].mean(axis=0)
+    axis = np.linalg.eigh(flat.T @ flat)[1][:, 1]
+    yaw = -np.arctan2(axis[1], axis[0])
+    # The axis has no sign. The half turn that keeps most of the recording's own x pointing right is taken.
+    return float(yaw - np.pi * np.round(yaw / np.pi))
+
+
+def yaw_quaternion(yaw: float) -> np.ndarray:
+    return np.array((np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)))
+
+
+def outermost(points: np.ndarray) -> np.ndarray:
+    """The few points, shape (m, 3), that reach furthest in any of many directions.
+
+    They span what all points span, but for a thousandth of their size, and are few enough to be followed through
+    every frame.
+    """
+    steps = np.arange(DIRECTIONS) + 0.5
+    height, turn = 1.0 - 2.0 * steps / DIRECTIONS, np.pi * (1.0 + 5.0**0.5) * steps
+    ring = np.sqrt(1.0 - height * height)
+    spread = np.stack((ring * np.cos(turn), ring * np.sin(turn), height), axis=-1)
+    return points[np.unique(np.concatenate([(points @ part.T).argmax(axis=0) for part in np.split(spread, 8)]))]
+
+
+def swept_points(poses: Poses, points: np.ndarray) -> np.ndarray:
+    """Where the object's points, shape (m, 3), come to be: shape (n m, 3)."""
+    arms = points[None] if poses.scales is None else points[None] * poses.scales[:, None, None]
+    return (rotate(poses.quaternions[:, None], arms) + poses.positions[:, None]).reshape(-1, 3)
+
+
+def telling_point(poses: Poses, points: np.ndarray) -> np.ndarray:
+    """The point whose path is drawn, shape (3,): the tip of the object, where that moves.
+
+    The tip is the point furthest from the origin. A tool that pivots about it is better told by another point: the
+    one that travels furthest, if that is more than twice as far.
+    """
+    paths = swept_points(poses, points).reshape(len(poses), len(points), 3)
+    travelled = np.linalg.norm(np.diff(paths, axis=0), axis=-1).sum(axis=0)
+    tip, farthest = np.argmax(np.linalg.norm(points, axis=-1)), np.argmax(travelled)
+    return points[farthest if travelled[farthest] > 2.0 * travelled[tip] else tip]
+
+
+def display_scale(path: np.ndarray, size: float) -> float:
+    """How much larger than it is the object is shown, so that it stays visible on a path of shape (n, 3)."""
+    extent = float(np.ptp(path, axis=0).max())
+    return max(1.0, extent / (SHOWN_RATIO * size))
+
+
+def project(points: np.ndarray) -> np.ndarray:
+    """Metres right and up in the frame, and away from the camera, of points on the stage: shape (..., 3)."""
+    return points @ np.stack((RIGHT, UP, AWAY), axis=-1)
+
+
+def unproject(seen: np.ndarray) -> np.ndarray:
+    """The points on the stage that `project` takes to these."""
+    return seen @ np.stack((RIGHT, UP, AWAY))
+
+
+def arrange(lanes: int, extent: np.ndarray, aspect: float) -> Layout:
+    """Cells in as few rows as show the object well.
+
+    Parameters
+    ----------
+    lanes : int
+    extent : array, shape (2,)
+        The width and height in metres that the motion needs in every cell. Above zero.
+    aspect : float
+        The picture's width over its height.
+    """
+    candidates = [
+        _arranged(lanes, rows, beside, extent, aspect) for rows in range(1, lanes + 1) for beside in (False, True)
+    ]
+    smallest = min(candidate.metres for candidate in candidates)
+    return next(candidate for candidate in candidates if candidate.metres <= smallest / WRAP_GAIN)
+
+
+def _arranged(lanes: int, rows: int, beside: bool, extent: np.ndarray, aspect: float) -> Layout:
+    columns = -(-lanes // rows)
+    width = (aspect - 2.0 * MARGIN - (columns - 1) * GAP) / columns
+    height = (1.0 - HEADER - FOOTER - 2.0 * MARGIN - (rows - 1) * GAP) / rows
+    left, top = -aspect / 2.0 + MARGIN, 0.5 - MARGIN - HEADER
+    cells = tuple(
+        Cell(
+            left + width / 2.0 + (lane % columns) * (width + GAP),
+            top - height / 2.0 - (lane // columns) * (height + GAP),
+            width,
+            height,
+            beside,
+        )
+        for lane in range(lanes)
+    )
+    return Layout(cells, float((extent / cells[0].room).max()), aspect)

@@ -1,0 +1,217 @@
+"""What a comparison found, in numbers: the rows of `metrics.csv`, and the poses behind them as tables.
+
+Errors are in metres; the poses in the tables keep the unit of their recording. The numbers are written so that `float`
+reads back exactly what was computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.measures import rms
+from rigid_motion_batch.files import replacing
+from rigid_motion_batch.rows import write_rows
+
+from .choices import Choice
+from .modes import BEST_OF
+from .reconstructions import Reconstruction
+
+BYTES_PER_KEY = 7 * 8
+"""A position and a quaternion, as doubles: what the paper sends for an update."""
+
+NOTHING = 1e-9
+"""An error below this, in metres, is rounding: every sample was a key, or nothing moved."""
+
+BLOCK = 10_000
+"""Rows of a table that are made at a time."""
+
+BYTES_PER_MODE = 1
+"""What a key has in addition where every segment has a mode of its own."""
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """One clip with one choice of keys under one mode. The fields are the columns of `metrics.csv`, in their order."""
+
+    clip: str
+    mode: str
+
+    rate_hz: str
+    """As the user wrote it; empty where a tolerance decides."""
+
+    keys: int
+
+    samples: int
+    """How many samples of the recording were compared: those between the first and the last key, both included."""
+
+    duration_s: float
+    """From the first key to the last."""
+
+    bytes_per_s: float
+    """Of the keys that were really kept, not of the rate that was asked for: see `measure_reconstruction`."""
+
+    rms_shell_m: float
+    p95_shell_m: float
+    max_shell_m: float
+    rms_position_m: float
+    rms_rotation_deg: float
+    rms_velocity_m_s: float
+
+    decimation: str
+    """How the keys were chosen: "uniform" or "adaptive"."""
+
+    tolerance_m: float | None
+    """The largest shell error that was allowed; empty in the table where a rate decides."""
+
+    keys_per_s: float
+    """On average, the first key not counted; of a whole body, for each joint."""
+
+    joints: int | None = None
+    """How many a whole body has; this and the following are empty for a single rigid body."""
+
+    key_frames: int | None = None
+    """Samples that are a key of any joint: key poses, where joints share them."""
+
+    worst_joint: str | None = None
+    """The one that `max_shell_m` is of."""
+
+    foot_slide_m: float | None = None
+    """The farthest that a joint which stands on the ground in the recording gets from where it began to stand."""
+
+    recorded_slide_m: float | None = None
+    """The same in the recording itself."""
+
+
+def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
+    """The metrics of every mode, in the order of the modes.
+
+    Notes
+    -----
+    `bytes_per_s` is (keys - 1) / duration times 56 bytes, or 57 under `best_of`, whose keys say the mode. A recording
+    that is thinned to 10 keys a second keeps fewer where it has gaps or is slow itself, and it is what would be sent
+    that counts. The first key is not counted, since a stretch of the motion costs the key at its end: keys exactly a
+    tenth of a second apart are 560 bytes a second for any length of the clip.
+
+    Raises
+    ------
+    ValueError
+        Where there are fewer than two keys, which have no time between them.
+    """
+    clip, choice, times = reconstruction.clip, reconstruction.choice, reconstruction.times
+    if len(times) < 2:
+        raise ValueError(
+            f"{clip.name} {choice.phrase}: 1 key has no in-betweens to measure; "
+            "give a longer recording or a higher rate"
+        )
+    duration = float(times[-1] - times[0])
+    rows = []
+    for mode, errors in reconstruction.errors.items():
+        keys = len(reconstruction.keys[mode])
+        rows.append(
+            Metrics(
+                clip=clip.name,
+                mode=mode,
+                rate_hz=choice.rate,
+                keys=keys,
+                samples=len(times),
+                duration_s=duration,
+                bytes_per_s=(keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
+                rms_shell_m=rms(errors.shell),
+                p95_shell_m=float(np.percentile(errors.shell, 95.0)),
+                max_shell_m=float(np.max(errors.shell)),
+                rms_position_m=rms(errors.position),
+                rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
+                rms_velocity_m_s=rms(errors.velocity),
+                decimation=choice.decimation,
+                tolerance_m=choice.tolerance(clip),
+                keys_per_s=(keys - 1) / duration,
+            )
+        )
+    return rows
+
+
+def geometric_mean(values: np.ndarray) -> np.ndarray:
+    """The geometric mean over the first axis of what is not NaN; NaN where nothing is left."""
+    known = np.isfinite(values) & (values > 0.0)
+    count = known.sum(axis=0)
+    total = np.log(np.where(known, values, 1.0)).sum(axis=0)
+    return np.exp(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
+
+
+def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
+    """Write `metrics.csv`: a header and a row for every clip, choice of keys and mode."""
+    write_rows(path, Metrics, rows)
+
+
+def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
+    """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
+
+    Parameters
+    ----------
+    path : Path
+    times : array, shape (n,)
+    poses : Poses, shape (n,)
+    modes : sequence of str, n - 1 of them, optional
+        Of the segments that the poses begin, for a last column, `mode`. The last pose begins none.
+    """
+    columns = [times, *poses.positions.T, *poses.quaternions.T]
+    header = "t,x,y,z,qw,qx,qy,qz"
+    if poses.scales is not None:
+        columns.append(poses.scales)
+        header += ",s"
+    with replacing(path) as stream:
+        stream.write(f"{header},mode\n" if modes else f"{header}\n")
+        for first, lines in lines_of_poses(columns):
+            if modes:
+                lines = [
+                    f"{line},{mode}" for line, mode in zip(lines, (*modes, "")[first : first + BLOCK], strict=True)
+                ]
+            stream.write("\n".join([*lines, ""]))
+
+
+def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[str]]]:
+    """The rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
+
+    Numbers take many times their memory as text, and a recording may have hours of them.
+    """
+    for first in range(0, len(columns[0]), BLOCK):
+        rows = np.stack([column[first : first + BLOCK] for column in columns], axis=-1).tolist()
+        yield first, [",".join(map(repr, row)) for row in rows]
+
+
+def table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
+    """The files that `write_reconstruction` writes for a choice of keys."""
+    modes = tuple(modes)
+    keys = {f"{mode}.keys.csv": mode for mode in modes}
+    if choice.decimation == "uniform":
+        keys = {"keys.csv": ""} | ({f"{BEST_OF}.keys.csv": BEST_OF} if BEST_OF in modes else {})
+    return [*(f"{mode}.csv" for mode in modes), *keys]
+
+
+def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
+    """The files of the keys of a whole body: one for all modes where they have the same."""
+    return ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
+
+
+def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:
+    """Write a `MODE.csv` for every mode into `folder`, and the keys.
+
+    Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
+    of `best_of` are in a table of their own in any case, with the mode of each segment.
+    """
+    clip = reconstruction.clip
+    for mode, poses in reconstruction.poses.items():
+        write_poses(folder / f"{mode}.csv", reconstruction.times, poses)
+    tables = {f"{mode}.keys.csv": keys for mode, keys in reconstruction.keys.items() if mode != BEST_OF}
+    if reconstruction.choice.decimation == "uniform":
+        tables = {"keys.csv": next(iter(tables.values()))}
+    for name, keys in tables.items():
+        write_poses(folder / name, clip.times[keys], clip.poses[keys])
+    if BEST_OF in reconstruction.keys:
+        keys, modes = reconstruction.keys[BEST_OF], reconstruction.segment_modes
+        write_poses(folder / f"{BEST_OF}.keys.csv", clip.times[keys], clip.poses[keys], modes)

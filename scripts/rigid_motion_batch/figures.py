@@ -1,0 +1,139 @@
+"""Figures: what a whole body is made of, its joints at rest and its skin; and how large it is.
+
+Arrays have the joints first, parents before their children. Lengths are in the unit of the file and axes are its own,
+as those of the poses that go with a figure: each joint's in its parent's space, those of roots in the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.repair import LARGEST
+
+UNITS = (
+    ("metres", 1.0),
+    ("centimetres", 0.01),
+    ("inches", 0.0254),
+    ("units of CMU's motion capture, 1/0.45 inch", 0.0254 / 0.45),
+    ("millimetres", 0.001),
+    ("feet", 0.3048),
+    ("decimetres", 0.1),
+)
+"""What files are in that do not say so, the likelier first, and their lengths in metres."""
+
+IN_METRES = 0.2, 5.0
+"""A body that would be as large as that in metres is believed to be in metres: the smallest and the largest."""
+
+GROWN_UP = 0.9, 2.3
+"""Metres that most bodies measure: a unit that makes a body as large is taken to be the file's."""
+
+TYPICAL = 1.7
+"""Metres; where no unit makes a body that large, that is taken which comes nearest."""
+
+MOST_NAMED = 5
+"""Joints that are named of one kind of fault."""
+
+NOTHING = 1e-9
+"""The size of what has none, in any unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """The surface of a body where its joints are at rest."""
+
+    vertices: np.ndarray
+    """Shape (v, 3), in the world."""
+
+    triangles: np.ndarray
+    """Shape (t, 3), numbers of vertices."""
+
+    joints: np.ndarray
+    """Shape (v, 4): the joints that carry each vertex."""
+
+    weights: np.ndarray
+    """Shape (v, 4): how much of it each carries. They sum to 1; what is not needed is 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A body at rest."""
+
+    joints: tuple[str, ...]
+    """Their names, each once."""
+
+    parents: np.ndarray
+    """Shape (joints,): the number of each joint's parent, lower than its own, -1 for roots."""
+
+    rest: Poses
+    """Where the joints are at rest, shape (joints,), in the world and not in their parents' space."""
+
+    tails: np.ndarray
+    """Where the bone of each joint ends, in its own space, shape (joints, 3)."""
+
+    skin: Skin | None = None
+
+    @property
+    def skeleton(self) -> Skeleton:
+        return Skeleton(self.parents)
+
+
+def repaired(figure: Figure) -> tuple[Figure, tuple[str, ...]]:
+    """A figure all of whose numbers are some, and what was done for that, a sentence each, as in `repair`.
+
+    Where a joint is at rest, and where its bone ends, decides about nothing but how it is drawn.
+    """
+    places, tails, skin, done = figure.rest.positions, figure.tails, figure.skin, []
+    wrong = ~(np.abs(np.concatenate((places, tails), axis=1)) < LARGEST).all(axis=1)
+    if wrong.any():
+        names = ", ".join(np.array(figure.joints)[wrong][:MOST_NAMED].tolist())
+        more = ", ..." if np.count_nonzero(wrong) > MOST_NAMED else ""
+        done.append(f"drew no bones for joints that are nowhere at rest ({np.count_nonzero(wrong)}: {names}{more})")
+        places, tails = (np.where(wrong[:, None], 0.0, some) for some in (places, tails))
+        figure = replace(figure, rest=Poses(places, figure.rest.quaternions), tails=tails)
+    if skin is not None and not (np.abs(skin.vertices) < LARGEST).all():
+        done.append("left out a skin with numbers that are missing, not finite or too large")
+        figure = replace(figure, skin=None)
+    return figure, tuple(done)
+
+
+def carrying(parents: np.ndarray) -> np.ndarray:
+    """Which joints are roots that carry a single child about, shape (joints,): they may be wherever it was left."""
+    children = np.bincount(parents[parents >= 0], minlength=len(parents))
+    return (parents < 0) & (children == 1)
+
+
+def size_of(parents: np.ndarray, places: np.ndarray) -> float:
+    """The largest extent along any axis of joints at these places (joints, 3).
+
+    Joints that only carry the rest of the body about, from the ground or from wherever they were left, are no part of
+    it: it begins where a joint first has several children.
+    """
+    children = np.bincount(parents[parents >= 0], minlength=len(parents))
+    body = np.ones(len(parents), dtype=bool)
+    for root in np.flatnonzero(parents < 0).tolist():
+        chain = [root]
+        while children[chain[-1]] == 1:
+            chain.append(int(np.flatnonzero(parents == chain[-1])[0]))
+        if children[chain[-1]] > 1:
+            body[chain[:-1]] = False
+    return float(np.ptp(places[body], axis=0).max())
+
+
+def unit_of(size: float) -> tuple[str, float]:
+    """The unit that a body of this size is likely to be in: what it is called, and its length in metres."""
+    if size < NOTHING or IN_METRES[0] <= size <= IN_METRES[1]:
+        return UNITS[0]
+    for name, length in UNITS:
+        if GROWN_UP[0] <= size * length <= GROWN_UP[1]:
+            return name, length
+    return min(UNITS, key=lambda unit: abs(np.log(size * unit[1] / TYPICAL)))
+
+
+def short_names(joints: Sequence[str]) -> list[str]:
+    """The names of joints without a namespace that they all have: "mixamorig:Hips" is told from others by "Hips"."""
+    spaces = {name.rpartition(":")[0] for name in joints}
+    return [name.rpartition(":")[2] for name in joints] if len(spaces) == 1 else list(joints)

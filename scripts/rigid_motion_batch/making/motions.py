@@ -1,0 +1,281 @@
+"""Motions of a hand-held tool as people make them: reaching, pivoting on a tip, throwing and catching, driving a screw.
+
+Metres, seconds, radians; right-handed, z up, the person stands at the origin and looks along +y. The tool's own axes
+are x to the right, y forward (along the bit), z up, with the origin in the hand: a tool held level points along +y.
+
+The strokes are minimum-jerk (Flash and Hogan, 1985): quintics in time, here in the joint angles or in the angles and
+places of the tool. Strokes that overlap add up (Flash and Henis, 1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import multiply, rotate
+
+from .tracking import turn, unsteadiness
+
+TIP = np.array((0.0, 0.160, 0.062))
+"""Where the drill's bit ends, in the tool's axes."""
+
+CENTRE_OF_MASS = np.array((0.0, 0.010, 0.030))
+
+GRAVITY = np.array((0.0, 0.0, -9.81))
+
+X, Y, Z = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion: its poses at any times (n,), and how long it takes."""
+
+    duration: float
+    poses: Callable[[np.random.Generator, np.ndarray], Poses]
+
+
+# ---- strokes ---------------------------------------------------------------------------------------------------------
+
+
+def strokes(times: np.ndarray, onsets: ArrayLike, durations: ArrayLike, amounts: ArrayLike) -> np.ndarray:
+    """The sum of minimum-jerk strokes at `times` (n,): shape (n,) and the trailing axes of `amounts`.
+
+    Parameters
+    ----------
+    onsets, durations, amounts : array-like, shapes (k, ...) that broadcast
+        Each stroke goes from 0 to its amount. Before it is 0, and after it stays.
+    """
+    onsets, durations, amounts = np.broadcast_arrays(onsets, durations, amounts)
+    done = np.clip((times.reshape((-1,) + (1,) * onsets.ndim) - onsets) / durations, 0.0, 1.0)
+    return (amounts * done**3 * (10.0 + done * (6.0 * done - 15.0))).sum(axis=1)
+
+
+@dataclass(frozen=True)
+class Knot:
+    """What a motion passes through: where, how fast and at what acceleration. A knot of rest has neither."""
+
+    time: float
+    place: ArrayLike
+    velocity: ArrayLike = 0.0
+    acceleration: ArrayLike = 0.0
+
+
+def through(knots: list[Knot], times: np.ndarray) -> np.ndarray:
+    """The minimum-jerk motion from knot to knot at `times`, shape (n, d): continuous up to the acceleration.
+
+    It rests before the first knot and after the last. Between two knots of free flight it is the parabola.
+    """
+    starts = np.array([knot.time for knot in knots])
+    place, velocity, acceleration = (
+        np.array([np.broadcast_to(getattr(knot, name), np.shape(knots[0].place)) for knot in knots])
+        for name in ("place", "velocity", "acceleration")
+    )
+    segment = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(knots) - 2)
+    length = np.diff(starts)[segment][:, None]
+    u = np.clip((times - starts[segment])[:, None] / length, 0.0, 1.0)
+    p0, v0, a0 = place[segment], velocity[segment] * length, acceleration[segment] * length**2
+    p1, v1, a1 = place[segment + 1], velocity[segment + 1] * length, acceleration[segment + 1] * length**2
+    missing_place = p1 - p0 - v0 - 0.5 * a0
+    missing_velocity = v1 - v0 - a0
+    missing_acceleration = a1 - a0
+    c3 = 10.0 * missing_place - 4.0 * missing_velocity + 0.5 * missing_acceleration
+    c4 = -15.0 * missing_place + 7.0 * missing_velocity - missing_acceleration
+    c5 = 6.0 * missing_place - 3.0 * missing_velocity + 0.5 * missing_acceleration
+    return p0 + u * (v0 + u * (0.5 * a0 + u * (c3 + u * (c4 + u * c5))))
+
+
+def about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Turns by `angles` (n,) about one axis, as quaternions (n, 4)."""
+    return turn(angles[:, None] * axis)
+
+
+def chain(*turns: np.ndarray) -> np.ndarray:
+    """The product of quaternions, the outermost first."""
+    product = turns[0]
+    for factor in turns[1:]:
+        product = multiply(product, factor)
+    return product
+
+
+def held_by(point: np.ndarray, places: np.ndarray, quaternions: np.ndarray) -> Poses:
+    """The poses of a tool whose `point` (3,), in the tool's axes, is at `places` (n, 3)."""
+    return Poses(places - rotate(quaternions, np.broadcast_to(point, places.shape)), quaternions)
+
+
+# ---- reaching --------------------------------------------------------------------------------------------------------
+
+SHOULDER = np.array((0.18, 0.0, 1.40))
+UPPER_ARM, FOREARM, HAND = 0.30, 0.26, 0.08
+
+JOINT_LAGS = np.array((0.00, 0.00, 0.03, 0.05, 0.08, 0.10, 0.10))
+"""The shoulder sets off first, the elbow and the wrist follow."""
+
+POSTURES = np.radians(
+    # azimuth, elevation and rotation of the upper arm; elbow flexion; pronation; wrist flexion and deviation
+    (
+        (-6.0, 8.0, 6.0, 82.0, 0.0, 0.0, 0.0),  # at rest beside the body
+        (-30.0, 38.0, -8.0, 58.0, 28.0, 12.0, -8.0),  # the tray, on the right
+        (24.0, 58.0, 18.0, 66.0, -18.0, -22.0, 10.0),  # over the site, up and on the left
+        (14.0, 56.0, 8.0, 28.0, -34.0, 20.0, 6.0),  # down into it
+        (2.0, 80.0, 16.0, 62.0, -62.0, -14.0, -10.0),  # lifted to the light and turned over
+        (-6.0, 10.0, 4.0, 84.0, 2.0, 2.0, 0.0),  # back
+    )
+)
+REACH_ONSETS = np.array((0.30, 1.10, 1.88, 2.72, 3.58))
+REACH_DURATIONS = np.array((0.78, 0.85, 0.70, 0.80, 0.85))
+
+
+def reach(rng: np.random.Generator, times: np.ndarray) -> Poses:
+    """Five reaches of an arm of seven joint angles: shoulder, elbow and wrist."""
+    angles = POSTURES[0] + strokes(
+        times, REACH_ONSETS[:, None] + JOINT_LAGS, REACH_DURATIONS[:, None], np.diff(POSTURES, axis=0)
+    )
+    angles += np.radians(0.25) * unsteadiness(rng, times, len(JOINT_LAGS))
+    return arm(angles)
+
+
+def arm(angles: np.ndarray) -> Poses:
+    """Forward kinematics: the pose of the tool for joint angles (n, 7) as in `POSTURES`; with all 0 the arm hangs."""
+    azimuth, elevation, rotation, elbow, pronation, flexion, deviation = angles.T
+    upper_arm = chain(about(Z, azimuth), about(X, elevation), about(Z, rotation))
+    forearm = multiply(upper_arm, about(X, elbow))
+    hand = chain(forearm, about(Z, pronation), about(X, flexion), about(Y, deviation))
+    down = np.broadcast_to(-Z, (len(angles), 3))
+    grip = SHOULDER + UPPER_ARM * rotate(upper_arm, down) + FOREARM * rotate(forearm, down) + HAND * rotate(hand, down)
+    # The tool points along the hand, which hangs down where the tool's own forward is level.
+    return Poses(grip, multiply(hand, turn(np.broadcast_to(-0.5 * np.pi * X, (len(angles), 3)))))
+
+
+# ---- pivoting about the tip ------------------------------------------------------------------------------------------
+
+SITE = np.array((0.02, 0.46, 0.98))
+
+
+def pivot(rng: np.random.Generator, times: np.ndarray) -> Poses:
+    """The tip rests on a point while the handle swings, tilts and rolls, in slow sweeps and quick flicks."""
+    #         onset, duration, swing, tilt, roll: the last three in degrees
+    table = np.array(
+        (
+            (0.25, 1.10, 46.0, 14.0, 0.0),
+            (1.20, 0.60, -62.0, -6.0, 18.0),
+            (1.85, 0.38, 34.0, 24.0, -10.0),
+            (2.25, 0.32, -30.0, -20.0, 6.0),
+            (2.60, 0.36, 28.0, 16.0, -30.0),
+            (3.05, 1.20, 6.0, -34.0, 44.0),
+            (4.05, 0.45, -16.0, 10.0, -24.0),
+        )
+    )
+    angles = strokes(times, table[:, :1], table[:, 1:2], np.radians(table[:, 2:]))
+    angles += np.radians(0.35) * unsteadiness(rng, times, 3)
+    slips = 0.25e-3 * unsteadiness(rng, times, 3)
+    swing, tilt, roll = angles.T
+    quaternions = chain(about(Z, swing), about(X, np.radians(-48.0) + tilt), about(Y, roll))
+    return held_by(TIP, SITE + slips, quaternions)
+
+
+# ---- throwing and catching -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Throw:
+    """A hand swings and lets go, the tool flies and turns about an axis, the other hand catches it and rests."""
+
+    moments: tuple[float, float, float, float]
+    """The start, the release, the catch and the rest."""
+
+    centres: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]
+    """The centre of mass at these moments."""
+
+    axis: np.ndarray
+
+    angles: tuple[float, float, float, float] = (0.0, -2.0, 366.0, 360.0)
+    """Degrees at these moments. Between them the hands turn back for the swing, and on with what they have caught."""
+
+    def path(self) -> list[Knot]:
+        """The centre of mass: a hand that lets go, or catches, has the velocity and acceleration of the free body."""
+        start, release, catch, rest = self.moments
+        held, released, caught, resting = self.centres
+        flight = catch - release
+        velocity = np.subtract(caught, released) / flight - 0.5 * GRAVITY * flight
+        return [
+            Knot(start, held),
+            Knot(release, released, velocity, GRAVITY),
+            Knot(catch, caught, velocity + GRAVITY * flight, GRAVITY),
+            Knot(rest, resting),
+        ]
+
+    def turning(self) -> list[Knot]:
+        """The angle about the axis, in radians; its rate is constant in flight."""
+        start, release, catch, rest = self.moments
+        angles = np.radians(self.angles)[:, None]
+        rate = (angles[2] - angles[1]) / (catch - release)
+        return [
+            Knot(start, angles[0]),
+            Knot(release, angles[1], rate),
+            Knot(catch, angles[2], rate),
+            Knot(rest, angles[3]),
+        ]
+
+    def airborne(self, times: np.ndarray) -> np.ndarray:
+        """1 in flight, 0 in a hand, with 40 ms of letting go and of closing in between, shape (n,)."""
+        _, release, catch, _ = self.moments
+        return strokes(times, [release - 0.04, catch], [0.04, 0.04], [1.0, -1.0])
+
+
+RIGHT_HAND, LEFT_HAND = (0.27, 0.38, 1.08), (-0.25, 0.40, 1.08)
+THERE = Throw((0.32, 0.76, 1.34, 1.80), (RIGHT_HAND, (0.24, 0.41, 1.18), (-0.27, 0.40, 1.15), LEFT_HAND), axis=X)
+BACK = Throw(
+    (2.20, 2.66, 3.28, 3.76),
+    (LEFT_HAND, (-0.22, 0.42, 1.20), (0.30, 0.38, 1.14), RIGHT_HAND),
+    axis=np.array((12.0, 4.0, -3.0)) / 13.0,
+)
+
+
+def throw(rng: np.random.Generator, times: np.ndarray) -> Poses:
+    """From the right hand to the left and back: wind-up, release, one tumble in free flight, catch, absorption."""
+    places = through(THERE.path() + BACK.path(), times)
+    hold = np.broadcast_to(turn(np.radians(12.0) * X), (len(times), 4))
+    turns = [about(way.axis, through(way.turning(), times)[:, 0]) for way in (THERE, BACK)]
+    poses = held_by(CENTRE_OF_MASS, places, chain(*turns, hold))
+
+    grasp = 1.0 - THERE.airborne(times) - BACK.airborne(times)
+    sway = grasp[:, None] * unsteadiness(rng, times, 6)
+    return Poses(
+        poses.positions + 0.8e-3 * sway[:, :3], multiply(poses.quaternions, turn(np.radians(0.4) * sway[:, 3:]))
+    )
+
+
+# ---- driving a screw -------------------------------------------------------------------------------------------------
+
+PITCH = 2.75e-3
+"""The advance a turn of a 6.5 mm cancellous bone screw."""
+
+
+def screw(rng: np.random.Generator, times: np.ndarray) -> Poses:
+    """Six strokes of the wrist drive a screw a little over two turns, with a rest for each new grip."""
+    onsets = np.array((0.25, 0.98, 1.70, 2.42, 3.12, 3.84))
+    durations = np.array((0.56, 0.54, 0.52, 0.54, 0.54, 0.56))
+    roll = strokes(times, onsets, durations, np.radians((118.0, 132.0, 140.0, 136.0, 128.0, 112.0)))
+    roll += np.radians(0.4) * unsteadiness(rng, times, 1)[:, 0]
+    # The hand pushes a little beside the axis, so the tool leans, and the lean goes round with the turn.
+    lean = np.radians(1.4) * np.stack((np.cos(roll), np.zeros_like(roll), np.sin(roll)), axis=-1)
+    lean += np.radians(0.3) * unsteadiness(rng, times, 3) * (1.0, 0.0, 1.0)
+    aim = np.broadcast_to(turn(np.radians(-38.0) * X), (len(times), 4))
+    depth = PITCH * roll / (2.0 * np.pi)
+    return held_by(
+        TIP,
+        SITE + depth[:, None] * rotate(aim[:1], Y[None]),
+        chain(aim, turn(lean), about(Y, roll)),
+    )
+
+
+MOTIONS = {
+    "reach": Motion(4.7, reach),
+    "pivot": Motion(4.7, pivot),
+    "throw": Motion(4.1, throw),
+    "screw": Motion(4.6, screw),
+}

@@ -1,0 +1,85 @@
+"""What a hand and a tracking device add to an ideal motion: unsteadiness, noise and an uneven timer.
+
+Seconds, metres, radians. The levels are those of hand-held controllers: a median step of 11.1 ms that strays between 7
+and 17 ms, noise of a few tenths of a millimetre and hundredths of a degree, most of it slower than the frames (it
+wanders), and the 8 to 12 Hz tremor that every outstretched hand has (Elble and Randall, 1978).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import multiply
+
+RATE = 90.0
+SHORTEST_STEP, LONGEST_STEP = 0.007, 0.017
+
+STAMP_ERROR = 0.3e-3
+POSITION_WANDER, POSITION_WHITE = 0.25e-3, 0.12e-3
+ROTATION_WANDER, ROTATION_WHITE = np.radians(0.06), np.radians(0.03)
+
+
+def tick(rng: np.random.Generator, duration: float) -> np.ndarray:
+    """The times at which a 90 Hz device reports, from 0 to about `duration`.
+
+    Each step is a little uneven; one in fourteen is late by 2 to 6 ms, and the step after it makes up for half of that.
+    """
+    count = round(duration * RATE)
+    steps = 1.0 / RATE + 0.60e-3 * rng.standard_normal(count)
+    lateness = rng.uniform(2e-3, 6e-3, count) * (rng.random(count) < 1.0 / 14.0)
+    steps += lateness
+    steps[1:] -= 0.5 * lateness[:-1]
+    return np.concatenate(([0.0], np.cumsum(np.clip(steps, SHORTEST_STEP, LONGEST_STEP))))
+
+
+def wander(
+    rng: np.random.Generator, times: np.ndarray, channels: int, band: tuple[float, float], slope: float = 0.0
+) -> np.ndarray:
+    """Independent random signals, shape (n, channels), of an expected root mean square of 1.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Need not be evenly spaced: the signal is a sum of sinusoids and has a value at any time.
+    band : tuple of float
+        The lowest and highest frequency in Hz.
+    slope : float
+        The power falls with the frequency to this power: 0 is flat, 1 is pink, 2 is brown.
+    """
+    low, high = band
+    frequencies = np.arange(low, high, 1.0 / (times[-1] - times[0]))
+    power = frequencies**-slope
+    amplitudes = np.sqrt(power / power.sum())[:, None] * rng.standard_normal((2, len(frequencies), channels))
+    phases = 2.0 * np.pi * times[:, None] * frequencies
+    return np.einsum("nf,fc->nc", np.cos(phases), amplitudes[0]) + np.einsum("nf,fc->nc", np.sin(phases), amplitudes[1])
+
+
+def unsteadiness(rng: np.random.Generator, times: np.ndarray, channels: int) -> np.ndarray:
+    """What a held hand does of itself, shape (n, channels), of a root mean square of about 1: slow sway and tremor."""
+    return wander(rng, times, channels, (0.3, 3.0), slope=2.0) + 0.10 * wander(rng, times, channels, (8.0, 12.0))
+
+
+def track(
+    rng: np.random.Generator, motion: Callable[[np.random.Generator, np.ndarray], Poses], times: np.ndarray
+) -> Poses:
+    """The poses of `motion` as a device would report them at `times`.
+
+    Each is of a moment a little beside the time it is stamped with, has noise that wanders, and noise that is new with
+    every frame.
+    """
+    count = len(times)
+    poses = motion(rng, times + STAMP_ERROR * rng.standard_normal(count))
+    position_noise = POSITION_WANDER * wander(rng, times, 3, (0.2, 12.0), slope=1.0)
+    position_noise += POSITION_WHITE * rng.standard_normal((count, 3))
+    rotation_noise = ROTATION_WANDER * wander(rng, times, 3, (0.2, 12.0), slope=1.0)
+    rotation_noise += ROTATION_WHITE * rng.standard_normal((count, 3))
+    return Poses(poses.positions + position_noise, multiply(poses.quaternions, turn(rotation_noise)))
+
+
+def turn(rotation_vectors: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) of rotation vectors (..., 3): the axis times the angle in radians."""
+    angles = np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
+    return np.concatenate((np.cos(0.5 * angles), 0.5 * np.sinc(angles / (2.0 * np.pi)) * rotation_vectors), axis=-1)

@@ -1,0 +1,99 @@
+"""The words and numbers of the page: how shares, times and tables are written, and verdicts that depend on numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigid_motion_batch.comparison.report.findings import listed
+from rigid_motion_batch.comparison.study.modes import REFERENCE
+
+from . import claims
+from .sending import SentNeeded
+from .table import Needed
+from .timing import Timing
+
+
+def percents(shares: Sequence[float]) -> str:
+    """Shares in a sentence: "33, 50, 53 and 58 %"."""
+    return f"{listed([number(100.0 * share, 0) if np.isfinite(share) else '-' for share in shares])} %"
+
+
+def less(saved: Sequence[float]) -> str:
+    """Shares saved, in a sentence."""
+    return f"{percents(saved)} less"
+
+
+def verdict(saved: Sequence[float]) -> str:
+    """Whether the paper's saving is there."""
+    good = [row.quality.lower() for row in holding(saved)]
+    if len(good) == len(claims.TABLE):
+        return "That is the paper's saving in every row."
+    return f"The paper's saving is there for {listed(good)}." if good else "The paper's saving is in no row."
+
+
+def holding(saved: Sequence[float]) -> list[claims.Row]:
+    """The rows of the paper's table whose saving is there, to the percent."""
+    return [row for row, share in zip(claims.TABLE, saved, strict=True) if share >= row.saved - 0.005]
+
+
+def needed_cell(cell: Needed | SentNeeded | None) -> str:
+    """A cell of a table of what is needed: updates a second, what is saved, and on how many clips if not on all."""
+    if cell is None or not np.isfinite(cell.needed):
+        return "-"
+    part = "" if cell.reached == cell.asked else f"; {cell.reached} of {cell.asked} clips"
+    return f"{cell.needed:.1f} ({percent(cell.saved)}{part})"
+
+
+def heads(first: str) -> list[str]:
+    """The heads of a table whose columns are the rows of the paper's."""
+    return [first, *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)]
+
+
+def papers_row() -> list[str]:
+    """What the paper says, as a row of such a table."""
+    return ["*the paper*", *(f"*{row.multivectors} ({row.saved:.0%})*" for row in claims.TABLE)]
+
+
+def changed(relative: float) -> str:
+    """A ratio as what it is more or less than 1."""
+    return f"{abs(1.0 - relative):.1%} {'less' if relative < 1.0 else 'more'}"
+
+
+def doubt(one: Timing) -> str:
+    """Whether the interval leaves room for doubt."""
+    return "" if one.low > 1.0 or one.high < 1.0 else " (which may be chance)"
+
+
+def timed(one: Timing | None) -> str:
+    """A cell of the races: the ratio, its interval, and the processor's time."""
+    if one is None:
+        return ""
+    if one.mode == REFERENCE:
+        return f"1 ({written(one.processor_s)})"
+    return f"{one.relative:.3g}, {one.low:.3g} to {one.high:.3g} ({written(one.processor_s)})"
+
+
+def written(seconds: float) -> str:
+    """A time that is short."""
+    for unit, factor in (("ns", 1e9), ("µs", 1e6)):
+        if seconds * factor < 1000.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e3:.3g} ms"
+
+
+def percent(share: float) -> str:
+    """A share without decimals."""
+    return number(100.0 * share, 0) + "%"
+
+
+def number(value: float, decimals: int = 2) -> str:
+    """With the sign that print has for a number below zero, and none for a zero."""
+    return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}") if round(value, decimals) else f"{0:.{decimals}f}"
+
+
+def grid(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """A table of Markdown, its first column to the left and the others to the right."""
+    align = ["---", *["---:"] * (len(head) - 1)]
+    return ["| " + " | ".join(cells) + " |" for cells in (head, align, *rows)]

@@ -1,0 +1,70 @@
+"""Where the program's own files are: in a checkout, or where pip has put them."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+PACKAGE = Path(__file__).resolve().parent
+
+_UP = PACKAGE.parents[1]
+CHECKOUT = _UP if (_UP / "addon" / "rigid_motion" / "__init__.py").is_file() else None
+"""The root of the checkout that this is in; None where pip has installed it."""
+
+EXTENSION = CHECKOUT / "addon" / "rigid_motion" if CHECKOUT else PACKAGE.with_name("rigid_motion")
+ASSETS = CHECKOUT / "assets" if CHECKOUT else PACKAGE / "assets"
+MANIFEST = (CHECKOUT or EXTENSION) / "blender_manifest.toml"
+LICENSE = (CHECKOUT or EXTENSION) / "LICENSE"
+
+NAMED = {
+    "assets": ASSETS,
+    "blender_manifest.toml": MANIFEST,
+    "rigid_motion": EXTENSION,
+    "rigid_motion_batch": PACKAGE,
+    **({"tests": CHECKOUT / "tests"} if CHECKOUT else {}),
+}
+"""What the program is made of, by names that are the same wherever it is; a folder that is in another comes first."""
+
+
+def output_folder(name: str) -> Path:
+    """Where a command writes unless told otherwise: `renders/` of the checkout, or of the current folder."""
+    return (CHECKOUT or Path.cwd()) / "renders" / name
+
+
+def from_here(place: Path) -> Path:
+    """A path as it counts from the root of the checkout, where that is the current folder; otherwise the path itself.
+
+    What is kept by such names serves a checkout that was moved.
+    """
+    here = CHECKOUT == Path.cwd() and place.is_relative_to(CHECKOUT)
+    return place.relative_to(CHECKOUT) if here else place
+
+
+def place_of(name: str) -> Path:
+    """The file or folder of a name such as "rigid_motion/motion/poses.py".
+
+    Raises
+    ------
+    KeyError
+        Where the program has no part of that name.
+    """
+    part, _, rest = name.partition("/")
+    return NAMED[part] / rest if rest else NAMED[part]
+
+
+@cache
+def name_of(place: Path) -> str | None:
+    """The name of a file or folder of the program; None for any other."""
+    for part, root in NAMED.items():
+        if place.is_relative_to(root):
+            rest = place.relative_to(root).as_posix()
+            return part if rest == "." else f"{part}/{rest}"
+    return None
+
+
+@cache
+def manifest() -> dict[str, Any]:
+    """What the extension's manifest says: its name, its version."""
+    return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))

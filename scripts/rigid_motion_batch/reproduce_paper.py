@@ -1,0 +1,191 @@
+"""Reproduce the paper: its figures, its table and its example, from this program, with the paper's numbers beside them.
+
+Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table is made from the
+clips in assets/, and with --recordings from those in a folder as well. Whole bodies among these, and those that
+--bodies names, are studied as bodies too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from rigid_motion_batch.command_line import as_called, program_of
+from rigid_motion_batch.system_libraries import missing_for_rendering, require_blender, way_out
+
+SCRIPT = "reproduce_paper.py"
+PROGRAM = program_of(SCRIPT)
+
+require_blender(SCRIPT)
+
+import bpy
+import numpy as np
+
+from rigid_motion_batch.files import write_text, written_beside
+from rigid_motion_batch.paper.bodies import body_files
+from rigid_motion_batch.paper.motions import recordings_in
+from rigid_motion_batch.paper.page import with_section
+from rigid_motion_batch.paper.steps import PAGE, SECTIONS, plan, plan_bodies, plan_sending
+from rigid_motion_batch.paper.timing import ROUNDS
+from rigid_motion_batch.places import ASSETS, CHECKOUT, from_here, output_folder
+from rigid_motion_batch.progress import Progress
+from rigid_motion_batch.trajectories import TrajectoryError
+from rigid_motion_batch.workplan import FolderInUse, Outcome, Plan, SerialExecutor, State, Workspace, code_version, run
+from rigid_motion_batch.workplan.manifest import ManifestError
+
+CODE = (
+    *("rigid_motion/animation", "rigid_motion/motion", "assets/models.blend"),
+    *(
+        f"rigid_motion_batch/{part}"
+        for part in (
+            *("axes.py", "command_line.py", "comparison", "figures.py", "files.py", "making", "paper", "places.py"),
+            *("rows.py", "streaming", "trajectories"),
+        )
+    ),
+)
+"""What the results depend on."""
+
+EPILOG = """
+examples:
+  python scripts/reproduce_paper.py
+  python scripts/reproduce_paper.py --recordings ../recordings
+  python scripts/reproduce_paper.py --recordings ../recordings --docs
+  python scripts/reproduce_paper.py --recordings ../recordings --bodies ../rigs run.fbx
+  python scripts/reproduce_paper.py --bodies ../rigs --only-bodies --docs
+  python scripts/reproduce_paper.py --recordings ../recordings --only-sending --docs
+  python scripts/reproduce_paper.py --no-video --output /tmp/paper
+  blender --background --python scripts/reproduce_paper.py -- --no-pictures
+
+It writes OUTPUT/paper.md, the page, with its pictures in OUTPUT/paper/, and every number of it in OUTPUT/*.csv. What is
+done is not done again: after Ctrl-C, or with more recordings, the same call goes on. A second run gives the same
+numbers, those of timing.csv aside. With --only-bodies it writes the section on whole bodies alone, OUTPUT/bodies.md,
+and with --only-sending that on live streams, OUTPUT/sending.md, which take the longest; --docs puts the section into
+the page there, and its other sections stay. The last line it prints is the path of the page.
+Exit code: 0 done, 1 a part of it failed (the page holds the others), 2 a wrong input or option, 130 stopped by Ctrl-C.
+"""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description=__doc__,
+        epilog=as_called(EPILOG, SCRIPT),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="recordings to make the table from as well")
+    parser.add_argument(
+        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them, to study"
+    )
+    alone = parser.add_mutually_exclusive_group()
+    for section, what in (("bodies", "whole bodies"), ("sending", "streams that are sent when needed")):
+        alone.add_argument(
+            f"--only-{section}",
+            dest="only",
+            action="store_const",
+            const=section,
+            help=f"the section on {what}, and nothing else",
+        )
+    parser.add_argument(
+        "--output", type=Path, default=output_folder("paper"), help="folder to write to (renders/paper)"
+    )
+    parser.add_argument(
+        "--docs",
+        type=Path,
+        nargs="?",
+        const=(CHECKOUT or Path()) / "docs",
+        metavar="FOLDER",
+        help="copy the page and its pictures there (docs)",
+    )
+    parser.add_argument("--no-video", action="store_true", help="pictures, but no film")
+    parser.add_argument("--no-pictures", action="store_true", help="nothing that Blender has to render")
+    parser.add_argument("--rounds", type=_count, default=ROUNDS, metavar="N", help="of the races (%(default)s)")
+    parser.add_argument("--force", action="store_true", help="do everything again")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: list[str]) -> int:
+    """Reproduce the paper, and return the exit code."""
+    options = parse(arguments)
+    missing = None if options.no_pictures or options.only else missing_for_rendering()
+    if missing:
+        print(f"{PROGRAM}: {way_out(missing)}\nOr go without pictures: --no-pictures", file=sys.stderr)
+        return 2
+    try:
+        work = _plan(options)
+        if options.only and options.docs and not (options.docs / PAGE).is_file():
+            raise ValueError(f"{options.docs / PAGE}: there is no page to put the section into; leave --docs out")
+        with Workspace(options.output) as workspace, Progress() as progress, SerialExecutor() as executor:
+            outcome = run(work, workspace, executor, force=options.force, progress=progress, title="Reproducing")
+        page = options.output / SECTIONS.get(options.only, PAGE)
+        if options.docs and outcome.states[work.order[-1]].there:
+            if options.only:
+                section, whole = page.read_text(encoding="utf-8"), (options.docs / PAGE).read_text(encoding="utf-8")
+                write_text(options.docs / PAGE, with_section(whole, section))
+            else:
+                copy_page(work, outcome, options.output, options.docs)
+            page = options.docs / PAGE
+    except (TrajectoryError, ValueError, FolderInUse, ManifestError) as error:
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"{PROGRAM}: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return _report(outcome, page)
+
+
+def copy_page(work: Plan, outcome: Outcome, output: Path, docs: Path) -> None:
+    """Copy the page, and the pictures that it shows, to another folder."""
+    shown = [
+        path
+        for name, task in work.tasks.items()
+        if outcome.states[name].there
+        for path in task.outputs
+        if path == PAGE or path.startswith("paper/")
+    ]
+    for path in shown:
+        with written_beside(docs / path) as beside:
+            shutil.copyfile(output / path, beside)
+
+
+def _plan(options: argparse.Namespace) -> Plan:
+    recordings = recordings_in(options.recordings) if options.recordings else []
+    bodies = body_files(options.bodies)
+    version = f"{code_version(*CODE)} Blender {bpy.app.version_string} NumPy {np.__version__}"
+    own = sorted(from_here(ASSETS).glob("*.csv"))
+    if options.only == "bodies":
+        return plan_bodies(recordings, bodies, version=version)
+    if options.only == "sending":
+        return plan_sending(own, recordings, version=version)
+    return plan(
+        own,
+        recordings,
+        bodies,
+        pictures=not options.no_pictures,
+        film=not options.no_video,
+        rounds=options.rounds,
+        version=version,
+    )
+
+
+def _report(outcome: Outcome, page: Path) -> int:
+    """Say how it went, and where the page is."""
+    for name, problem in outcome.failures.items():
+        print(f"{PROGRAM}: {name}: {problem}", file=sys.stderr)
+    print(f"{outcome}.", file=sys.stderr)
+    if outcome.problem:
+        print(f"{PROGRAM}: {outcome.problem}", file=sys.stderr)
+        return 2
+    if outcome.interrupted:
+        print("Stopped; the same call goes on from here.", file=sys.stderr)
+    if page.is_file():
+        print(page.resolve(), flush=True)
+    return 130 if outcome.interrupted else int(outcome.count(State.FAILED) > 0)
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and 2 <= int(text) <= 10_000):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of rounds; give 2 to 10000")
+    return int(text)

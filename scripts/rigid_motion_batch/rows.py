@@ -1,0 +1,60 @@
+"""Tables in files: rows of one kind, a dataclass whose fields are the columns. `float` reads back what was computed."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from dataclasses import astuple, fields
+from pathlib import Path
+from typing import TypeVar
+
+from rigid_motion_batch.files import replacing
+
+Row = TypeVar("Row")
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""What spreadsheets take for the beginning of a formula, if a text begins with it: names come from strangers' files."""
+
+
+def plain(text: str) -> str:
+    """A text that no spreadsheet takes for a formula: with an apostrophe before it, where it would be one."""
+    return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
+
+
+def meant(cell: str) -> str:
+    """What `plain` made this of."""
+    return cell[1:] if cell.startswith("'") and plain(cell) != cell else cell
+
+
+def line_of(cells: Iterable[object]) -> str:
+    """Cells as a line of CSV, which ends with LF; texts are `plain`."""
+    line = io.StringIO()
+    cells = [plain(cell) if isinstance(cell, str) else cell for cell in cells]
+    # Before Python 3.13, csv quotes no ends of lines but those it writes itself. A joint's name may have any.
+    csv.writer(line, lineterminator="\r\n").writerow(cells)
+    return f"{line.getvalue()[:-2]}\n"
+
+
+def write_rows(path: Path, kind: type[Row], rows: Iterable[Row]) -> None:
+    """Write a header and the rows; None is an empty cell."""
+    with replacing(path) as stream:
+        stream.write(line_of(field.name for field in fields(kind)))
+        for row in rows:
+            stream.write(line_of(astuple(row)))
+
+
+READERS = {"str": meant, "int": int, "float": float}
+
+
+def read_all_rows(paths: Iterable[Path], kind: type[Row]) -> list[Row]:
+    """The rows of several files, one after the other."""
+    return [row for path in paths for row in read_rows(path, kind)]
+
+
+def read_rows(path: Path, kind: type[Row]) -> list[Row]:
+    """Read what `write_rows` wrote."""
+    with path.open(encoding="utf-8", newline="") as stream:
+        lines = list(csv.reader(stream))[1:]
+    readers = [READERS[field.type] for field in fields(kind)]
+    return [kind(*(read(cell) for read, cell in zip(readers, line, strict=True))) for line in lines]

@@ -1,0 +1,81 @@
+"""The libraries that Blender's wheel takes from a Linux system, and what to say where they are missing."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rigid_motion_batch.command_line import program_of
+from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.places import CHECKOUT
+
+DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
+"""Packages of Debian and Ubuntu."""
+
+FEDORA = "libX11 libXrender libXfixes libXi libxkbcommon libSM libICE mesa-libGL mesa-libEGL mesa-dri-drivers"
+"""Packages of Fedora and its relatives."""
+
+
+LOADED_LATE = ("libEGL.so.1", "libGL.so.1")
+"""What Blender loads only when it renders. It aborts the whole process where it cannot."""
+
+
+def missing_for_rendering() -> str | None:
+    """The message of the dynamic linker about the first library that is not here; None where all of them are."""
+    if sys.platform != "linux":
+        return None
+    for library in LOADED_LATE:
+        try:
+            ctypes.CDLL(library)
+        except OSError as error:
+            return str(error)
+    return None
+
+
+def require_blender(script: str) -> None:
+    """Load Blender, or end the command of a script with code 2 and what to do about it."""
+    try:
+        with _ended_by_ctrl_c(), hushed():  # Where OCIO is set, it says so.
+            import bpy  # noqa: F401
+    except ImportError as error:
+        print(f"{program_of(script)}: {error}\n{way_out(str(error), script)}", file=sys.stderr)
+        sys.exit(2)
+
+
+@contextmanager
+def _ended_by_ctrl_c() -> Iterator[None]:
+    """Have Ctrl-C end the process at once: an exception would leave Blender half loaded, and it crashes then."""
+    handler = signal.getsignal(signal.SIGINT)
+    if handler != signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+
+
+def way_out(error: str, script: str = "compare.py") -> str:
+    """What to do about the message that `import bpy` failed with in a script, in a few lines."""
+    missing = re.search(r"(\S+): cannot open shared object file", error)
+    if missing:
+        return (
+            f"Blender needs the system library {missing[1]}, which this machine does not have. Install, as root:\n"
+            f"  Debian, Ubuntu:  apt-get install -y {DEBIAN}\n"
+            f"  Fedora, RHEL:    dnf install -y {FEDORA}"
+        )
+    if CHECKOUT is None:
+        return (
+            "Blender's Python module bpy is not here. `pip install rigid-motion[blender]` brings it, for Python 3.11 "
+            "and 3.13."
+        )
+    return (
+        "Blender's Python module bpy is not here. Run this through `python scripts/bootstrap.py`, which installs it,\n"
+        f"or inside Blender: blender --background --python scripts/{script} -- INPUT"
+    )

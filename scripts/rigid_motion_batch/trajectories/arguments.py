@@ -1,0 +1,62 @@
+"""The options of a command line that say of recordings what their files do not."""
+
+from __future__ import annotations
+
+import argparse
+
+from rigid_motion_batch.command_line import number
+
+from .options import TICKS, ReadingOptions
+
+
+def add_reading_options(parser: argparse.ArgumentParser) -> None:
+    """Add a group of options, of which `reading_options` makes one thing."""
+    group = parser.add_argument_group("reading", "What recordings do not say of themselves; docs/csv.md has examples.")
+    group.add_argument(
+        "--columns",
+        type=_columns,
+        default=(),
+        metavar="t=NAME,...",
+        help="columns of CSVs by name: t, x, y, z, qx, qy, qz, qw, rx, ry, rz (Euler angles), scale, device",
+    )
+    group.add_argument("--time-unit", choices=TICKS, help="what times count, whatever the file says")
+    group.add_argument("--scale", type=_scale, metavar="M", help="metres in a unit of length: 0.01 for centimetres")
+    group.add_argument(
+        "--euler",
+        type=_order,
+        metavar="ORDER",
+        help="order of the Euler angles of CSVs: YXZ about the moved axes (intrinsic), zxy about those of the world",
+    )
+    group.add_argument(
+        "--degrees", action="store_true", help="they are degrees; otherwise as their names say, or radians"
+    )
+
+
+def reading_options(options: argparse.Namespace) -> ReadingOptions:
+    """What the options of that group say. Raises ValueError for some that do not go together."""
+    if options.degrees and not options.euler:
+        raise ValueError("--degrees is for Euler angles: add their order, such as --euler YXZ")
+    return ReadingOptions(options.columns, options.time_unit, options.scale, options.euler, options.degrees)
+
+
+def _columns(text: str) -> tuple[tuple[str, str], ...]:
+    pairs = [part.partition("=") for part in text.split(",")]
+    if not all(separator and column.strip() for _, separator, column in pairs):
+        raise argparse.ArgumentTypeError(f"{text!r} names no columns; write t=timestamp_ms,x=pos_x,...")
+    columns = tuple((meaning.strip(), column.strip()) for meaning, _, column in pairs)
+    return _checked(columns=columns).columns
+
+
+def _scale(text: str) -> float | None:
+    return _checked(scale=number(text)).scale
+
+
+def _order(text: str) -> str | None:
+    return _checked(euler=text).euler
+
+
+def _checked(**said: object) -> ReadingOptions:
+    try:
+        return ReadingOptions(**said)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None

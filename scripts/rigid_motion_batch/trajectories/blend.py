@@ -1,0 +1,294 @@
+"""Animated objects, rigs and pose bones of .blend files: where Blender evaluates them on every whole frame.
+
+The file's data is linked into the running Blender, a probe follows the object, or the bones, in a scene of its own, and
+all of it is taken out again: what is open stays as it is. Python of the file (its text blocks, scripted drivers) is not
+run. An armature whose bones move is a whole body; a bone is named OBJECT/BONE. Times are frame / frame rate, positions
+are Blender units, axes are Blender's; those of a bone are its own, y along it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from difflib import SequenceMatcher
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+
+from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
+from .rigs import LAST_FRAME, whole_body
+from .stages import probe
+
+if TYPE_CHECKING:
+    import bpy
+
+TRANSFORMS = ("location", "rotation_", "scale", "delta_")
+"""How the data paths of the channels begin that move an object."""
+
+OF_BONES = "pose.bones["
+"""How the data paths of everything begin that a driver may drive in a bone."""
+
+BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
+"""The data paths of the channels that move a pose bone, whose name is escaped in them."""
+
+FEW = 5
+"""Bones of a rig that are told where one has to be named."""
+
+STEADY = 1e-4
+"""By what share a scale may differ that is one and the same: single precision, through a chain of bones."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """What is followed: an object, or a bone of its pose."""
+
+    obj: bpy.types.Object
+    bone: str | None = None
+
+    @property
+    def name(self) -> str:
+        return self.obj.name if self.bone is None else f"{self.obj.name}/{self.bone}"
+
+    def frames_of_keys(self) -> tuple[float, float] | None:
+        """The first and last frame of what moves it in the object's Action and NLA strips. None where it has neither.
+
+        What moves any bone of a rig counts for all of them, which hang on one another by parents and constraints.
+        """
+        data = self.obj.animation_data
+        if data is None:
+            return None
+        ranges = [(strip.frame_start, strip.frame_end) for track in data.nla_tracks for strip in track.strips]
+        for fcurve in fcurves_of(data.action, data.action_slot):
+            # One that only its modifiers make has no keys, and says that they are on frame 0.
+            has_keys = fcurve.keyframe_points or fcurve.sampled_points
+            if has_keys and (
+                fcurve.data_path.startswith(TRANSFORMS) or (self.bone and BONE_CHANNEL.match(fcurve.data_path))
+            ):
+                ranges.append(tuple(fcurve.range()))
+        return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
+
+
+def read(path: Path, selection: Selection) -> list[Trajectory]:
+    """The first, by their names, of the animated objects and the rigs whose bones have keys; or all animated objects.
+
+    Any other object, and any bone, can be had by its name.
+    """
+    try:
+        import bpy  # noqa: F401
+    except ImportError:
+        raise TrajectoryError(path, "this needs Blender", "run it in Blender, or pip install bpy") from None
+    try:
+        with _without_scripts(), _opened(path) as (objects, scenes):
+            if not scenes:
+                raise TrajectoryError(path, "no scene in this file", "save the file from Blender itself")
+            bodies = {name: Body(obj) for name, obj in objects.items()}
+            animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
+            still = [name for name in objects if name not in animated]
+            wanted = selection.wanted or ""
+            if wanted not in bodies and (body := _bone_called(path, wanted, objects)):
+                selection.of(animated, unlisted=[wanted])
+                return [_sample(path, body, scenes)]
+            with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
+            few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
+            more = sum(map(len, with_keys.values())) - len(few)
+            if selection.wanted == ALL:
+                taken = selection.of(animated, unlisted=[*few, *still], more=more)
+                return [_sample(path, bodies[name], scenes) for name in taken]
+            moving = [name for name in objects if name in animated or with_keys[name]]
+            still = [name for name in still if name not in moving]
+            (name,) = selection.of(moving, unlisted=[*few, *still], more=more)
+            if with_keys[name] or _bones_are_moved(objects[name]):
+                return [_sample_whole(path, objects[name], scenes)]
+            return [_sample(path, bodies[name], scenes)]
+    except (UnicodeDecodeError, SystemError):
+        # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
+        raise TrajectoryError(path, "a name in this file is no text", "save it again from Blender") from None
+
+
+def _bone_called(path: Path, wanted: str, objects: dict[str, bpy.types.Object]) -> Body | None:
+    """The bone called OBJECT/BONE, of which either may have slashes in its name. None where there is no such object.
+
+    Raises
+    ------
+    TrajectoryError
+        Where there is the object and not the bone, or the bone alone was named.
+    """
+    ends = [index for index, character in enumerate(wanted) if character == "/"]
+    split = [Body(objects[wanted[:end]], wanted[end + 1 :]) for end in reversed(ends) if wanted[:end] in objects]
+    rigs = [body for body in split if body.obj.type == "ARMATURE"]
+    for body in rigs:
+        if body.bone in body.obj.data.bones:
+            return body
+    if rigs:
+        rig, missing = rigs[0].obj, rigs[0].bone
+        problem, bones = f"{shown(rig.name)} has no bone {shown(missing)}", rig.data.bones.keys()
+        way_out = f"of its {len(bones)} bones the nearest by name: {listed(_nearest(missing, bones))}"
+        raise TrajectoryError(path, problem, way_out if bones else "it has none at all")
+    if split:
+        obj = split[0].obj
+        if obj.is_missing:
+            problem = f"{shown(obj.name)} is missing from {obj.library.filepath}"
+            raise TrajectoryError(path, problem, "bring that file back, or tell Blender where it is now")
+        kind = obj.bl_rna.properties["type"].enum_items[obj.type].name
+        problem = f"{shown(obj.name)} has no bones, for it is no armature (its type is {kind})"
+        raise TrajectoryError(path, problem, f"name the object alone with {path}:{obj.name}")
+    if alone := [rig for rig, obj in objects.items() if obj.type == "ARMATURE" and wanted in obj.data.bones]:
+        problem = f"no body named {shown(wanted)}, only a bone of {listed(alone, FEW)}"
+        raise TrajectoryError(path, problem, f"name it with {path}:{alone[0]}/{wanted}")
+    return None
+
+
+def _nearest(wanted: str, names: list[str]) -> list[str]:
+    """A few of the names: those that are most like the one that was wanted, whatever their case."""
+    likeness = SequenceMatcher(b=wanted.casefold(), autojunk=False)
+
+    def unlike(name: str) -> float:
+        likeness.set_seq1(name.casefold())
+        return -likeness.ratio()
+
+    return sorted(names, key=unlike)[:FEW]
+
+
+def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene]) -> Trajectory:
+    from rigid_motion.animation import read_poses
+
+    frames, times, metres = _timing(path, body, scenes)
+    with probe() as seen:
+        follow = seen.constraints.new("COPY_TRANSFORMS")
+        follow.target = body.obj
+        if body.bone is not None:
+            follow.subtarget = body.bone
+        poses = read_poses(seen, frames)
+    return Trajectory(body.name, times, poses, metres, _remark(body, poses))
+
+
+def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
+    if not rig.data.bones:
+        raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "name another object of the file")
+    # What moves any bone counts.
+    frames, times, metres = _timing(path, Body(rig, rig.data.bones[0].name), scenes, rig.name)
+    return whole_body(path, rig, rig.name, frames, times, metres)
+
+
+def _timing(
+    path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = ""
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The frames that a body is looked at, their times in seconds, and the metres of a unit."""
+    scene = next((scene for scene in scenes if scene in body.obj.users_scene), scenes[0])
+    keyed = body.frames_of_keys()
+    first, last = keyed if keyed and keyed[0] < keyed[1] else (scene.frame_start, scene.frame_end)
+    if not -LAST_FRAME <= first <= last <= LAST_FRAME:
+        problem = f"{shown(name or body.name)} moves from frame {first:g} to {last:g}, where Blender does not go"
+        raise TrajectoryError(path, problem, "delete the keys that are far off")
+    rate, base = scene.render.fps, scene.render.fps_base
+    if not (rate > 0 and base > 0.0):
+        raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
+    frames = np.arange(np.floor(first), np.ceil(last) + 1.0)
+    units = scene.unit_settings
+    return frames, frames * base / rate, 1.0 if units.system == "NONE" else units.scale_length
+
+
+def _remark(body: Body, poses: Poses) -> str:
+    """Of a bone, what its rig's size does to it."""
+    if body.bone is None or poses.scales is None:
+        return ""
+    if not np.allclose(poses.scales, poses.scales[0], rtol=STEADY, atol=0.0):
+        return ""
+    size = f"{poses.scales[0]:.4g} times its own size"
+    return f"{body.name} is {size} all along, and so are the shell of its errors (--radius) and what a video shows"
+
+
+def _bones_are_moved(obj: bpy.types.Object) -> bool:
+    """Whether drivers or constraints may move the bones of what may be an armature."""
+    if obj.type != "ARMATURE" or not obj.pose:
+        return False
+    data = obj.animation_data
+    drivers = data.drivers if data else ()
+    return any(bone.constraints for bone in obj.pose.bones) or any(
+        driver.data_path.startswith(OF_BONES) for driver in drivers
+    )
+
+
+def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
+    """The bones that the object's Action or NLA strips move, in the order of the armature."""
+    from bpy.utils import unescape_identifier
+
+    data = obj.animation_data
+    if obj.type != "ARMATURE" or data is None:
+        return []
+    actions = [(strip.action, strip.action_slot) for track in data.nla_tracks for strip in track.strips]
+    found = {
+        unescape_identifier(channel["name"])
+        for action, slot in [(data.action, data.action_slot), *actions]
+        for fcurve in fcurves_of(action, slot)
+        if (channel := BONE_CHANNEL.match(fcurve.data_path))
+    }
+    return [bone.name for bone in obj.data.bones if bone.name in found]
+
+
+def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
+    """What an Action has for one of its slots."""
+    from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+    if action is not None and slot is not None:
+        channelbag = action_get_channelbag_for_slot(action, slot)
+        yield from channelbag.fcurves if channelbag else ()
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[dict[str, bpy.types.Object], list[bpy.types.Scene]]]:
+    """The objects by name, and the scenes, of the file: linked for as long as this lasts, or those of the open file.
+
+    Objects that the file itself links are among them where a scene has them; its own go before others of their name.
+    """
+    import bpy
+
+    if bpy.data.filepath and path.samefile(bpy.data.filepath):
+        own = [obj for obj in bpy.data.objects if obj.library is None]
+        scenes = [scene for scene in bpy.data.scenes if scene.library is None]
+        yield _by_name(own, scenes), scenes
+        return
+    before = set(bpy.data.libraries)
+    try:
+        with bpy.data.libraries.load(str(path.resolve()), link=True) as (there, here):
+            here.objects, here.scenes = list(there.objects), list(there.scenes)
+    except (OSError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        problem = f"Blender cannot open this file ({reason})"
+        raise TrajectoryError(path, problem, "save it again from Blender") from None
+    try:
+        scenes = [scene for scene in here.scenes if scene]
+        yield _by_name([obj for obj in here.objects if obj], scenes), scenes
+    finally:
+        # A library takes those along that it alone needed, so they are looked for again each time.
+        while added := [library for library in bpy.data.libraries if library not in before]:
+            bpy.data.libraries.remove(added[0])
+
+
+def _by_name(own: list[bpy.types.Object], scenes: list[bpy.types.Scene]) -> dict[str, bpy.types.Object]:
+    """The objects of the file, and then those of libraries, each in the order of their names."""
+    # A scene of a damaged file may come without its collection.
+    linked = (obj for scene in scenes if scene.collection for obj in scene.collection.all_objects)
+    objects = {obj.name: obj for obj in sorted(own, key=lambda obj: obj.name)}
+    for obj in sorted(linked, key=lambda obj: obj.name):
+        objects.setdefault(obj.name, obj)
+    return objects
+
+
+@contextmanager
+def _without_scripts() -> Iterator[None]:
+    """No Python of the file runs. The preference also switches off what Blender was started with (`-y`)."""
+    import bpy
+
+    preferences = bpy.context.preferences.filepaths
+    allowed = preferences.use_scripts_auto_execute
+    preferences.use_scripts_auto_execute = False
+    try:
+        yield
+    finally:
+        preferences.use_scripts_auto_execute = allowed

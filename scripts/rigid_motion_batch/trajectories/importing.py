@@ -1,0 +1,320 @@
+"""Whole bodies of files that Blender imports: into a scene of their own, out of which all of it is taken again.
+
+What is open stays as it is. A file may hold several armatures: that one is taken which moves and has the most bones,
+unless another is named. Times begin with 0 on the first key, axes and units are those that the importer makes of the
+file's. A stranger's file is data: importers are written in Python, fail in any way there is, and may crash.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigid_motion_batch.hushing import hushed
+
+from .blend import BONE_CHANNEL, TRANSFORMS, fcurves_of
+from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed
+from .rigs import LAST_FRAME, joints_of, refuse_too_many, single_joints, whole_body
+from .tables import LARGEST_FILE
+
+if TYPE_CHECKING:
+    import bpy
+
+FASTEST, SLOWEST = 240.0, 5.0
+"""Keys a second that are believed to be the rate of the file."""
+
+ROUND = 2e-4
+"""By what share a rate may be off a whole number that is one: 29.97 is none."""
+
+ON_A_FRAME = 1e-4
+"""What is as near to a whole frame is on it."""
+
+FEW = 5
+"""Names of a kind that a remark tells."""
+
+NUMBERED = re.compile(r"(?P<name>.+)\.\d{3,}", re.DOTALL)
+"""A name that Blender has numbered, for there was one like it."""
+
+LONGEST_REASON = 120
+"""Characters of what an importer says."""
+
+
+def refuse_too_large(path: Path, *others: Path) -> None:
+    """Raise TrajectoryError where a file, and those that belong to it, have more bytes than are read."""
+    size = sum(one.stat().st_size for one in (path, *others))
+    if size > LARGEST_FILE:
+        problem = f"{size} bytes are more than the {LARGEST_FILE} that are read"
+        raise TrajectoryError(path, problem, "export the skeleton without its meshes, or split the recording")
+
+
+def read_imported(
+    path: Path,
+    selection: Selection,
+    importer: Callable[[], None],
+    addon: str,
+    rate_of: Callable[[float, float | None], float],
+    fps: int = 24,
+) -> list[Trajectory]:
+    """The whole skeleton of a file; or bones that are named, or all.
+
+    Parameters
+    ----------
+    path : Path
+    selection : Selection
+    importer : callable
+        Imports the file into the current scene.
+    addon : str
+        The add-on of Blender that it is in.
+    rate_of : callable
+        Given the frames a second of the scene, and how many keys there are in one where that can be believed: the
+        rate to sample at.
+    fps : int
+        Frames a second of the scene to import into.
+
+    Raises
+    ------
+    TrajectoryError
+        Where there is no Blender, the file cannot be imported, or has no armature that moves.
+    """
+    try:
+        import bpy  # noqa: F401
+    except ImportError:
+        raise TrajectoryError(path, "this needs Blender", "run it in Blender, or pip install bpy") from None
+    try:
+        with _imported(path, importer, addon, fps) as (scene, names):
+            rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
+            return _read(path, selection, rigs, scene, rate_of)
+    except (UnicodeDecodeError, SystemError):
+        raise TrajectoryError(path, "a name in this file is no text", "export it again") from None
+    except MemoryError:
+        raise TrajectoryError(path, "this file needs more memory than there is", "split the recording") from None
+
+
+def _read(
+    path: Path,
+    selection: Selection,
+    rigs: dict[str, bpy.types.Object],
+    scene: bpy.types.Scene,
+    rate_of: Callable[[float, float | None], float],
+) -> list[Trajectory]:
+    moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
+    if not moving:
+        problem = "no skeleton that moves" if rigs else "no skeleton"
+        raise TrajectoryError(path, f"{problem} in this file", "export the armature together with its animation")
+    name, bone = _wanted(rigs, moving, selection.wanted)
+    rig, fps = rigs[name], scene.render.fps / scene.render.fps_base
+    first, last = moving.get(name) or next(iter(moving.values()))
+    rate = rate_of(fps, _rate_of_keys(rig, fps))
+    step = fps / rate
+    if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
+        refuse_too_many(path, name, 1, np.array([first, last]))
+    frames = first + step * np.arange(max(1, math.ceil((last - first) / step - ON_A_FRAME) + 1))
+    whole = np.rint(frames)
+    frames = np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
+    times = np.arange(len(frames)) / rate
+    remarks = _remarks(scene, rig, name, list(rigs), several=selection.wanted in (None, ALL))
+    if bone is None and selection.wanted != ALL:
+        body = whole_body(path, rig, path.stem if selection.wanted is None else name, frames, times)
+        return [_with_remarks(body, *remarks)]
+    joints = joints_of(rig)
+    if bone is None:
+        taken = selection.of(joints.names)
+        several = single_joints(path, rig, taken, frames, times)
+        return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
+    known = bone in joints.names or bone in joints.left_out
+    selection.of(joints.names, unlisted=[*joints.left_out, *([selection.wanted] if known else [])])
+    (motion,) = single_joints(path, rig, [bone], frames, times)
+    return [_with_remarks(replace(motion, name=selection.wanted), *remarks)]
+
+
+def _wanted(rigs: dict[str, bpy.types.Object], moving: dict[str, object], wanted: str | None) -> tuple[str, str | None]:
+    """The armature that is meant and its bone, or None for the whole."""
+    largest = max(moving, key=lambda name: len(rigs[name].data.bones))
+    if wanted in (None, ALL):
+        return largest, None
+    in_order = sorted(rigs, key=lambda name: name != largest)
+    for name in in_order:
+        if wanted in rigs[name].data.bones:
+            return name, wanted
+    if wanted in rigs:
+        return wanted, None
+    for name in in_order:
+        if wanted.startswith(f"{name}/") and wanted[len(name) + 1 :] in rigs[name].data.bones:
+            return name, wanted[len(name) + 1 :]
+    return largest, wanted
+
+
+def _remarks(
+    scene: bpy.types.Scene, rig: bpy.types.Object, name: str, rigs: list[str], *, several: bool
+) -> Iterator[str]:
+    """What is left of the file."""
+    if several and len(rigs) > 1:
+        others = listed([other for other in rigs if other != name], FEW)
+        yield f"took {name} of {len(rigs)} armatures; others: {others}"
+    data = rig.animation_data
+    if data and data.action and (takes := _other_takes(rig, scene)):
+        yield f"took its take {data.action.name}; others: {listed(takes, FEW)}"
+
+
+def _with_remarks(trajectory: Trajectory, *remarks: str) -> Trajectory:
+    return replace(trajectory, remark="; ".join(filter(None, (trajectory.remark, *remarks))))
+
+
+# -- keys -------------------------------------------------------------------------------------------------------------
+
+
+def _moving_curves(rig: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
+    """What moves the bones, the armature, and what it hangs on."""
+    obj = rig
+    while obj is not None:
+        if data := obj.animation_data:
+            for fcurve in fcurves_of(data.action, data.action_slot):
+                if fcurve.data_path.startswith(TRANSFORMS) or (obj == rig and BONE_CHANNEL.match(fcurve.data_path)):
+                    yield fcurve
+        obj = obj.parent
+
+
+def _keys(fcurve: bpy.types.FCurve) -> np.ndarray:
+    """The frames of the keys, rising."""
+    places = np.empty(2 * len(fcurve.keyframe_points), dtype=np.float32)
+    fcurve.keyframe_points.foreach_get("co", places)
+    return np.sort(places[::2].astype(np.float64))
+
+
+def _frames_of_keys(rig: bpy.types.Object) -> tuple[float, float] | None:
+    """The first and last frame of what moves an armature. None where nothing does."""
+    keys = [keys for fcurve in _moving_curves(rig) if len(keys := _keys(fcurve))]
+    return (min(own[0] for own in keys), max(own[-1] for own in keys)) if keys else None
+
+
+def _rate_of_keys(rig: bpy.types.Object, fps: float) -> float | None:
+    """How many keys a second there are mostly; None where that is no rate that anything is recorded at."""
+    between = [np.diff(_keys(fcurve)) for fcurve in _moving_curves(rig)]
+    between = np.concatenate(between) if between else np.empty(0)
+    between = between[between > ON_A_FRAME]
+    rate = fps / np.median(between) if len(between) else 0.0
+    if abs(rate - round(rate)) < ROUND * rate:
+        rate = float(round(rate))
+    return rate if SLOWEST <= rate <= FASTEST else None
+
+
+def _other_takes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:
+    """Other Actions that move its bones, of those that the importer has made after the scene."""
+    import bpy
+
+    own, bones, found = rig.animation_data.action, set(rig.data.bones.keys()), []
+    for action in bpy.data.actions:
+        if action != own and action.session_uid > scene.session_uid:
+            curves = (fcurve for slot in action.slots for fcurve in fcurves_of(action, slot))
+            channels = (BONE_CHANNEL.match(fcurve.data_path) for fcurve in curves)
+            if any(match["name"] in bones for match in channels if match):
+                found.append(action.name)
+    return found
+
+
+# -- Blender ----------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _imported(
+    path: Path, importer: Callable[[], None], addon: str, fps: int
+) -> Iterator[tuple[bpy.types.Scene, dict[bpy.types.Object, str]]]:
+    """A scene with what was imported, and its objects with their names; all of it gone afterwards."""
+    import bpy
+
+    before = {block.session_uid for block in bpy.data.user_map()}
+    taken = {obj.name for obj in bpy.data.objects}
+    window = bpy.context.window
+    if window is None:
+        raise TrajectoryError(path, "the open .blend has no window", "save it from Blender's own window, or open none")
+    shown_scene = window.scene
+    scene = bpy.data.scenes.new("Importing")
+    try:
+        scene.render.fps, scene.render.fps_base = fps, 1.0
+        # Importers go by what the window shows: an override is not enough for the mode that they edit bones in.
+        window.scene = scene
+        with _enabled(path, addon):
+            _import(path, importer)
+        for obj in scene.objects:
+            _only_its_action(obj)
+        yield scene, {obj: _own_name(obj.name, taken) for obj in scene.objects}
+    finally:
+        window.scene = shown_scene
+        new = [block for block in bpy.data.user_map() if block.session_uid not in before]
+        bpy.data.batch_remove(new)
+
+
+def _import(path: Path, importer: Callable[[], None]) -> None:
+    try:
+        with hushed(), redirect_stderr(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            importer()
+    except TrajectoryError:
+        raise
+    except Exception as error:
+        problem = f"Blender cannot import this file ({_reason(path, error)})"
+        raise TrajectoryError(path, problem, "export it again") from None
+
+
+def _reason(path: Path, error: Exception) -> str:
+    """What an importer says: in its own words, or the last line of a traceback."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    if not lines:
+        return type(error).__name__
+    if any("Traceback (most recent call last)" in line for line in lines):
+        # Blender adds where it was called from.
+        lines = [line for line in lines if not line.startswith("Location:")]
+        said = lines[-1]
+    else:
+        said = " ".join(lines).removeprefix("Error: ").strip()
+        if not isinstance(error, RuntimeError):
+            said = f"{type(error).__name__}: {said}"
+    said = said.replace(repr(str(path)), "it").replace(str(path), "it")
+    return said if len(said) <= LONGEST_REASON else f"{said[:LONGEST_REASON]}..."
+
+
+@contextmanager
+def _enabled(path: Path, addon: str) -> Iterator[None]:
+    """An add-on of Blender's own, switched on for as long as this lasts."""
+    import addon_utils
+
+    _, loaded = addon_utils.check(addon)
+    if not loaded:
+        with hushed():
+            module = addon_utils.enable(addon, default_set=False)
+        if module is None:
+            raise TrajectoryError(path, f"this Blender has no add-on {addon}", "take a Blender that has it")
+    try:
+        yield
+    finally:
+        if not loaded:
+            addon_utils.disable(addon, default_set=False)
+
+
+def _only_its_action(obj: bpy.types.Object) -> None:
+    """An object with the Action that it has, or else that of its first strip, and without what else is in its NLA."""
+    data = obj.animation_data
+    if data is None:
+        return
+    strips = [strip for track in data.nla_tracks for strip in track.strips if strip.action]
+    if data.action is None and strips:
+        action, slot = strips[0].action, strips[0].action_slot
+        data.action = action
+        data.action_slot = slot
+    for track in list(data.nla_tracks):
+        data.nla_tracks.remove(track)
+
+
+def _own_name(name: str, taken: set[str]) -> str:
+    """What the file calls an object that was numbered, for there is one of that name in what is open."""
+    numbered = NUMBERED.fullmatch(name)
+    return numbered["name"] if numbered and numbered["name"] in taken else name

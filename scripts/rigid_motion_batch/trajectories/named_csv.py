@@ -1,0 +1,194 @@
+"""CSV with named columns in any order, as loggers write them: `t,x,y,z,qx,qy,qz,qw`, `timestamp_ms,pos_x,...,rot_w`.
+
+`column_names` says which names are known, and `columns` how they become bodies: several in a row, or one of several
+that another column names. The quaternion's order is that of the names; other columns are ignored. Separated by commas,
+semicolons or tabs; with the latter two, numbers may have a decimal comma. The program's own files
+(`t,x,y,z,qw,qx,qy,qz`) are such CSVs. Units in names are honoured: times become seconds, and the unit of the positions
+is `Trajectory.metres_per_unit`. Euler angles need their order from the user.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+
+from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of, require_time_unit
+from .dates import kind_of_times, seconds_of_dates
+from .euler import quaternions_from_intrinsic_eulers
+from .options import ReadingOptions
+from .recordings import Selection, Trajectory, TrajectoryError, unique
+from .sense import require_one_body
+from .tables import HeaderLine, Table, header_lines, lines_above_numbers
+from .times import require_seconds, seconds_of
+
+MOST_LABELS = 0.5
+"""The share of the rows up to which different texts in a column can be names of devices. Running numbers are not."""
+
+MOST_DEVICES = 1000
+"""Different texts in a column beyond are no names of devices."""
+
+LARGEST_RADIANS = 4.0 * np.pi
+"""Two turns. Angles beyond, of which nothing says that they are radians, are degrees."""
+
+SMALLEST_DEGREES = np.pi
+"""Angles that are all below this, and said to be degrees, may be radians."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """One body of the file: its columns, and its rows."""
+
+    name: str
+    prefix: str
+    """What its columns have in front."""
+
+    columns: Mapping[str, int]
+    rows: np.ndarray | slice
+
+    def label(self, meaning: str) -> str:
+        """What errors call a column."""
+        return f"{self.prefix} {meaning}".strip()
+
+
+def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
+    """The bodies that are wanted. One without a name of its own has the file's."""
+    header, layout = _find_header(path, options)
+    width, line = len(header.cells), header.number
+    bodies = _bodies(path, header, layout, "device" in dict(options.columns))
+    taken = set(selection.of([body.name for body in bodies]))
+    wanted = [body for body in bodies if body.name in taken]
+    columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
+    table = Table(path, header.separator, columns, width, line)
+    kind = kind_of_times(table)
+    if kind and options.time_unit:
+        problem = f"--time-unit {options.time_unit} is for times that are numbers, and these have {kind}"
+        raise TrajectoryError(path, problem, "leave it out", line)
+    parsed = [name for name in columns if name != "t" or kind is None]
+    numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
+    times = seconds_of_dates(table, kind) if kind else _seconds(table, numbers["t"], wanted, layout)
+    trajectories = []
+    for body in wanted:
+        held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
+        try:
+            trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
+        except ColumnProblem as problem:
+            raise problem.at(path, line) from None
+        way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
+        require_one_body(trajectory, path, f"{way_out}, or split the file", line)
+        trajectories.append(trajectory)
+    return trajectories
+
+
+def _seconds(table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: Layout) -> np.ndarray:
+    """Times that are numbers, shape (n,), as seconds, where that of all bodies can be."""
+    try:
+        require_time_unit(layout)
+    except ColumnProblem as problem:
+        raise problem.at(table.path, table.header) from None
+    for body in wanted:
+        require_seconds(table, ticks[body.rows], layout.time_unit)
+    return seconds_of(table, ticks, layout.time_unit)
+
+
+def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:
+    """The line that names all that is needed: one of the first, or the only one further down that numbers follow.
+
+    Where none does, TrajectoryError says what the nearest lacks.
+    """
+    problems: list[tuple[ColumnProblem, int]] = []
+    for line in header_lines(path):
+        try:
+            return line, layout_of(line.cells, options)
+        except ColumnProblem as problem:
+            problems.append((problem, line.number))
+    found = []
+    for line in lines_above_numbers(path):
+        try:
+            found.append((line, layout_of(line.cells, options)))
+        except ColumnProblem as problem:
+            problems.append((problem, line.number))
+    if len(found) == 1:
+        return found[0]
+    if found:
+        numbers = " and ".join(str(line.number) for line, _ in found[:2])
+        problem = f"lines {numbers} both name columns, with others before them"
+        raise TrajectoryError(path, problem, "make a file of each table, without what is before it", found[0][0].number)
+    problem, number = max(problems, key=lambda known: known[0].known)
+    if not problem.known:
+        problem, number = problems[-1]
+    raise problem.at(path, number)
+
+
+def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
+    """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
+    columns = {f"device {index}": index for index in layout.devices}
+    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number), named)
+    bodies = [
+        (f"{device} {prefix}".strip() or path.stem, prefix, columns, rows)
+        for device, rows in groups.items()
+        for prefix, columns in layout.bodies.items()
+    ]
+    names = unique([name for name, *_ in bodies])
+    return [_Body(name, *rest) for name, (_, *rest) in zip(names, bodies, strict=True)]
+
+
+def _devices(table: Table, named: bool) -> dict[str, np.ndarray | slice]:
+    """The rows of each device: of the first column that tells several apart, or else that tells the one there is."""
+    only = ""
+    for column in table.columns:
+        codes: dict[str, int] = {}
+        cells = takewhile(lambda _, codes=codes: len(codes) <= MOST_DEVICES, table.cells(column))
+        of_rows = np.fromiter((codes.setdefault(text, len(codes)) for _, text in cells), np.int64)
+        if len(codes) > MOST_DEVICES and named:
+            problem = f"more than {MOST_DEVICES} different values in the column of devices"
+            raise TrajectoryError(table.path, problem, "name another with --columns device=NAME", table.header)
+        if len(codes) > min(max(MOST_LABELS * len(of_rows), 1), MOST_DEVICES) and not named:
+            continue
+        if len(codes) > 1:
+            order = np.argsort(of_rows, kind="stable")
+            rows = np.split(order, np.flatnonzero(np.diff(of_rows[order])) + 1)
+            return dict(zip(codes, rows, strict=True))
+        only = only or next(iter(codes), "")
+    return {only: slice(None)}
+
+
+def _trajectory(
+    body: _Body, times: np.ndarray, held: Mapping[str, np.ndarray], layout: Layout, options: ReadingOptions
+) -> Trajectory:
+    metres = metres_of(layout, body.columns, options)
+    positions = np.column_stack([held[axis] for axis in POSITION])
+    if len(set(metres)) > 1:
+        positions, metres = positions * metres, [1.0]
+    warnings: tuple[str, ...] = ()
+    if options.euler:
+        angles = np.column_stack([held[f"r{axis.lower()}"] for axis in options.intrinsic_order])
+        angles, warnings = _radians(angles, [layout.units.get(body.columns[one], "") for one in EULER], options)
+        quaternions = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order)
+    else:
+        quaternions = np.column_stack([held[one] for one in ("qw", "qx", "qy", "qz")])
+    scales = held.get("scale")
+    if scales is not None and not np.any(scales != 1.0):
+        scales = None
+    return Trajectory(body.name, times, Poses(positions, quaternions, scales), metres[0], warnings=warnings)
+
+
+def _radians(angles: np.ndarray, units: Sequence[str], options: ReadingOptions) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Angles of shape (n, 3) as radians, and what is hard to believe of them."""
+    largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
+    if options.degrees or "deg" in units:
+        if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
+            return np.radians(angles), (f"its angles are all within {largest:.3g} degrees; radians need no --degrees",)
+        return np.radians(angles), ()
+    if "rad" not in units and largest > LARGEST_RADIANS:
+        raise ColumnProblem(
+            f"angles go up to {largest:.4g}, which are no radians",
+            "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad",
+            len(EULER),
+        )
+    return angles, ()

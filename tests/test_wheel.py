@@ -1,0 +1,134 @@
+"""What pip installs: one wheel, in an environment that has nothing of the checkout."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import venv
+import zipfile
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.commands import COMMANDS
+from rigid_motion_batch.places import CHECKOUT, manifest
+
+BESIDES = ("bpy", "numpy")
+"""What the extra `blender` brings along. The environment of these tests lends it."""
+
+WITHOUT_BLENDER = """
+import sys
+from rigid_motion.motion import Poses, interpolate
+poses = interpolate([0.0, 1.0], Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [0, 0, 0, 1]]), [0.5], "dq_sclerp")
+assert poses.quaternions.shape == (1, 4)
+print(sorted({name.split(".")[0] for name in sys.modules} & {"bpy", "mathutils", "scipy", "rigid_motion_batch"}))
+"""
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    options = ("--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--wheel-dir", folder)
+    done = run(sys.executable, "-m", "pip", "wheel", CHECKOUT, *options)
+    assert done.returncode == 0, done.stderr
+    (made,) = folder.glob("*.whl")
+    return made
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the commands of an environment with the wheel, NumPy and Blender alone."""
+    folder = tmp_path_factory.mktemp("environment")
+    made = venv.EnvBuilder(with_pip=False).ensure_directories(folder)
+    venv.create(folder, with_pip=False)
+    to = Path(made.env_dir) / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
+    for name in BESIDES:
+        lend(name, to)
+    options = ("--no-deps", "--no-index", "--disable-pip-version-check")
+    done = run(sys.executable, "-m", "pip", "--python", made.env_exe, "install", *options, wheel)
+    assert done.returncode == 0, done.stderr
+    return Path(made.bin_path)
+
+
+def lend(name: str, to: Path) -> None:
+    """Link a package, and what says of which version it is, from the environment of these tests."""
+    for part in {Path(file).parts[0] for file in distribution(name).files} - {"..", "__pycache__"}:
+        (to / part).symlink_to(distribution(name).locate_file(part))
+
+
+def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProcess:
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    command = list(map(str, command))
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, env=environment)
+
+
+def test_the_wheel_holds_two_packages_with_their_types_and_no_name_besides(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as opened:
+        names = opened.namelist()
+    assert {name.split("/")[0].removesuffix(f"-{manifest()['version']}.dist-info") for name in names} == {
+        "rigid_motion",
+        "rigid_motion_batch",
+    }
+    assert {"rigid_motion/py.typed", "rigid_motion_batch/py.typed", "rigid_motion/blender_manifest.toml"} <= {*names}
+    modules = {
+        f"{package.name}/{path.relative_to(package).as_posix()}"
+        for package in (CHECKOUT / "addon" / "rigid_motion", CHECKOUT / "scripts" / "rigid_motion_batch")
+        for path in package.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert modules <= {*names}
+
+
+def test_the_main_job_runs_on_the_motions_that_come_along(installed: Path, tmp_path: Path) -> None:
+    done = run(installed / "rigid-motion", "compare", "--no-video", "--rates", "5", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    report = Path(done.stdout.splitlines()[-1])
+    assert report == tmp_path / "renders" / "comparison" / "report.html"
+    assert "rigid-motion compare --no-video --rates 5" in report.read_text(encoding="utf-8")
+    rows = (report.parent / "metrics.csv").read_text(encoding="utf-8").splitlines()
+    clips = {path.stem for path in (CHECKOUT / "assets").glob("*.csv")}
+    assert {row.split(",")[0] for row in rows[1:]} == clips
+
+
+def test_the_zip_for_blender_is_the_same_as_from_the_checkout(
+    installed: Path, tmp_path: Path, extension_zip: Path
+) -> None:
+    done = run(installed / "rigid-motion", "build", "--output", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert Path(done.stdout.strip()).read_bytes() == extension_zip.read_bytes()
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "benchmark"])
+def test_help_shows_every_command_as_it_is_typed(command: str, installed: Path) -> None:
+    done = run(installed / "rigid-motion", command, "--help")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"usage: rigid-motion {command}")
+    assert "python scripts/" not in done.stdout.replace("python scripts/bootstrap.py tasks", "")
+
+
+def test_the_benchmark_says_what_it_needs(installed: Path) -> None:
+    done = run(installed / "rigid-motion", "benchmark", "--help")
+    assert done.returncode == 2
+    assert "rigid-motion[benchmark]" in done.stderr
+
+
+def test_the_mathematics_needs_numpy_alone(installed: Path) -> None:
+    done = run(installed / "python", "-W", "error", "-c", WITHOUT_BLENDER)
+    assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
+
+
+@pytest.mark.parametrize("arguments", [(), ("--help",)])
+def test_help_lists_the_commands(arguments: tuple[str, ...], installed: Path) -> None:
+    done = run(installed / "rigid-motion", *arguments)
+    assert done.returncode == 0
+    assert all(f"\n  {name} " in done.stdout for name in COMMANDS)
+
+
+def test_a_command_that_there_is_not_is_said(installed: Path) -> None:
+    done = run(installed / "rigid-motion", "compair")
+    assert done.returncode == 2
+    assert "'compair'" in done.stderr
+    assert "compare" in done.stderr
+    assert run(installed / "rigid-motion", "--version").stdout == f"rigid-motion {manifest()['version']}\n"
