@@ -38,7 +38,7 @@ def from_here(place: Path) -> Path:
 
     What is kept by such names serves a checkout that was moved.
     """
-    here = CHECKOUT == Path.cwd() and place.is_relative_to(CHECKOUT)
+    here = Path.cwd() == CHECKOUT and place.is_relative_to(CHECKOUT)
     return place.relative_to(CHECKOUT) if here else place
 
 
