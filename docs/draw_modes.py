@@ -111,7 +111,7 @@ def speed_of(mode: str) -> list[Markup]:
     return [
         element("path", d=f"M{left} {top + height}h{width}" + "".join(ticks), class_="faint"),
         element("path", d="".join(map(polyline, pieces)), class_="mode path"),
-        element("text", "speed of the middle, from key to key", x=left, y=28, class_="words"),
+        element("text", "speed of the middle", x=left, y=28, class_="words"),
         element("text", "time", x=left + width, y=top + height + 22, class_="words", text_anchor="end"),
         element("text", "0", x=left - 14, y=top + height + 5, class_="words"),
     ]

@@ -272,7 +272,7 @@ def test_the_command_goes_through_the_sections_that_it_is_asked_for(monkeypatch,
     assert benchmark_live.main(["--rounds", "1", "--only", "choosing", "baking", "--output", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert "`python scripts/benchmark_live.py --rounds 1 --only choosing baking`" in text
-    assert [line for line in text.splitlines() if line.startswith("###")] == [
+    assert [line for line in text.splitlines() if line.startswith("## ")] == [
         f"## A mode for {SMALL}, turned by QUATERNION",
         f"## A mode for {SMALL}, turned by XYZ",
         "## Baking one object with 5 keys",
