@@ -38,8 +38,9 @@ def show_films(app: Sphinx, doctree: nodes.document) -> None:
     shown = set()
     for image in list(doctree.findall(nodes.image)):
         place, film = image, str(PurePosixPath(image["uri"]).with_suffix(".mp4"))
-        if linked := _film_of(app, image.parent):
-            place, film = image.parent, linked
+        link = _enclosing(image, addnodes.download_reference)
+        if link and (linked := _film_of(app, link)):
+            place, film = link, linked
         elif not (image["uri"].endswith(".png") and (Path(app.srcdir) / film).is_file()):
             continue
         place.replace_self(make_video(film, image["uri"], image.get("alt", "")))
@@ -48,20 +49,19 @@ def show_films(app: Sphinx, doctree: nodes.document) -> None:
         film = _film_of(app, link)
         if film and film not in shown:
             shown.add(film)
-            paragraph = _paragraph_of(link)
+            paragraph = _enclosing(link, nodes.paragraph)
             label = paragraph.astext().replace("\n", " ")
             paragraph.parent.insert(paragraph.parent.index(paragraph) + 1, make_video(film, "", label))
 
 
 def _film_of(app: Sphinx, link: nodes.Element) -> str | None:
     """The path in docs/ of the film that a link leads to."""
-    if isinstance(link, addnodes.download_reference) and link["reftarget"].endswith(".mp4"):
-        return app.env.relfn2path(link["reftarget"], app.env.docname)[0]
-    return None
+    return app.env.relfn2path(link["reftarget"], app.env.docname)[0] if link["reftarget"].endswith(".mp4") else None
 
 
-def _paragraph_of(node: nodes.Node) -> nodes.Element:
-    while not isinstance(node, nodes.paragraph):
+def _enclosing(node: nodes.Node, kind: type[nodes.Element]) -> nodes.Element | None:
+    """What of this kind a node is in."""
+    while node is not None and not isinstance(node, kind):
         node = node.parent
     return node
 
