@@ -128,8 +128,9 @@ def _in_short(found: Results) -> list[str]:
     lines = [
         "## In short",
         "",
-        f"Updates a second that are as good as {rates} of the state of the art, positions and quaternions apart "
-        f"(`{REFERENCE}`), on the {found.sets[0]}, by the {next(iter(YARDSTICKS.values()))}:",
+        f"The state of the art interpolates positions and quaternions separately (`{REFERENCE}`). At {rates} updates a "
+        f"second it has a certain {next(iter(YARDSTICKS.values()))} on the {found.sets[0]}. To have no larger an "
+        "error, the other ways need:",
         "",
         f"- The paper: {percents([row.saved for row in claims.TABLE])} less bandwidth.",
         f"- A screw (`{SCREW}`): {less(found.saved(SCREW))}. {verdict(found.saved(SCREW))}",
@@ -138,13 +139,14 @@ def _in_short(found: Results) -> list[str]:
     for mode in SPLINES:
         if mode in MODES and np.isfinite(found.saved(mode)).any():
             ahead = MODES[mode].ahead
-            wait = f"for {ahead} update more to wait for" if ahead else "without waiting for any update more"
+            wait = f"which has to wait for {ahead} more update" if ahead else "which waits for no later update"
             lines.append(f"- `{mode}`, {wait}: {less(found.saved(mode))}. {verdict(found.saved(mode))}")
     for mode in (REFERENCE, SPLINES[0]):
         saved = found.saved(mode, ADAPTIVE)
         if np.isfinite(saved).any():
             lines.append(
-                f"- `{mode}` with keys where it needs them, which takes the whole recording: {less(saved)}. "
+                f"- `{mode}` with keys placed where it needs them, for which the whole recording has to be known: "
+                f"{less(saved)}. "
                 f"{verdict(saved)}"
             )
     lines += sending_section.in_short(found.sending, found.sets[0])
@@ -270,8 +272,9 @@ def _table(found: Results) -> list[str]:
         "The lowest rate at which a mode is as good as the state of the art at its rate, and the bandwidth saved. As "
         "good means no larger an error, by three yardsticks set beforehand. Geometric means over clips, of which one "
         f"counts where it has two samples to an update: {_clips_counted(found)}. The first row after the paper's is a "
-        f"check: the state of the art held against itself, which needs what it has but for {_check(found):.0%} at "
-        "most. Rates that were as good on some clips only say on how many. A dash: on none.",
+        "check, which compares the state of the art with itself: it should need its own rates, and does to within "
+        f"{_check(found):.0%}. Where a rate was as good on some clips only, the cell says on how many. A dash: on "
+        "none.",
         "",
     ]
     for one in found.sets:

@@ -131,7 +131,7 @@ def half(row):
 
 @pytest.mark.parametrize(
     ("share", "verdict"),
-    [(0.3, "That is the paper's saving in every row."), (0.95, "The paper's saving is in no row.")],
+    [(0.3, "This reaches the paper's saving at every rate."), (0.95, "This reaches the paper's saving at no rate.")],
 )
 def test_the_verdict_is_that_of_the_numbers(tmp_path: Path, share: float, verdict: str):
     rows = [cell for mode in MODES for cell in needed(RECORDINGS, mode, share if mode == "dq_sclerp" else 1.0)]
