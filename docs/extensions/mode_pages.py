@@ -56,7 +56,9 @@ class ModeDetails(SphinxDirective):
         facts = nodes.field_list()
         facts += fact("Looks at", nodes.Text(keys_it_looks_at(mode)))
         facts += fact("In files", nodes.literal("", str(mode.number)))
-        facts += fact("Fast form", code(mode.curves), nodes.Text("; a pair of poses in its algebra: "), code(mode.reference))
+        facts += fact(
+            "Fast form", code(mode.curves), nodes.Text("; a pair of poses in its algebra: "), code(mode.reference)
+        )
         if same:
             others = joined(link(self, f"{DETAILS}#{anchor(other)}", nodes.literal("", other)) for other in same)
             facts += fact("The same motion", *others, nodes.Text(", where nothing grows"))

@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 import re
+import sys
 
 from docutils import nodes
 from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
+from sphinx.pycode import ModuleAnalyzer
 from sphinx.roles import XRefRole
 
 CODE = re.compile(r"(`[^`]*`)")
@@ -31,6 +33,7 @@ class NameRole(XRefRole):
 def setup(app: Sphinx) -> dict[str, bool]:
     app.add_role("name", NameRole())
     app.connect("missing-reference", leave_as_code)
+    app.connect("autodoc-process-docstring", document_data, priority=100)
     app.connect("autodoc-process-docstring", keep_bars, priority=900)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -40,6 +43,18 @@ def leave_as_code(
 ) -> nodes.Element | None:
     """Names that lead nowhere stay what they are, without a warning."""
     return content if node.get("optional") else None
+
+
+def document_data(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Give data that a package imports what stands below it in the module that it comes from."""
+    package, _, attribute = name.rpartition(".")
+    if what != "data" or any(lines):
+        return
+    for module in [module for module in sys.modules if module.startswith(f"{package}.")]:
+        documented = ModuleAnalyzer.for_module(module).find_attr_docs()
+        if found := documented.get(("", attribute)):
+            lines[:] = found
+            return
 
 
 def keep_bars(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
