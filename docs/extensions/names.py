@@ -16,6 +16,7 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.roles import XRefRole
 
 CODE = re.compile(r"(`[^`]*`)")
+PAGE = re.compile(r"docs/([\w/]+)\.md")
 
 
 class NameRole(XRefRole):
@@ -24,6 +25,9 @@ class NameRole(XRefRole):
     def process_link(
         self, env: BuildEnvironment, refnode: nodes.Element, has_explicit_title: bool, title: str, target: str
     ) -> tuple[str, str]:
+        if page := PAGE.fullmatch(target):
+            refnode["refdomain"], refnode["reftype"], refnode["refexplicit"] = "std", "doc", True
+            return title, f"/{page[1]}"
         refnode["refdomain"], refnode["reftype"], refnode["optional"] = "py", "obj", True
         refnode["py:module"], refnode["py:class"] = env.ref_context.get("py:module"), env.ref_context.get("py:class")
         refnode["refspecific"] = True
