@@ -53,10 +53,10 @@ FRAMES = np.arange(KEYS[0][0], KEYS[-1][0])
 STILL = 14
 """The frame of the picture, in which the mode and Blender are far apart."""
 
-WIDTH = 5.2
+WIDTH = 5.4
 """Metres from side to side of the picture."""
 
-MIDDLE = (0.12, 0.0, -0.18)
+MIDDLE = (-0.1, 0.0, -0.3)
 
 LINE = 0.014
 """Half the thickness of the head's way, in metres; that of the handle's end is half as thick."""
