@@ -42,6 +42,7 @@ from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_er
 from rigid_motion.motion.quaternions import align_signs, multiply
 from rigid_motion.motion.trigonometry import VECTOR_TANGENT
 from rigid_motion_batch.publishing import opening, publish
+from rigid_motion_batch.summaries import of_speed
 
 ENOUGH = 4.0
 """Seconds after which one way of computing a case has been measured well enough."""
@@ -336,5 +337,5 @@ def main(arguments: list[str] | None = None) -> int:
         lines += report(case, race(ways(case), options.rounds))
     print("key reduction ...", file=sys.stderr, flush=True)
     lines += reductions((900, 1000, 10_000, options.count))
-    publish(lines, options.output)
+    publish(lines, options.output, of_speed)
     return 0

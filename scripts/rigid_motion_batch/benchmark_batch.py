@@ -29,7 +29,8 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion_batch.places import ASSETS, PACKAGE
-from rigid_motion_batch.publishing import opening, publish
+from rigid_motion_batch.publishing import more_or_less, opening, publish
+from rigid_motion_batch.summaries import of_batch
 from rigid_motion_batch.workplan.worker import peak_memory_of
 
 SECONDS = 2.0
@@ -173,7 +174,7 @@ def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> Itera
         say(f"memory over {count} clips ...")
         run = compare(clips[:count], folder, 2, *options)
         base = base or run.own
-        yield f"| {count} | {run.own / 1e6:.0f} | {run.own / base - 1.0:+.1%} |"
+        yield f"| {count} | {run.own / 1e6:.0f} | {more_or_less(run.own / base) if base else ''} |"
     yield ""
     yield "| one clip of | samples | a worker at most, MB | more than for a clip of no length, a sample | seconds |"
     yield "|---:|---:|---:|---:|---:|"
@@ -220,5 +221,5 @@ def main(arguments: list[str] | None = None) -> int:
         )
         lines += workers(f"{options.films} clips with video", clips[: options.films], folder, options.rounds, *small)
         lines += memory(folder, clips[: options.clips], [int(part) for part in options.minutes.split(",")])
-    publish(lines, options.output)
+    publish(lines, options.output, of_batch)
     return 0

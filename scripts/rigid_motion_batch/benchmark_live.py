@@ -27,6 +27,7 @@ from rigid_motion_batch.live_benchmark.rigs import RigSize, rigs
 from rigid_motion_batch.live_benchmark.scenes import Size
 from rigid_motion_batch.live_benchmark.shots import choosing, shots
 from rigid_motion_batch.publishing import opening, publish
+from rigid_motion_batch.summaries import of_live
 
 CHOOSING = Size(400, 10, 1000)
 """A mode is chosen for all of these."""
@@ -84,5 +85,5 @@ def main(arguments: list[str] | None = None) -> int:
             lines += run[section]()
     finally:
         animation.unregister()
-    publish(lines, options.output)
+    publish(lines, options.output, of_live)
     return 0

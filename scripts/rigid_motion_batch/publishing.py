@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from rigid_motion_batch.files import write_text
+from rigid_motion_batch.summaries import with_summary
 
 
 def opening(title: str, command: str, about: str, **versions: object) -> list[str]:
@@ -34,9 +35,16 @@ def opening(title: str, command: str, about: str, **versions: object) -> list[st
     ]
 
 
-def publish(lines: Sequence[str], output: Path | None) -> None:
-    """Print a page, and write it to a file where one is given."""
+def more_or_less(ratio: float, decimals: int = 1) -> str:
+    """What a ratio is more or less than 1: "7.7% more"."""
+    share = f"{abs(ratio - 1.0):.{decimals}%}"
+    return f"{share} {'more' if ratio >= 1.0 else 'less'}"
+
+
+def publish(lines: Sequence[str], output: Path | None, summary: Callable[[str], Sequence[str]]) -> None:
+    """Print a page with its summary on top, and write it to a file where one is given."""
     page = "\n".join(lines)
+    page = with_summary(page, summary(page))
     print(page)
     if output:
         write_text(output, page)

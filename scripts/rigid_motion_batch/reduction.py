@@ -32,6 +32,7 @@ from rigid_motion.motion.measures import rms
 from rigid_motion_batch.graph_decimate import decimate
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.publishing import opening, publish
+from rigid_motion_batch.summaries import of_reduction
 from rigid_motion_batch.trajectories import TrajectoryError, read_trajectories
 from rigid_motion_batch.trajectories.reading import FORMATS
 from rigid_motion_batch.whole_bodies import rigs
@@ -225,5 +226,5 @@ def main(arguments: list[str] | None = None) -> int:
             lines += section(bodies, [(one.name, options.fps, one.poses) for one in recordings])
     finally:
         animation.unregister()
-    publish(lines, options.output)
+    publish(lines, options.output, of_reduction)
     return 0

@@ -31,6 +31,7 @@ from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from rigid_motion.motion.measures import rms
 from rigid_motion.motion.quaternions import align_signs, angle_between, multiply
 from rigid_motion_batch.publishing import opening, publish
+from rigid_motion_batch.summaries import of_sub_frames
 
 SEGMENTS = 24
 
@@ -167,5 +168,5 @@ def main(arguments: list[str] | None = None) -> int:
             lines += table(motion, options.radius)
     finally:
         animation.unregister()
-    publish(lines, options.output)
+    publish(lines, options.output, of_sub_frames)
     return 0

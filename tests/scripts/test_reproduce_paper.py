@@ -169,8 +169,9 @@ def test_pictures_and_film_are_in_the_plan_unless_they_are_not_wanted(root: Path
         plan = steps.plan(assets, [], rounds=2, version="", **options)
         return {output for task in plan.tasks.values() for output in task.outputs if output.startswith("paper/")}
 
-    assert outputs(pictures=False, film=True) == {"paper/engines.svg"}
-    stills = {"paper/engines.svg", "paper/triangle.png", "paper/strips.png", "paper/catching.png"}
+    drawings = {"paper/engines.svg", "paper/shell_error.svg"}
+    assert outputs(pictures=False, film=True) == drawings
+    stills = drawings | {"paper/triangle.png", "paper/strips.png", "paper/catching.png"}
     assert outputs(pictures=True, film=False) == stills
     assert outputs(pictures=True, film=True) == stills | {"paper/catching.mp4"}
 

@@ -11,7 +11,7 @@ import bpy
 from rigid_motion import animation
 
 from .scenes import MODE, ROTATION_MODES, NativeBaking, Size, all_frames, forget_digests, new_empty, scene_of, set_modes
-from .turns import Seconds, in_turns, told_in_ms
+from .turns import Seconds, against, beyond, in_turns, told_in_ms
 
 WARMING = 8
 """Edits in a row, unmeasured and then measured."""
@@ -37,23 +37,19 @@ def rows(objects: list[bpy.types.Object], rounds: int) -> list[str]:
     set_modes(objects, MODE)
     lines = []
     edit = edit_one(objects, rounds)
-    more = statistics.median(edit["live"]) - statistics.median(edit["native"])
-    lines.append(
-        row("one key edited, and the view updated", edit["live"], "native", edit["native"], f"{more * 1e3:.2f} ms more")
-    )
+    live, native = edit["live"], edit["native"]
+    lines.append(row("one key edited, and the view updated", live, "native", native, beyond(live, native)))
     elsewhere = edit_elsewhere(rounds)
-    more = statistics.median(elsewhere["live"]) - statistics.median(elsewhere["native"])
-    lines.append(row("another object moved", elsewhere["live"], "native", elsewhere["native"], f"{more * 1e6:+.1f} µs"))
+    live, native = elsewhere["live"], elsewhere["native"]
+    lines.append(row("another object moved", live, "native", native, beyond(live, native, "µs", 1)))
     playback = play(objects, max(3, rounds // 10))
     ratio = statistics.median(playback["live"]) / statistics.median(playback["native"])
     lines.append(row("all frames played", playback["live"], "native", playback["native"], f"{ratio:.2f} times as long"))
     everything = refresh_all(objects, rounds)
     for name, channels in (("same", "location and rotation"), ("default", "all channels, as *Bake Action* does")):
-        ratio = statistics.median(everything[name]) / statistics.median(everything["refresh"])
+        ours, theirs = everything["refresh"], everything[name]
         peer = f"`bake_action_objects`, {channels}"
-        lines.append(
-            row("all in-betweens anew", everything["refresh"], peer, everything[name], f"{ratio:.1f} times faster")
-        )
+        lines.append(row("all in-betweens anew", ours, peer, theirs, against(ours, theirs)))
     return lines
 
 

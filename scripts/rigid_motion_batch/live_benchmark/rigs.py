@@ -16,7 +16,7 @@ from rigid_motion import animation
 from .everyday import WARMING, play, with_and_without
 from .scenes import MODE, NativeBaking, Size, all_frames, forget_digests, general, keyed, set_modes
 from .shots import choose
-from .turns import MILLISECONDS, Seconds, against, in_turns, judged, told_in_ms
+from .turns import MILLISECONDS, Seconds, against, beyond, in_turns, judged, told_in_ms
 
 CHAIN = 10
 """Bones from root to tip."""
@@ -71,7 +71,7 @@ def rigs(size: RigSize, rounds: int) -> Iterator[str]:
         more = (statistics.median(edit[ours]) - statistics.median(edit[theirs])) * 1e3
         yield (
             f"| {what} | {told_in_ms(edit[ours])} | {peer}: {told_in_ms(edit[theirs])} "
-            f"| {more:.2f} ms more | {judged(more, EDIT_GOAL, ' ms')} |"
+            f"| {beyond(edit[ours], edit[theirs])} | {judged(more, EDIT_GOAL, ' ms')} |"
         )
     peer = f"`bake_action_objects`, as *Bake Action* does: {told_in_ms(anew['bake'])}"
     updated = [choose + update for choose, update in zip(anew["choose"], anew["update"], strict=True)]

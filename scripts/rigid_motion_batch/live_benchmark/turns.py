@@ -47,6 +47,12 @@ def judged(value: float, goal: float, unit: str = "", *, at_least: bool = False)
     return f"at {'least' if at_least else 'most'} {goal:g}{unit}: {'met' if is_met else 'missed'}"
 
 
+def beyond(ours: Sequence[float], theirs: Sequence[float], unit: str = "ms", decimals: int = 2) -> str:
+    """How much longer ours takes, or less long."""
+    more = (statistics.median(ours) - statistics.median(theirs)) * {"ms": 1e3, "µs": 1e6}[unit]
+    return f"{abs(more):.{decimals}f} {unit} {'more' if more >= 0.0 else 'less'}"
+
+
 def against(ours: Sequence[float], theirs: Sequence[float]) -> str:
     """How many times faster ours is, or slower."""
     ratio = statistics.median(theirs) / statistics.median(ours)

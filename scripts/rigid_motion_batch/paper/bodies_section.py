@@ -32,13 +32,11 @@ from .bodies import (
     Limb,
 )
 from .bows import SCREW
+from .claims import BLEND
 from .table import ADAPTIVE, RADIUS, UNIFORM
-from .wording import changed, grid, percent, percents
+from .wording import changed, grid, less, percent
 
 HEADING = "## The same study on bodies"
-
-BLEND = "pga_lerp"
-"""The multivectors of the paper."""
 
 ONE_MOTION = 1e-6
 """Metres: what is nearer than that is one motion for all that can be seen."""
@@ -161,8 +159,8 @@ def _keys(found: BodyResults) -> list[str]:
         "",
         f"**Key poses needed to be as good as `{REFERENCE}`**",
         "",
-        "Key poses a second, and how many fewer they are; below zero it takes more. Geometric means over bodies, of "
-        "which one counts where it has two samples to a key pose. Those chosen by the motion are chosen to keep the "
+        "Key poses a second, and how many fewer they are, or more. Geometric means over bodies, of which "
+        "one counts where it has two samples to a key pose. Those chosen by the motion are chosen to keep the "
         "largest error small, not the RMS that is asked for. A dash: all samples, on every body.",
         "",
         *grid(
@@ -213,7 +211,7 @@ def _who_counts(found: BodyResults) -> list[str]:
 
 def _fewer(found: BodyResults, mode: str, decimation: str) -> str:
     saved = found.saved(BODY, mode, decimation, found.rates)
-    return f"{percents(saved)} fewer key poses than {listed([str(rate) for rate in found.rates])} a second"
+    return f"{less(saved, 'fewer')} key poses than {listed([str(rate) for rate in found.rates])} a second"
 
 
 def _called(mode: str) -> str:
@@ -415,10 +413,10 @@ def _alone(found: BodyResults) -> list[str]:
         "",
     ]
     for kind in kinds:
-        told = [f"`{mode}` {percents(found.saved(kind, mode, UNIFORM, rates))}" for mode in (SCREW, MODES[-1])]
+        told = [f"`{mode}` {less(found.saved(kind, mode, UNIFORM, rates), 'fewer')}" for mode in (SCREW, MODES[-1])]
         lines.append(
-            f"- {kind.capitalize()}, evenly spaced: {listed(told)} fewer keys than "
-            f"{listed([str(rate) for rate in rates])} a second."
+            f"- {kind.capitalize()}, evenly spaced, keys beside {listed([str(rate) for rate in rates])} a second: "
+            f"{'; '.join(told)}."
         )
     return lines
 
@@ -554,7 +552,12 @@ def _beside_the_paper(found: BodyResults) -> list[str]:
             best.append((row, there[of], "whole bodies" if of == BODY else f"{of} alone"))
     if not best:
         return []
-    told = [f"{percent(saved)} at {row.state_of_the_art} a second ({of})" for row, saved, of in best]
+    told = [
+        f"{percent(saved)} at {row.state_of_the_art} a second ({of})"
+        if round(saved, 2) >= 0.0
+        else f"nothing at {row.state_of_the_art} a second, where it takes {percent(saved)} ({of})"
+        for row, saved, of in best
+    ]
     reached = [str(row.state_of_the_art) for row, saved, _ in best if saved >= row.saved - 0.005]
     ending = f"It is there at {listed(reached)} a second." if reached else "Nowhere here is it the paper's."
     return [

@@ -1,11 +1,8 @@
 """Why a screw wins on one motion and loses on another: how much of its bow the recorded path has.
 
 Between two keys the origin runs straight under `lerp_slerp` and on a bow under a screw. With a the way from the
-straight line to the recorded position, and b to the screw's, the sums of squared errors differ by
-
-    sum |a|^2 - sum |a - b|^2  =  (2 k - 1) sum |b|^2        k = sum a.b / sum |b|^2
-
-So the screw has the smaller RMS position error where the share k of its bow is above a half, exactly; and by how much
+straight line to the recorded position, and b to the screw's, the sums of squared errors differ as `FORMULA` says. So
+the screw has the smaller RMS position error where the share k of its bow is above a half, exactly; and by how much
 depends on the stake, sum |b|^2 / sum |a|^2. A hand that pivots about a wrist or an elbow has a k near 1, a body in free
 flight near 0. Lengths in metres.
 """
@@ -23,6 +20,12 @@ from rigid_motion_batch.comparison.study.modes import REFERENCE
 
 from . import claims
 from .table import senders
+
+FORMULA = (
+    "k = sum a.b / sum |b|^2",
+    "sum |a - b|^2 = sum |a|^2 - (2 k - 1) sum |b|^2",
+)
+"""What k is, and what it decides; a and b as above."""
 
 SCREW = "dq_sclerp"
 

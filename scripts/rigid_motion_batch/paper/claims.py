@@ -32,6 +32,9 @@ TABLE = tuple(
     )
 )
 
+BLEND = "pga_lerp"
+"""The multivectors of the paper."""
+
 TIME_SAVED = 0.165
 """The running time saved for a generated frame, as a share."""
 

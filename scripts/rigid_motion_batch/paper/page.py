@@ -12,15 +12,16 @@ import numpy as np
 from rigid_motion.motion import MODES
 from rigid_motion_batch.comparison.report.findings import listed
 from rigid_motion_batch.comparison.study.modes import REFERENCE
-from rigid_motion_batch.streaming.packets import HEADER
+from rigid_motion_batch.summaries import of_paper, with_summary
 
-from . import bodies_section, claims, sending_section, strips, triangle
-from .bandwidths import Bandwidth
+from . import bodies_section, bows_section, claims, costs_section, sending_section, shell, strips, triangle
 from .bows import SCREW
+from .bows_section import SPLINES
 from .catching import LINK
+from .claims import BLEND
 from .results import Results
-from .table import ADAPTIVE, UNIFORM, YARDSTICKS
-from .timing import ALGEBRA, AS_GOOD, CONFIDENCE, EQUAL, FAST, FRAMES_PER_S, PAPER, SINGLE, USERS, Timing
+from .table import ADAPTIVE, RADIUS, UNIFORM, YARDSTICKS
+from .timing import EQUAL, FAST
 from .wording import (
     changed,
     doubt,
@@ -28,18 +29,11 @@ from .wording import (
     heads,
     less,
     needed_cell,
-    number,
     papers_row,
     percent,
     percents,
-    timed,
     verdict,
 )
-
-BLEND = "pga_lerp"
-"""The multivectors of the paper."""
-
-SPLINES = ("motor_spline", "motor_spline_causal")
 
 LAST = ("## Running time", "## Bytes", "## Files")
 """Headings of the sections that come last."""
@@ -50,18 +44,12 @@ AFTER = {
 }
 """Of sections that may be written alone, the headings that may come after them."""
 
-WHAT_ASSETS_ARE = {
-    "pivot": "a tool turned about its resting tip",
-    "reach": "an arm that reaches",
-    "screw": "a tool that drives a screw",
-    "throw": "a tool thrown and caught",
-}
-
 
 def write_page(found: Results) -> str:
     """The whole page."""
     sections = [
         _opening(found),
+        _shell_error(found),
         _in_short(found),
         _triangle(found),
         _strips(found),
@@ -71,13 +59,14 @@ def write_page(found: Results) -> str:
         _clip_by_clip(found),
         _look_ahead(found),
         sending_section.sending_section(found.sending, found.sets),
-        _bows(found),
+        bows_section.bows_section(found),
         bodies_section.bodies_section(found.of_bodies),
-        _running_time(found),
-        _bandwidth(found),
+        costs_section.running_time(found),
+        costs_section.bandwidth(found),
         _files(found),
     ]
-    return "\n".join(line for section in sections if section for line in [*section, ""]).rstrip() + "\n"
+    page = "\n".join(line for section in sections if section for line in [*section, ""]).rstrip() + "\n"
+    return with_summary(page, of_paper(page))
 
 
 def with_section(page: str, section: str) -> str:
@@ -91,7 +80,8 @@ def with_section(page: str, section: str) -> str:
         places = [place for name in AFTER[heading] if (place := before.find(f"\n{name}\n")) >= 0]
         place = min(places, default=len(before))
         before, rest = before[:place], before[place:]
-    return "\n\n".join(part.strip("\n") for part in (before, section, rest) if part.strip("\n")) + "\n"
+    whole = "\n\n".join(part.strip("\n") for part in (before, section, rest) if part.strip("\n")) + "\n"
+    return with_summary(whole, of_paper(whole))
 
 
 # -- sections ----------------------------------------------------------------------------------------------------------
@@ -119,6 +109,20 @@ def _opening(found: Results) -> list[str]:
     if found.run:
         lines += ["", ", ".join(f"{name} {value}" for name, value in found.run.items()) + "."]
     return lines
+
+
+def _shell_error(found: Results) -> list[str]:
+    if not found.needed:
+        return []
+    picture = ["", f"![{shell.TITLE}](paper/shell_error.svg)"] if "paper/shell_error.svg" in found.pictures else []
+    return [
+        "## The shell error",
+        "",
+        f"The farthest that any point within {1e3 * RADIUS:.0f} mm of a body's origin is from where it was recorded at "
+        "that moment: one length for place and turn together, whatever the body's axes. Of a whole clip it is the root "
+        "mean square (RMS) over all samples.",
+        *picture,
+    ]
 
 
 def _in_short(found: Results) -> list[str]:
@@ -269,12 +273,12 @@ def _table(found: Results) -> list[str]:
     lines = [
         "## Table 1",
         "",
-        "The lowest rate at which a mode is as good as the state of the art at its rate, and the bandwidth saved. As "
-        "good means no larger an error, by three yardsticks set beforehand. Geometric means over clips, of which one "
-        f"counts where it has two samples to an update: {_clips_counted(found)}. The first row after the paper's is a "
-        "check, which compares the state of the art with itself: it should need its own rates, and does to within "
-        f"{_check(found):.0%}. Where a rate was as good on some clips only, the cell says on how many. A dash: on "
-        "none.",
+        "The lowest rate at which a mode is as good as the state of the art at its rate, and the bandwidth saved, or "
+        "how much more it takes. As good means no larger an error, by three yardsticks set beforehand. Geometric "
+        "means over clips, of which one counts where it has two samples to an update: "
+        f"{_clips_counted(found)}. The first row after the paper's is a check, which compares the state of the art "
+        f"with itself: it should need its own rates, and does to within {_check(found):.0%}. Where a rate was as good "
+        "on some clips only, the cell says on how many. A dash: on none.",
         "",
     ]
     for one in found.sets:
@@ -369,207 +373,6 @@ def _look_ahead(found: Results) -> list[str]:
     ]
 
 
-def _bows(found: Results) -> list[str]:
-    if not found.bows:
-        return []
-    rates = list(dict.fromkeys(one.updates for one in found.bows))
-    clips = list(dict.fromkeys(one.clip for one in found.bows))
-    at = {(one.clip, one.updates): one for one in found.bows}
-    errors = {clip: float(np.mean([at[clip, rate].error for rate in rates if (clip, rate) in at])) for clip in clips}
-    shares = {clip: float(np.mean([at[clip, rate].share for rate in rates if (clip, rate) in at])) for clip in clips}
-    best, worst = min(clips, key=errors.__getitem__), max(clips, key=errors.__getitem__)
-    lines = [
-        "## Why a screw wins here and loses there",
-        "",
-        "Between two updates the origin runs straight under the state of the art, and on a bow under a screw. How "
-        "much of that bow the recorded path has is a number k, and the screw has the smaller RMS position error "
-        "where k is above a half, exactly. In a cell: k, and the screw's error as a multiple of the state of the "
-        "art's.",
-        "",
-        *grid(
-            ["clip", *(f"{rate}/s" for rate in rates)],
-            [
-                [
-                    clip,
-                    *(
-                        f"{number(at[clip, rate].share)}; {at[clip, rate].error:.2f}" if (clip, rate) in at else ""
-                        for rate in rates
-                    ),
-                ]
-                for clip in clips
-            ],
-        ),
-        "",
-        f"A screw is best on {_said(best)}: {errors[best]:.2f} times the error on average, with a k of "
-        f"{number(shares[best])}; and worst on {_said(worst)}: {errors[worst]:.2f} times, with "
-        f"{number(shares[worst])}. " + _motions_in_words(shares),
-    ]
-    wins = {rate: [at[clip, rate].share > 0.5 for clip in clips if (clip, rate) in at] for rate in rates}
-    low, high = min(rates), max(rates)
-    lines.append(
-        f"At {low} updates a second the screw is nearer on {sum(wins[low])} of {len(wins[low])} clips, at {high} on "
-        f"{sum(wins[high])} of {len(wins[high])}"
-        + (": between updates far apart a hand does more than one screw." if sum(wins[low]) < sum(wins[high]) else ".")
-    )
-    left = [one.error for one in found.bows if one.updates >= claims.TABLE[-1].state_of_the_art]
-    if left:
-        lines.append(
-            "How much can be gained is bounded by what is at stake: of the state of the art's error at "
-            f"{claims.TABLE[-1].state_of_the_art} updates a second and more, the screw left {min(left):.0%} where it "
-            f"was best and {max(left):.0%} where it was worst."
-        )
-    splines = [mode for mode in SPLINES if np.isfinite(found.saved(mode)).any()]
-    if splines:
-        told = [f"`{mode}` {less(found.saved(mode))}" for mode in splines]
-        lines.append(
-            "What a straight line and a screw have in common is the corner at every update, and that costs more than "
-            f"either's path between them: without it, {listed(told)}. Keys where the motion needs them, instead of "
-            f"evenly in time, add to that where nobody waits for a stream: `{SPLINES[0]}` "
-            f"{less(found.saved(SPLINES[0], ADAPTIVE))}."
-        )
-    return lines
-
-
-def _motions_in_words(means: dict[str, float]) -> str:
-    """What the assets, of which it is known what moves, have of the bow."""
-    known = {clip: WHAT_ASSETS_ARE[clip] for clip in means if clip in WHAT_ASSETS_ARE}
-    bowed = [f"{what} ({means[clip]:.2f})" for clip, what in known.items() if means[clip] > 0.5]
-    straight = [f"{what} ({means[clip]:.2f})" for clip, what in known.items() if means[clip] <= 0.5]
-    parts = []
-    if bowed:
-        parts.append(f"Of the motions that are known, a screw suits {listed(bowed)}")
-    if straight:
-        parts.append(f"{'it' if bowed else 'a screw'} does not suit {listed(straight)}")
-    return "; ".join(parts) + "." if parts else ""
-
-
-def _running_time(found: Results) -> list[str]:
-    if not found.timings:
-        return []
-    lines = [
-        "## Running time",
-        "",
-        f"Of a generated frame, {FRAMES_PER_S:.0f} a second for {USERS} users, as a multiple of the state of the "
-        f"art's in the same round; the median of all rounds and its {CONFIDENCE:.0%} confidence interval (bootstrap "
-        f"over rounds). All take turns. The paper: {1.0 - claims.TIME_SAVED:.3f}. In brackets, processor time. These "
-        "numbers differ from run to run and from machine to machine; all others on this page do not.",
-        "",
-        "This program's own forms work out a segment once and then fill in its frames, so fewer updates make them "
-        "quicker.",
-        "",
-    ]
-    for pace, title in (
-        (EQUAL, "At equal rates"),
-        (AS_GOOD, "Each at the rate with which it is as good, by the table above"),
-        (PAPER, "Each at the paper's rate"),
-    ):
-        lines += [f"**{title}**", "", *_timing_grid(found, pace), ""]
-    lines += [
-        "**The algebras as they are written**, every frame encoded, filled in and extracted anew, as the paper's "
-        "engines do: all frames as one array, and one after the other. The products of multivectors are general ones "
-        "here, of 16 or 32 coefficients, where an engine would write out those that are not zero; one frame after "
-        "the other is for the most part the cost of calling NumPy. So neither is a verdict on an engine in C#",
-        "",
-        *_algebra_grid(found),
-        "",
-        _times_of_the_blend(found),
-        f"The {claims.ENERGY_SAVED:.0%} of energy that the paper saved cannot be measured here: a processor's time is "
-        "what there is, and it leaves out the radio, which fewer updates would spare.",
-    ]
-    return lines
-
-
-def _timing_grid(found: Results, pace: str) -> list[str]:
-    modes = dict.fromkeys(one.mode for one in found.timings if (one.reading, one.pace) == (FAST, pace))
-    rows = [
-        [f"`{mode}`", *(_timing_cell(found.timing(FAST, pace, mode, row)) for row in claims.TABLE)] for mode in modes
-    ]
-    return grid(["mode", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)], rows)
-
-
-def _timing_cell(one: Timing | None) -> str:
-    return "" if one is None else timed(one) if one.pace == EQUAL else f"{one.updates:.3g}/s: {timed(one)}"
-
-
-def _times_of_the_blend(found: Results) -> str:
-    """What multivectors by LERP take, in all rows."""
-    told = []
-    for pace, where in (
-        (EQUAL, "at equal rates"),
-        (AS_GOOD, "at the rates that are as good"),
-        (PAPER, "at the paper's rates"),
-    ):
-        races = [found.timing(FAST, pace, BLEND, row) for row in claims.TABLE]
-        if all(races):
-            told.append(f"{listed([changed(one.relative) + doubt(one) for one in races])} {where}")
-    if not told:
-        return ""
-    return (
-        f"Multivectors by LERP take, in the four rows, {'; '.join(told)}. The paper has {claims.TIME_SAVED:.1%} less."
-    )
-
-
-def _algebra_grid(found: Results) -> list[str]:
-    modes = dict.fromkeys(one.mode for one in found.timings if one.reading == ALGEBRA)
-    rows = [[f"`{mode}`", *(timed(found.timing(how, EQUAL, mode)) for how in (ALGEBRA, SINGLE))] for mode in modes]
-    return grid(["mode", "as arrays", "one after the other"], rows)
-
-
-def _bandwidth(found: Results) -> list[str]:
-    if not found.bandwidths:
-        return []
-    rates = list(dict.fromkeys(one.updates for one in found.bandwidths))
-    packings = list(dict.fromkeys(one.packing for one in found.bandwidths))
-    at = {(one.packing, one.updates): one for one in found.bandwidths}
-    doubles = [at["double", rate].bytes_per_s for rate in rates]
-    example = [f"{count} n bytes a second for n users at {rate} updates" for rate, count in claims.EXAMPLE.items()]
-    same = all(round(counted, 6) == claims.EXAMPLE[rate] for counted, rate in zip(doubles, rates, strict=True))
-    return [
-        "## Bytes",
-        "",
-        f"The example of the text: {listed(example)}. Counted from packets that were packed: "
-        f"{listed([f'{count:.0f} n' for count in doubles])}, {'the same' if same else 'not the same'}. With the "
-        f"header of {HEADER.itemsize} bytes that a receiver needs besides (checksum, stream, number, time stamp, age):",
-        "",
-        *grid(
-            [
-                "packing",
-                "bytes a pose",
-                *(f"{rate}/s, poses alone" for rate in rates),
-                *(f"{rate}/s, with headers" for rate in rates),
-                "error",
-            ],
-            [
-                [
-                    at[name, rates[0]].label,
-                    str(at[name, rates[0]].bytes_a_pose),
-                    *(f"{at[name, rate].bytes_per_s:.0f} n" for rate in rates),
-                    *(f"{at[name, rate].with_headers_per_s:.0f} n" for rate in rates),
-                    _packing_error(at[name, rates[0]]),
-                ]
-                for name in packings
-            ],
-        ),
-        "",
-        _packing_remark(at, packings, rates[0]),
-    ]
-
-
-def _packing_error(one: Bandwidth) -> str:
-    if one.position_error_m < 1e-12:
-        return "none"
-    return f"within {one.position_error_m * 1e6:.2g} µm and {one.rotation_error_deg:.2g}°"
-
-
-def _packing_remark(at: dict[tuple[str, int], Bandwidth], packings: Sequence[str], rate: int) -> str:
-    smallest = min(packings, key=lambda name: at[name, rate].bytes_a_pose)
-    share = 1.0 - at[smallest, rate].bytes_per_s / at["double", rate].bytes_per_s
-    return (
-        f"Packing the same poses as {at[smallest, rate].label.lower()} saves {share:.0%} of their bytes, at any rate "
-        "and under any mode."
-    )
-
-
 def _files(found: Results) -> list[str]:
     return [
         "## Files",
@@ -597,7 +400,3 @@ def _beside_the_screw(found: Results) -> str:
 def _middle_step(steps: Sequence[triangle.Step]) -> float:
     turned = np.array([one.lerp_turned_deg for one in steps])
     return float(np.diff(turned).max())
-
-
-def _said(clip: str) -> str:
-    return f"`{clip}`, {WHAT_ASSETS_ARE[clip]}" if clip in WHAT_ASSETS_ARE else f"`{clip}`"

@@ -11,7 +11,7 @@ from rigid_motion_batch.streaming import TWISTS
 from . import claims
 from .sending import AROUND_A_PACKET, DELAYS, HEARTBEAT, MODES_SENT, SentNeeded, at_delay, packet_bytes
 from .table import YARDSTICKS
-from .wording import grid, heads, holding, needed_cell, papers_row, percent, percents, verdict
+from .wording import grid, heads, holding, less, needed_cell, papers_row, percent, verdict
 
 HEADING = "## Sending when needed"
 
@@ -50,10 +50,10 @@ def in_short(found: Sequence[SentNeeded], clips: str) -> list[str]:
     updates, numbers = [cell.saved for cell in rows], [_of_numbers(cell) for cell in rows]
     packed, small = [cell.saved_bytes for cell in rows], [cell.saved_small for cell in rows]
     return [
-        f"- `{TWISTS}`, sent when needed by a live sender, at a delay of 2 intervals instead of 1: {percents(updates)} "
-        f"fewer updates. {verdict(updates)} But each has 13 numbers instead of 7: {percents(numbers)} fewer numbers "
-        f"(as the paper counts; {_short(numbers)}), {percents(packed)} fewer bytes with headers in doubles "
-        f"({_short(packed)}), {percents(small)} in the smallest packing ({_short(small)})."
+        f"- `{TWISTS}`, sent when needed by a live sender, at a delay of 2 intervals instead of 1: "
+        f"{less(updates, 'fewer')} updates. {verdict(updates)} But each has 13 numbers instead of 7: "
+        f"{less(numbers, 'fewer')} numbers (as the paper counts; {_short(numbers)}), {less(packed, 'fewer')} bytes "
+        f"with headers in doubles ({_short(packed)}), {less(small, 'fewer')} in the smallest packing ({_short(small)})."
     ]
 
 

@@ -34,6 +34,7 @@ from . import (
     sending,
     sending_section,
     sending_steps,
+    shell,
     strips,
     table,
     timing,
@@ -108,6 +109,7 @@ def plan(
         _task("bytes", "count_bytes", ("bandwidth.csv",), source=asset["reach"]),
         _task("catching", "view_catching", ("catching.csv",), source=asset["throw"]),
         _task("engines", "draw_engines", ("paper/engines.svg",)),
+        _task("shell error", "draw_shell_error", ("paper/shell_error.svg",)),
         _task("figures in numbers", "count_figures", ("triangle.csv", "strips.csv")),
     ]
     if pictures:
@@ -348,6 +350,12 @@ def count_figures(job: Job) -> None:
 def draw_engines(job: Job) -> None:
     """The sequence diagram."""
     write_text(job.writes("paper/engines.svg"), engines.draw())
+
+
+@step
+def draw_shell_error(job: Job) -> None:
+    """What errors are measured by."""
+    write_text(job.writes("paper/shell_error.svg"), shell.draw())
 
 
 @step

@@ -20,9 +20,20 @@ def percents(shares: Sequence[float]) -> str:
     return f"{listed([number(100.0 * share, 0) if np.isfinite(share) else '-' for share in shares])} %"
 
 
-def less(saved: Sequence[float]) -> str:
-    """Shares saved, in a sentence."""
-    return f"{percents(saved)} less"
+def less(saved: Sequence[float], word: str = "less") -> str:
+    """Shares saved, in a sentence; of a share below zero it says how much more that is."""
+    shares = [round(share, 2) if np.isfinite(share) else float("nan") for share in saved]
+    if not any(share < 0.0 for share in shares):
+        return f"{percents(saved)} {word}"
+    if not any(share > 0.0 for share in shares):
+        return f"{percents([-share for share in saved])} more"
+    return listed([_less_or_more(share, word) for share in saved])
+
+
+def _less_or_more(saved: float, word: str) -> str:
+    if not np.isfinite(saved):
+        return "-"
+    return f"{number(100.0 * abs(saved), 0)} % {'more' if round(saved, 2) < 0.0 else word}"
 
 
 def verdict(saved: Sequence[float]) -> str:
@@ -83,9 +94,9 @@ def written(seconds: float) -> str:
     return f"{seconds * 1e3:.3g} ms"
 
 
-def percent(share: float) -> str:
-    """A share without decimals."""
-    return number(100.0 * share, 0) + "%"
+def percent(saved: float) -> str:
+    """A share that is saved, without decimals; below zero it says how much more that is: "23% more"."""
+    return number(100.0 * abs(saved), 0) + ("% more" if round(saved, 2) < 0.0 else "%")
 
 
 def number(value: float, decimals: int = 2) -> str:

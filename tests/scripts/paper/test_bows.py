@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from rigid_motion_batch.paper.bows import RATES, bows_of
+from rigid_motion_batch.paper.bows import FORMULA, RATES, bows_of
 from tests.scripts.comparison.recordings import swinging_clip
 from tests.scripts.paper.clips import circling, spinning_straight
 
@@ -31,3 +32,12 @@ def test_the_screw_is_nearer_exactly_where_more_than_half_of_the_bow_is_there(se
     for one in found:
         assert (one.share > 0.5) == (one.error < 1.0)
         assert one.error**2 == pytest.approx(1.0 - (2.0 * one.share - 1.0) * one.stake, abs=1e-9)
+
+
+def test_the_formula_that_the_page_has_is_what_is_measured():
+    random = np.random.default_rng(3)
+    a, b = random.normal(size=(2, 50, 3))
+    share = np.sum(a * b) / np.sum(b * b)
+    assert FORMULA[0] == "k = sum a.b / sum |b|^2"
+    assert FORMULA[1] == "sum |a - b|^2 = sum |a|^2 - (2 k - 1) sum |b|^2"
+    assert np.sum((a - b) ** 2) == pytest.approx(np.sum(a * a) - (2.0 * share - 1.0) * np.sum(b * b))

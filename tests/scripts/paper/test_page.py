@@ -86,7 +86,10 @@ FILES = {
     "strips.csv": (Instant, [Instant(mode, 0.5, 55.0, 0.0678) for mode in ("lerp_slerp", "dq_sclerp", "pga_lerp")]),
 }
 
-PICTURES = ("paper/triangle.png", "paper/strips.png", "paper/engines.svg", "paper/catching.png", "paper/catching.mp4")
+PICTURES = (
+    *("paper/triangle.png", "paper/strips.png", "paper/engines.svg", "paper/shell_error.svg"),
+    *("paper/catching.png", "paper/catching.mp4"),
+)
 
 
 def written(folder: Path, **changed: list) -> str:
@@ -139,12 +142,12 @@ def test_the_verdict_is_that_of_the_numbers(tmp_path: Path, share: float, verdic
     assert verdict in line
 
 
-def test_a_mode_that_needs_more_is_said_to_save_less_than_nothing(tmp_path: Path):
+def test_a_mode_that_needs_more_is_said_to_take_more(tmp_path: Path):
     rows = [cell for mode in MODES for cell in needed(RECORDINGS, mode, 1.1 if mode == "dq_sclerp" else 1.0)]
     text = written(tmp_path, table=rows)
-    assert "33.0 (\N{MINUS SIGN}10%)" in text
-    assert "-0%" not in text
-    assert "\N{MINUS SIGN}0%" not in text
+    assert "33.0 (10% more)" in text
+    assert "- A screw (`dq_sclerp`): 10, 10, 10 and 10 % more." in text
+    assert not re.search(r"[-\N{MINUS SIGN}]\d+(\.\d+)? ?%", text)
 
 
 def test_modes_with_the_same_cells_share_a_row(tmp_path: Path):
@@ -187,4 +190,17 @@ def test_pictures_that_are_not_there_are_not_shown(tmp_path: Path):
 
 
 def test_shares_in_a_sentence():
-    assert wording.percents([0.333, -0.021, float("nan"), 0.0]) == "33, \N{MINUS SIGN}2, - and 0 %"
+    assert wording.percents([0.333, 0.021, float("nan"), 0.0]) == "33, 2, - and 0 %"
+
+
+@pytest.mark.parametrize(
+    ("saved", "words"),
+    [
+        ([0.33, 0.0], "33 and 0 % less"),
+        ([-0.267, 0.001], "27 and 0 % more"),
+        ([0.02, -0.23, float("nan")], "2 % less, 23 % more and -"),
+        ([-0.004], "0 % less"),
+    ],
+)
+def test_what_is_not_saved_is_more(saved: list[float], words: str):
+    assert wording.less(saved) == words

@@ -1,0 +1,302 @@
+"""Measure the recordings of other people that these pages speak of: docs/figures/recordings.json.
+
+    python docs/measure_recordings.py --recordings FOLDER
+    python docs/quote_figures.py
+
+It takes five minutes; the second command puts the figures into the pages. Of the folder those count that the table of
+the paper's page counts in all its rows: single bodies that move, with two samples to each of 30 updates a second.
+Errors are RMS shell errors at a radius of 0.1 m, means are geometric.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+DOCS = Path(__file__).resolve().parent
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
+
+from rigid_motion.motion import curves, decimate
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.metrics import geometric_mean
+from rigid_motion_batch.comparison.study.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.comparison.study.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
+from rigid_motion_batch.files import write_text
+from rigid_motion_batch.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
+from rigid_motion_batch.paper.table import RADIUS, SAMPLES_AN_UPDATE
+
+OUTPUT = DOCS / "figures" / "recordings.json"
+
+RATES = ("5", "10", "15", "20", "30")
+"""Evenly spaced keys a second."""
+
+STREAMED = (REFERENCE, "dq_sclerp", "motor_spline_causal", "motor_spline")
+"""Modes of the table of errors."""
+
+COUNTED = (REFERENCE, "dq_sclerp", "pga_lerp", "motor_spline")
+"""Modes whose keys are counted."""
+
+CHOICES = {"all": "all,best_of", "without_spline": "lerp_slerp,dq_sclerp,pga_lerp,best_of"}
+"""What `best_of` chooses from."""
+
+BUDGETS = ("5", "10", "20")
+"""Adaptive keys a second, of which `best_of` chooses the modes as well."""
+
+DIGITS = 4
+"""Significant ones that are kept of a figure."""
+
+
+def parabola(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """The share of the twist before a key without a bound."""
+    return after / (before + after)
+
+
+def bounded(factor: float, power: float = 1.0) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """The same, where the shorter segment's share is at most so many times (short / long) to a power."""
+
+    def shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        least, most = 1.0 - factor * (after / before) ** power, factor * (before / after) ** power
+        return np.clip(parabola(before, after), least, most)
+
+    return shares
+
+
+RULES = {
+    "parabola": parabola,
+    "2": bounded(2.0),
+    "1.5": bounded(1.5),
+    "1": bounded(1.0),
+    "0.75": bounded(0.75),
+    "squared": bounded(1.0, 2.0),
+    "between_neighbours": lambda before, after: before / (before + after),
+}
+"""Rules for the share of the twist before a key; that of the program is "1"."""
+
+PARTS = {"whole": 1.0, "none": 0.0}
+"""How much of what the parabola adds a key of `motor_spline_causal` could have, where the program gives half."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, and write the file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", required=True)
+    parser.add_argument("--output", type=Path, default=OUTPUT, help="(docs/figures/recordings.json)")
+    options = parser.parse_args(arguments)
+    chosen = dict(_counting(recordings_in(options.recordings)))
+    clips, paths = list(chosen.values()), list(chosen)
+    figures = {
+        "made_by": "python docs/measure_recordings.py --recordings FOLDER",
+        "recordings": {clip.name: len(clip.times) for clip in clips},
+        "errors": _errors(paths),
+        "causal_errors": {name: _errors_of_clips(clips, part) for name, part in PARTS.items()},
+        "keys_needed": _needed(clips, COUNTED, fit=True),
+        "rules": {name: _by_rule(clips, name) for name in RULES},
+        "best_of": {name: _best_of(paths, modes) for name, modes in CHOICES.items()},
+        "best_of_adaptive": _best_of_adaptive(paths),
+    }
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    write_text(options.output, json.dumps(_rounded(figures), indent=1) + "\n")
+    return 0
+
+
+def _counting(paths: Iterable[Path]) -> Iterator[tuple[Path, Clip]]:
+    for path in paths:
+        _, clip = read_motion(str(path), path.stem, RECORDINGS)
+        if clip is not None and sampling_rate(clip) >= SAMPLES_AN_UPDATE * float(TABLE_RATES[0]):
+            yield path, clip
+
+
+# -- errors of evenly spaced keys --------------------------------------------------------------------------------------
+
+
+def _errors(paths: Sequence[Path]) -> dict[str, dict[str, float]]:
+    """By mode and rate, the error as a multiple of that of `lerp_slerp`."""
+    with _compared(paths, "--rates", ",".join(RATES), "--modes", ",".join(STREAMED)) as folder:
+        table = _Metrics(folder)
+        return {mode: {rate: table.mean(partial(table.ratio, rate, mode)) for rate in RATES} for mode in STREAMED[1:]}
+
+
+def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
+    """By rate, the error of `motor_spline_causal` where keys have another part of what the parabola adds."""
+    bent = curves._bent
+
+    def with_part(segments, at_keys):
+        def changed(twists, before, after, rests):
+            found = at_keys(twists, before, after, rests)
+            added = np.where(rests[:, 1:], 0.0, found[..., 2:] - twists[..., 1:])
+            return np.concatenate((found[..., :2], found[..., 2:] + (2.0 * part - 1.0) * added), axis=-1)
+
+        return bent(segments, changed)
+
+    means = {}
+    for rate in RATES:
+        ratios = []
+        for clip in clips:
+            ways, keys = OfRigidBody(clip, RADIUS), decimate(clip.times, float(rate))
+            stretch = ways.between(int(keys[0]), int(keys[-1]))
+            with mock.patch.object(curves, "_bent", with_part):
+                error = stretch.error(keys, "motor_spline_causal")
+            ratios.append(error / stretch.error(keys, REFERENCE))
+        means[rate] = float(geometric_mean(np.array(ratios)))
+    return means
+
+
+# -- keys needed -------------------------------------------------------------------------------------------------------
+
+
+def _needed(clips: Sequence[Clip], modes: Sequence[str], *, fit: bool) -> dict[str, dict[str, dict[str, float]]]:
+    """By mode, way to have keys and rate, the keys needed as a share of those of `lerp_slerp`."""
+    found = []
+    for clip in clips:
+        _say(f"keys needed, {clip.name} ...")
+        found.append(_apart(keys_needed(OfRigidBody(clip, RADIUS, fit), modes)))
+    means = overall(found)
+    decimations = OfRigidBody(clips[0], RADIUS, fit).decimations
+    shares = {group[0]: means.shares[row] for row, group in enumerate(means.groups)}
+    return {
+        mode: {
+            decimation: {rate: float(shares[mode][column, means.rates.index(rate)]) for rate in TABLE_RATES}
+            for column, decimation in enumerate(decimations)
+        }
+        for mode in modes
+    }
+
+
+def _apart(found: KeysNeeded) -> KeysNeeded:
+    """With a row for each mode, also where several are one motion."""
+    rows = [row for row, group in enumerate(found.groups) for _ in group]
+    groups = tuple((mode,) for group in found.groups for mode in group)
+    return KeysNeeded(
+        found.clip,
+        groups,
+        found.rates,
+        found.durations,
+        found.reference_keys,
+        found.targets,
+        found.keys[rows],
+        found.reached[rows],
+        found.uniform_errors[rows],
+    )
+
+
+def _by_rule(clips: Sequence[Clip], name: str) -> dict[str, dict[str, float]]:
+    """By way to have keys and rate, what `motor_spline` needs under a rule."""
+    _say(f"rule {name} ...")
+    with mock.patch.object(curves, "_shares", RULES[name]):
+        return _needed(clips, ("motor_spline",), fit=name in ("parabola", "1"))["motor_spline"]
+
+
+# -- the best mode of each segment -------------------------------------------------------------------------------------
+
+
+def _best_of(paths: Sequence[Path], modes: str) -> dict[str, dict[str, float]]:
+    """By rate, what `best_of` has of the errors of the best single mode of each clip, and how it changes modes."""
+    with _compared(paths, "--rates", ",".join(RATES), "--modes", modes) as folder:
+        table = _Metrics(folder)
+        return {rate: _best_at(table, folder, rate) for rate in RATES}
+
+
+def _best_of_adaptive(paths: Sequence[Path]) -> dict[str, float]:
+    """The same with adaptive keys, as many on average: the errors alone."""
+    with _compared(
+        paths, "--decimate", "adaptive", "--budget", ",".join(BUDGETS), "--modes", ",".join((*COUNTED, BEST_OF))
+    ) as folder:
+        return _adaptive_gains(_Metrics(folder))
+
+
+def _adaptive_gains(table: _Metrics) -> dict[str, float]:
+    def ratio(clip: str, rate: str) -> float:
+        return table.value(clip, rate, BEST_OF) / table.value(clip, rate, table.best(clip, rate))
+
+    return {rate: table.mean(partial(ratio, rate=rate)) for rate in BUDGETS}
+
+
+def _best_at(table: _Metrics, folder: Path, rate: str) -> dict[str, float]:
+    def ratio(column: str) -> Callable[[str], float]:
+        def of_clip(clip: str) -> float:
+            best = table.best(clip, rate)
+            return table.value(clip, rate, BEST_OF, column) / table.value(clip, rate, best, column)
+
+        return of_clip
+
+    shell = [ratio("rms_shell_m")(clip) for clip in table.clips]
+    splines, changes = [], []
+    for clip in table.clips:
+        chosen = [row["mode"] for row in _rows(folder / clip / rate / "best_of.keys.csv") if row["mode"]]
+        splines.append(np.mean([mode == "motor_spline" for mode in chosen]))
+        changes.append(np.mean([mode != after for mode, after in pairwise(chosen)]))
+    return {
+        "rms_shell": table.mean(ratio("rms_shell_m")),
+        "rms_shell_least": min(shell),
+        "rms_shell_most": max(shell),
+        "rms_velocity": table.mean(ratio("rms_velocity_m_s")),
+        "largest_shell": table.mean(ratio("max_shell_m")),
+        "with_spline": float(np.mean(splines)),
+        "changes": float(np.mean(changes)),
+    }
+
+
+# -- runs of compare.py ------------------------------------------------------------------------------------------------
+
+
+class _Metrics:
+    """The table of a run: `metrics.csv`."""
+
+    def __init__(self, folder: Path) -> None:
+        self._at = {(row["clip"], row["rate_hz"], row["mode"]): row for row in _rows(folder / "metrics.csv")}
+        self.clips = list(dict.fromkeys(clip for clip, _, _ in self._at))
+        self._single = [mode for mode in dict.fromkeys(mode for _, _, mode in self._at) if mode != BEST_OF]
+
+    def value(self, clip: str, rate: str, mode: str, column: str = "rms_shell_m") -> float:
+        return float(self._at[clip, rate, mode][column])
+
+    def ratio(self, rate: str, mode: str, clip: str) -> float:
+        return self.value(clip, rate, mode) / self.value(clip, rate, REFERENCE)
+
+    def best(self, clip: str, rate: str) -> str:
+        """The single mode with the least error."""
+        return min(self._single, key=lambda mode: self.value(clip, rate, mode))
+
+    def mean(self, of_clip: Callable[[str], float]) -> float:
+        return float(geometric_mean(np.array([of_clip(clip) for clip in self.clips])))
+
+
+@contextmanager
+def _compared(paths: Sequence[Path], *options: str) -> Iterator[Path]:
+    """The folder of a run of `compare.py`."""
+    _say(f"compare.py {' '.join(options)} ...")
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, DOCS.parent / "scripts" / "compare.py", *paths, "--no-video", "--jobs", "1"]
+        subprocess.run([*command, *options, "--output", folder], check=True, capture_output=True)
+        yield Path(folder)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _rounded(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _rounded(one) for key, one in value.items()}
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
+
+
+def _say(what: str) -> None:
+    print(what, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
