@@ -25,7 +25,8 @@ class NameRole(XRefRole):
     def process_link(
         self, env: BuildEnvironment, refnode: nodes.Element, has_explicit_title: bool, title: str, target: str
     ) -> tuple[str, str]:
-        if page := PAGE.fullmatch(target):
+        page = PAGE.fullmatch(target)
+        if page and page[1] in env.found_docs:  # Other programs have files of such names too.
             refnode["refdomain"], refnode["reftype"], refnode["refexplicit"] = "std", "doc", True
             return title, f"/{page[1]}"
         refnode["refdomain"], refnode["reftype"], refnode["optional"] = "py", "obj", True

@@ -147,6 +147,7 @@ def test_times_may_be_a_list(use):
         (lambda: measure(TIMES, POSES[:5], POSES), r"shape \(5,\) do not fit true ones of shape \(12,\)"),
         (lambda: measure(TIMES[:5], POSES, POSES), r"times of shape \(5,\) do not fit"),
         (lambda: measure(TIMES, POSES, POSES, radius=-1.0), "a radius of -1.0"),
+        (lambda: measure(TIMES, BODY, BODY, radius=[[0.1], [-1.0]]), "a radius of -1.0"),
         (lambda: shell_error(POSES[:5], POSES), "do not fit true ones"),
         (lambda: reduce_keys(TIMES, POSES), "needs a tolerance or a budget of keys: give one of the two"),
         (lambda: reduce_keys(TIMES, POSES, tolerance=0.1, budget=3), "give one of the two, not both"),
@@ -165,3 +166,9 @@ def test_times_may_be_a_list(use):
 def test_what_makes_no_sense_is_refused_in_words(use, message):
     with pytest.raises(ValueError, match=message):
         use()
+
+
+def test_a_body_may_have_a_radius_for_each_joint():
+    shown = BODY[:, ::-1]
+    of_joints = [measure(TIMES, shown[joint], BODY[joint], radius).shell for joint, radius in enumerate((0.1, 0.4))]
+    assert measure(TIMES, shown, BODY, radius=[[0.1], [0.4]]).shell.tolist() == np.stack(of_joints).tolist()

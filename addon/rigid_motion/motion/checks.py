@@ -110,6 +110,12 @@ def check_radius(radius: float) -> None:
         raise ValueError(f"a radius of {radius} is not a number from 0 to {LIMIT:g}")
 
 
+def check_radii(radii: ArrayLike) -> None:
+    """The same of one radius or many, in an array of any shape."""
+    for radius in np.unique(np.asarray(radii)):
+        check_radius(radius)
+
+
 def number(value: float, name: str) -> float:
     """One number, or a ValueError where an argument of this name is none, such as "5mm"."""
     try:

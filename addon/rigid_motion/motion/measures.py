@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_poses, check_radius
+from .checks import check_poses, check_radii
 from .poses import Poses
 from .quaternions import angle_between, cross
 
@@ -57,7 +57,7 @@ class Errors:
     """How far the origin's velocity is off between samples, shape (..., n - 1), in units per second."""
 
 
-def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: float = 0.1) -> Errors:
+def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> Errors:
     """All errors of `poses` against `truth`, sample by sample.
 
     Parameters
@@ -66,7 +66,7 @@ def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: float = 0.1) -
         Seconds, rising.
     poses, truth : Poses, shape (..., n)
         With unit quaternions, both in one unit of length.
-    radius : float
+    radius : float or array-like, shape (..., n)
         Of the ball around the origin in which no point is off by more than the shell error, in the unit of the
         positions; not below zero.
 
@@ -103,7 +103,7 @@ def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: float = 0.1) -
     >>> errors.shell.round(6).tolist(), errors.rotation.round(6).tolist()
     ([0.0, 0.141421], [0.0, 1.570796])
     """
-    check_radius(radius)
+    check_radii(radius)
     _check_pair(poses, truth)
     times = np.asarray(times, dtype=np.float64)
     if times.shape not in (poses.shape, truth.shape, poses.shape[-1:]) or not times.shape:
@@ -130,14 +130,14 @@ def _check_pair(poses: Poses, truth: Poses) -> None:
             raise ValueError(f"poses of shape {poses.shape} do not fit true ones of shape {truth.shape}") from None
 
 
-def shell_error(poses: Poses, truth: Poses, radius: float | np.ndarray = 0.1) -> np.ndarray:
+def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarray:
     """The largest displacement of any point within `radius` of the body's origin: position and rotation in one number.
 
     Parameters
     ----------
     poses, truth : Poses, shape (..., n)
         With unit quaternions.
-    radius : float or array, shape (..., n)
+    radius : float or array-like, shape (..., n)
         Of the ball around the origin, in the unit of the positions, before the body's own scale.
 
     Returns
@@ -176,6 +176,7 @@ def shell_error(poses: Poses, truth: Poses, radius: float | np.ndarray = 0.1) ->
     [0.03, 0.23]
     """
     _check_pair(poses, truth)
+    radius = np.asarray(radius, dtype=np.float64)
     (w, *xyz), (true_w, *true_xyz) = (np.moveaxis(some.quaternions, -1, 0) for some in (poses, truth))
     d, v = np.moveaxis(poses.positions - truth.positions, -1, 0), cross(true_xyz, xyz)
     for axis in range(3):
@@ -225,6 +226,7 @@ def rms(errors: ArrayLike) -> float:
     Parameters
     ----------
     errors : array-like, any shape
+        Of samples, in any unit.
 
     Returns
     -------

@@ -107,8 +107,8 @@ def repair(times: ArrayLike, poses: Poses) -> tuple[np.ndarray, Poses, list[Repa
     >>> from rigid_motion.motion import Poses, repair
     >>> poses = Poses([[0, 0, 0], [np.nan, 0, 0], [2, 0, 0]], [[2, 0, 0, 0], [1, 0, 0, 0], [-1, 0, 0, 0]])
     >>> times, poses, repairs = repair([0.0, 0.1, 0.2], poses)
-    >>> poses.quaternions.tolist()
-    [[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]
+    >>> poses.quaternions[:, 0].tolist()
+    [1.0, 1.0]
     >>> times.tolist(), len(repairs)
     ([0.0, 0.2], 3)
     >>> print(repairs[0])
