@@ -16,7 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 
-BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md")
+BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md", "examples")
 """What pages show or link to that is not in docs/."""
 
 EPILOG = """
@@ -79,7 +79,8 @@ def stage(folder: Path) -> Path:
     shutil.copytree(ROOT / "docs", pages, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     for name in BESIDE:
         (folder / name).parent.mkdir(exist_ok=True)
-        shutil.copy(ROOT / name, folder / name)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, folder / name)
     return pages
 
 

@@ -13,6 +13,7 @@ PAGES = {
     "CONTRIBUTING.md": "contributing",
     "CHANGELOG.md": "changelog",
     "assets/README.md": "assets",
+    "examples/modes_in_python/README.md": "notebook",
 }
 """Files outside docs/ to the pages of the site that show them."""
 
