@@ -28,7 +28,13 @@ SAME = 1e-9
 """Motions that are never further apart than this are one motion."""
 
 
-class ModeLoops(SphinxDirective):
+class ModeDirective(SphinxDirective):
+    """What is written in it is for people who read the page as a file."""
+
+    has_content = True
+
+
+class ModeLoops(ModeDirective):
     """A section for each mode: its film, and what it does."""
 
     def run(self) -> list[nodes.Node]:
@@ -42,7 +48,7 @@ class ModeLoops(SphinxDirective):
         return nodes.section("", nodes.title("", mode.label), film, text, ids=[f"loop-{anchor(name)}"])
 
 
-class ModeDetails(SphinxDirective):
+class ModeDetails(ModeDirective):
     """A section for each mode: its name in programs, path and speed, the keys it looks at, and modes like it."""
 
     def run(self) -> list[nodes.Node]:
@@ -70,7 +76,7 @@ class ModeDetails(SphinxDirective):
         return nodes.section("", title, label, picture, facts, ids=[anchor(name)])
 
 
-class ModeTable(SphinxDirective):
+class ModeTable(ModeDirective):
     """One row for each mode."""
 
     def run(self) -> list[nodes.Node]:
