@@ -167,9 +167,11 @@ def test_the_gain_of_screws_in_a_hand_is_told_only_where_it_is_measured(tmp_path
 
 
 def test_bytes_that_are_not_those_of_the_paper_are_called_so(tmp_path: Path):
-    assert "the same. With" in written(tmp_path)
+    assert "the same. A receiver also" in written(tmp_path)
     _, rows = FILES["bandwidth.csv"]
-    assert "not the same. With" in written(tmp_path, bandwidth=[replace(row, bytes_per_s=1000.0) for row in rows])
+    assert "not the same. A receiver also" in written(
+        tmp_path, bandwidth=[replace(row, bytes_per_s=1000.0) for row in rows]
+    )
 
 
 def test_energy_is_not_claimed(tmp_path: Path):
