@@ -147,6 +147,12 @@ def test_films_play_by_themselves_without_a_sound(pages):
         assert film["aria-label"], film["src"]
 
 
+def test_a_picture_that_links_to_a_film_is_that_film(site, pages):
+    home = pages[site / "index.html"]
+    assert [film["src"] for film in home.films] == ["_images/rigs.mp4"]
+    assert home.loaded.count("_images/rigs-lever.png") == 1, "as the poster, and not as a picture besides"
+
+
 def test_formulas_are_set_by_the_browser_and_all_of_them_could_be(site, pages):
     assert pages[site / "conventions.html"].formulas > len(motion.MODES)
     for page in pages.values():
