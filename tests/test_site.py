@@ -116,6 +116,7 @@ def test_every_public_name_of_the_core_has_an_entry(name, site, pages):
     path = site / "reference" / "generated" / f"{qualified}.html"
     assert path in pages
     assert qualified in pages[path].anchors
+    assert re.search(rf'id="{re.escape(qualified)}".*?<dd>\s*<p>\w', pages[path].text, re.S), "nothing is said of it"
 
 
 @pytest.mark.parametrize("mode", motion.MODES)

@@ -51,11 +51,10 @@ def leave_as_code(
 
 
 def document_data(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    """Give data that a package imports what stands below it in the module that it comes from."""
+    """Give data that a package imports what stands below it in the module that it comes from, and not its type's."""
     package, _, attribute = name.rpartition(".")
-    if what != "data" or any(lines):
-        return
-    for module in [module for module in sys.modules if module.startswith(f"{package}.")]:
+    modules = [module for module in sys.modules if module.startswith(f"{package}.")] if what == "data" else []
+    for module in modules:
         documented = ModuleAnalyzer.for_module(module).find_attr_docs()
         if found := documented.get(("", attribute)):
             lines[:] = found
