@@ -40,12 +40,12 @@ def _summarised(summary: Summary, chart: str) -> list[Content]:
         mean = f", geometric mean over the {len(summary.clips)} clips" if len(summary.clips) > 1 else ""
         measure = "Number of keys" if summary.kind is Tolerance else "RMS shell error"
         where = "within the same tolerance" if summary.kind is Tolerance else "at the same rate"
-        meaning = "as many" if summary.kind is Tolerance else "as far off"
+        meaning = "the same number" if summary.kind is Tolerance else "the same error"
         content += [
             element("h3", f"{summary.what.capitalize()} relative to {reference}"),
             element(
                 "p",
-                f"{measure} as a multiple of that of {reference} {where}{mean}: 1.00 is {meaning}, lower is better.",
+                f"{measure} as a multiple of that of {reference} {where}{mean}: 1.00 means {meaning}, lower is better.",
                 class_="note",
             ),
             element(
