@@ -14,6 +14,7 @@
     python scripts/bootstrap.py openjd run template.json    run such a job on this machine
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
+    python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
 
 The packages go into .venv/ of this checkout; the first run downloads about 400 MB. All arguments after the command are
 passed on to it: `python scripts/bootstrap.py compare --help` shows the options of compare.
@@ -37,7 +38,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
-    "test": (["-m", "pytest"], ("test", "farm")),
+    "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
@@ -47,6 +48,7 @@ COMMANDS = {
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
+    "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 
