@@ -6,6 +6,7 @@
     python scripts/bootstrap.py test                        run the tests
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
     python scripts/bootstrap.py bake shot.blend             turn in-betweens of .blend files into real keys, or back
+    python scripts/bootstrap.py reduce shot.blend           keep few keys, in .blend files and of recordings
     python scripts/bootstrap.py stream --help               send a recording over a network, in real time
     python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
     python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
@@ -13,6 +14,7 @@
     python scripts/bootstrap.py openjd run template.json    run such a job on this machine
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
+    python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
 
 The packages go into .venv/ of this checkout; the first run downloads about 400 MB. All arguments after the command are
 passed on to it: `python scripts/bootstrap.py compare --help` shows the options of compare.
@@ -36,15 +38,17 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
-    "test": (["-m", "pytest"], ("test", "farm")),
+    "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
+    "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
     "tasks": (["-m", "rigid_motion_batch.workplan"], ()),
     "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
+    "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 

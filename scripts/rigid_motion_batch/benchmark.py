@@ -234,7 +234,7 @@ def race(contestants: dict[tuple[str, str], Callable[[], object]], rounds: int) 
 def report(case: Case, seconds: dict[tuple[str, str], list[float]]) -> Iterator[str]:
     """The case as lines of Markdown: million poses a second, and this program's multiple of each peer."""
     fastest = {name: min(times) for name, times in seconds.items()}
-    yield f"### {case.title[0].upper()}{case.title[1:]}"
+    yield f"## {case.title[0].upper()}{case.title[1:]}"
     yield ""
     yield f"{case.in_betweens} in-betweens from {case.keys.shape[0] * case.keys.shape[1]} keys."
     yield ""
@@ -292,7 +292,7 @@ def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
 
 def reductions(counts: tuple[int, ...], tolerance: float = 0.005) -> Iterator[str]:
     """Key reduction as lines of Markdown, beside greedy insertion."""
-    yield "### Key reduction"
+    yield "## Key reduction"
     yield ""
     yield (
         f"A made-up hand at 90 samples a second, `motor_spline` within {tolerance * 1e3:g} mm at a radius of 0.1 m; "

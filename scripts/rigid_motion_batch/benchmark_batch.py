@@ -146,7 +146,7 @@ def workers(title: str, clips: Sequence[Path], folder: Path, rounds: int, *optio
             say(f"{title}, {jobs} at work{' on one processor' if alone else ''} ...")
             some.append(compare(clips, folder, jobs, *options, alone=alone))
     best = {way: min(some, key=lambda run: run.seconds) for way, some in runs.items()}
-    yield f"### {title}"
+    yield f"## {title}"
     yield ""
     yield f"`compare.py CLIP... {' '.join(options)} --jobs N`"
     yield ""
@@ -165,7 +165,7 @@ def workers(title: str, clips: Sequence[Path], folder: Path, rounds: int, *optio
 def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> Iterator[str]:
     """What the program and its workers take, as lines of Markdown."""
     options = ("--no-video", "--rates", "10")
-    yield "### Memory"
+    yield "## Memory"
     yield ""
     yield "| clips | of the program, MB | beside |"
     yield "|---:|---:|---:|"

@@ -138,7 +138,7 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> tup
 
 def table(motion: Motion, radius: float) -> Iterator[str]:
     """The measurements of one motion as lines of Markdown."""
-    yield f"### {motion.describe()}"
+    yield f"## {motion.describe()}"
     yield ""
     yield "| mode | turned by | live, mm | RMS, mm | degrees | baked every 0.25, mm | degrees | baked every frame, mm |"
     yield "|---|---|---:|---:|---:|---:|---:|---:|"

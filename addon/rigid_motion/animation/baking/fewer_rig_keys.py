@@ -26,6 +26,7 @@ from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import (
     SMALLEST,
     FewerKeys,
+    NeedsItsKeys,
     WholeRig,
     goes_elsewhere,
     samples_of,
@@ -179,7 +180,7 @@ class _Rig:
         chosen = {number: own for number, own in chosen.items() if len(own) < len(before[number])}
         if not chosen:
             text = NO_FEWER_POSES if shared else NO_FEWER
-            raise Refused(rpt_(text).format(name=self.rig.name, frames=len(self.frames)))
+            raise NeedsItsKeys(rpt_(text).format(name=self.rig.name, frames=len(self.frames)))
         shown = self.poses.copy()
         fewer: dict[int, Source] = {}
 
