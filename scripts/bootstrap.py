@@ -11,6 +11,7 @@
     python scripts/bootstrap.py dask scheduler              many machines: Dask's own commands
     python scripts/bootstrap.py bundle hand.csv             a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    such a job, on this machine
+    python scripts/bootstrap.py examples lid                small complete cases to begin with: examples/README.md
     python scripts/bootstrap.py benchmark
     python scripts/bootstrap.py build                       dist/rigid_motion-VERSION.zip, the extension to install
 
@@ -44,6 +45,7 @@ COMMANDS = {
     "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
+    "examples": ([ROOT / "examples" / "make_examples.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
