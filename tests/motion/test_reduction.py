@@ -158,8 +158,8 @@ GOOD = wandering(20, 1)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "either a tolerance or a budget"),
-        ({"tolerance": 0.1, "budget": 4}, "either a tolerance or a budget"),
+        ({}, "needs a tolerance or a budget of keys: give one of the two$"),
+        ({"tolerance": 0.1, "budget": 4}, "give one of the two, not both"),
         ({"tolerance": 0.0}, "not a positive number"),
         ({"tolerance": float("nan")}, "not a positive number"),
         ({"budget": 1}, "too small"),

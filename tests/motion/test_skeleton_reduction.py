@@ -271,8 +271,8 @@ CHAIN = [-1, 0, 1]
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({}, "either a tolerance or a budget"),
-        ({"tolerance": 0.1, "budget": 12}, "either a tolerance or a budget"),
+        ({}, "needs a tolerance or a budget of keys: give one of the two$"),
+        ({"tolerance": 0.1, "budget": 12}, "give one of the two, not both"),
         ({"tolerance": 0.0}, "not a positive number"),
         ({"tolerance": np.nan}, "not a positive number"),
         ({"tolerance": np.inf}, "not a positive number"),

@@ -4,6 +4,7 @@ No Blender here: importable anywhere. Quaternions are w, x, y, z; positions and 
 """
 
 from .best_of import best_modes, interpolate_by_segments
+from .contacts import standing
 from .decimation import decimate
 from .fitting import fit_keys
 from .measures import Errors, measure, rms, shell_error
@@ -35,4 +36,5 @@ __all__ = [
     "repair",
     "rms",
     "shell_error",
+    "standing",
 ]

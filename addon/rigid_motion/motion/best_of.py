@@ -11,7 +11,9 @@ from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from .checks import check_poses, check_radius, check_recording, key_samples, number
 from .measures import shell_error
 from .modes import KEYFRAME_MODES, interpolate
 from .poses import Poses
@@ -24,10 +26,10 @@ ROUNDING = 1e-12
 
 
 def best_modes(
-    times: np.ndarray,
+    times: ArrayLike,
     poses: Poses,
-    keys: np.ndarray,
-    modes: Iterable[str] = KEYFRAME_MODES,
+    keys: ArrayLike,
+    modes: Iterable[str] = tuple(KEYFRAME_MODES),
     radius: float = 0.1,
     tolerance: float | None = None,
 ) -> tuple[str, ...]:
@@ -35,18 +37,20 @@ def best_modes(
 
     Parameters
     ----------
-    times : array, shape (n,)
-        Seconds, strictly rising.
+    times : array-like, shape (n,)
+        Strictly rising, in any unit.
     poses : Poses, shape (n,)
-        The recording.
-    keys : array of int, shape (k,)
-        The samples that are keys, rising, at least two. What is before the first and behind the last does not count.
+        The recording, with unit quaternions.
+    keys : array-like of int, shape (k,), or of bool, shape (n,)
+        The samples that are keys: their numbers, rising, or a mask; at least two. What is before the first and behind
+        the last does not count.
     modes : iterable of str
-        Those to choose from, of `MODES`. Of equally good ones the first is taken, or the neighbour's.
+        The names in `MODES` to choose from; all modes for keyframes where none are given. Of equally good ones the
+        first is taken, or the neighbour's.
     radius : float
         Of the shell, in the unit of the positions.
     tolerance : float, optional
-        The largest shell error at any sample. Modes that pass it are out, unless all do.
+        The largest shell error at any sample, in the unit of the positions. Modes that pass it are out, unless all do.
 
     Returns
     -------
@@ -55,12 +59,40 @@ def best_modes(
 
     Raises
     ------
+    TypeError
+        Where the recording is no `Poses`.
     ValueError
-        As `interpolate` does, and without any mode.
+        For an unknown mode or none, keys that are no rising samples or fewer than two, and samples that are not finite,
+        out of order or of no size.
+
+    See Also
+    --------
+    interpolate_by_segments : The motion that these modes make.
+    reduce_keys : Few keys, for one mode.
+
+    Examples
+    --------
+    A motion that was made of two modes is taken apart again:
+
+    >>> import numpy as np
+    >>> from rigid_motion.motion import Poses, best_modes, interpolate_by_segments
+    >>> keys = Poses([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1], [1, 0, 0, 0]])
+    >>> times = np.linspace(0, 2, 21)
+    >>> recording = interpolate_by_segments([0, 1, 2], keys, times, ["lerp_slerp", "dq_sclerp"])
+    >>> best_modes(times, recording, [0, 10, 20])
+    ('lerp_slerp', 'dq_sclerp')
     """
+    if isinstance(modes, str):
+        raise ValueError(f"modes to choose from need to be several names: of a single one make a list, [{modes!r}]")
     modes = tuple(modes)
     if not modes:
         raise ValueError("there is no mode to choose from")
+    check_radius(radius)
+    if tolerance is not None and not number(tolerance, "tolerance") > 0.0:
+        raise ValueError(f"a tolerance of {tolerance} is not a positive number")
+    times = np.asarray(times, dtype=np.float64)
+    check_recording(times, poses)
+    keys = key_samples(keys, len(times))
     samples = slice(keys[0], keys[-1] + 1)
     truth = poses[samples]
     errors = np.stack(
@@ -112,31 +144,55 @@ def _fewest_changes(acceptable: np.ndarray) -> np.ndarray:
     return np.repeat(first, np.diff(ends, prepend=-1))
 
 
-def interpolate_by_segments(key_times: np.ndarray, keys: Poses, times: np.ndarray, modes: Sequence[str]) -> Poses:
+def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike, modes: Sequence[str]) -> Poses:
     """The poses at `times` of one object whose segments have modes of their own.
 
     Parameters
     ----------
-    key_times : array, shape (k,)
-        Strictly rising.
+    key_times : array-like, shape (k,)
+        Strictly rising, in any unit.
     keys : Poses, shape (k,)
-    times : array, shape (m,)
-        In any order. Outside of the keys the end poses hold.
+        At least two, as in `interpolate`.
+    times : array-like, shape (m,)
+        In any order, in the unit of `key_times`. Outside of the keys the end poses hold.
     modes : sequence of str, k - 1 of them
-        Of `rigid_motion.motion.MODES`.
+        Names in `MODES`.
 
     Returns
     -------
     Poses, shape (m,)
+        With unit quaternions, in the unit of the keys' positions.
 
     Raises
     ------
+    TypeError
+        Where the keys are no `Poses`.
     ValueError
-        As `interpolate` does, and for another number of modes.
+        As `interpolate` does, and for another number of modes, or more than one object.
+
+    See Also
+    --------
+    best_modes : The mode of each segment that comes closest to a recording.
+    interpolate : One mode for all segments.
+
+    Examples
+    --------
+    >>> from rigid_motion.motion import Poses, interpolate_by_segments
+    >>> keys = Poses([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1], [1, 0, 0, 0]])
+    >>> shown = interpolate_by_segments([0, 1, 2], keys, [0.5, 1.5], ["lerp_slerp", "dq_sclerp"])
+    >>> shown.positions.round(6).tolist()
+    [[0.5, 0.0, 0.0], [1.5, 0.207107, 0.0]]
     """
+    check_poses(keys, "keys")
+    key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    if key_times.ndim != 1 or times.ndim != 1 or len(key_times) < 2:
+        raise ValueError("modes for segments need a row of at least two key times, and a row of times")
+    if isinstance(modes, str):
+        raise ValueError(f"{modes!r} is a single mode: give one for each segment, or use interpolate")
     if len(modes) != len(key_times) - 1:
         raise ValueError(f"{len(modes)} modes do not fit {len(key_times)} keys")
-    key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    if keys.shape != key_times.shape:
+        raise ValueError(f"key times of shape {key_times.shape} do not fit keys of shape {keys.shape}")
     modes_at_times = np.array(modes)[np.clip(np.searchsorted(key_times, times, side="right") - 1, 0, len(modes) - 1)]
     positions, quaternions = np.empty((len(times), 3)), np.empty((len(times), 4))
     scales = None if keys.scales is None else np.empty(len(times))

@@ -6,6 +6,7 @@ A foot that stands still in a recording is the first thing that is seen to move 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 LOW = 0.12
 """How far above the lowest place that any joint gets to what stands is at most, in heights of the body."""
@@ -17,21 +18,45 @@ SHORTEST = 0.1
 """Seconds that something stands at least: what only turns back is not standing."""
 
 
-def standing(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
     """Which joints stand on the ground, and when.
 
     Parameters
     ----------
-    times : array, shape (n,)
+    times : array-like, shape (n,)
         Seconds, strictly rising.
-    positions : array, shape (joints, n, 3)
-        In the world, the third axis upwards.
+    positions : array-like, shape (joints, n, 3)
+        In the world, the third axis upwards, in any unit: what is low and slow is measured by the body's height.
 
     Returns
     -------
     array of bool, shape (joints, n)
         Low and slow, for a while.
+
+    Raises
+    ------
+    ValueError
+        Where the shapes do not fit one another.
+
+    See Also
+    --------
+    reduce_skeleton_keys : Takes it for weights: feet that stand count for more.
+
+    Examples
+    --------
+    A head that goes on, and a foot that stands for half a second:
+
+    >>> import numpy as np
+    >>> from rigid_motion.motion import standing
+    >>> times = np.arange(11) / 10
+    >>> head = np.stack((times, 0 * times, 1.7 + 0 * times), axis=1)
+    >>> foot = np.stack((np.maximum(times - 0.5, 0), 0 * times, 0 * times), axis=1)
+    >>> standing(times, [head, foot]).sum(axis=1).tolist()
+    [0, 5]
     """
+    times, positions = np.asarray(times, dtype=np.float64), np.asarray(positions, dtype=np.float64)
+    if positions.ndim != 3 or (*times.shape, 3) != positions.shape[1:]:
+        raise ValueError(f"positions of shape {positions.shape} need the shape (joints, {times.size}, 3)")
     if len(times) < 2:
         return np.zeros(positions.shape[:2], dtype=bool)
     heights = positions[..., 2]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from .checks import check_times, number
 
 
-def decimate(times: np.ndarray, rate: float) -> np.ndarray:
+def decimate(times: ArrayLike, rate: float) -> np.ndarray:
     """The samples that a sender of `rate` poses a second would have sent: those nearest to its ticks.
 
     Parameters
     ----------
-    times : array, shape (n,)
-        Seconds, strictly rising.
+    times : array-like, shape (n,)
+        Seconds, strictly rising, at least one.
     rate : float
         Keys a second. The ticks start at the first sample.
 
@@ -23,10 +26,27 @@ def decimate(times: np.ndarray, rate: float) -> np.ndarray:
     Raises
     ------
     ValueError
-        For a rate that is not a positive number.
+        For a rate that is not a positive number, no times at all, and times that are not finite or do not rise. The
+        message names the sample.
+
+    See Also
+    --------
+    reduce_keys : The samples that a mode needs, unevenly in time.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rigid_motion.motion import decimate
+    >>> decimate(np.arange(10) / 90, 30).tolist()
+    [0, 3, 6, 9]
     """
+    rate = number(rate, "rate")
     if not (np.isfinite(rate) and rate > 0.0):
         raise ValueError(f"a rate of {rate} keys a second is not a positive number")
+    times = np.asarray(times, dtype=np.float64)
+    check_times(times)
+    if not len(times):
+        raise ValueError("there are no times to decimate")
     # A tick more than the duration holds would repeat the last sample; the allowance is for rounding, as in 2.0 * 0.5.
     duration = times[-1] - times[0]
     if duration * rate > 4.0 * len(times):

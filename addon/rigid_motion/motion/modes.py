@@ -4,20 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
+from .checks import check_poses
 from .poses import LIMIT, SHORTEST, Poses
 from .segments import Curves, Segments, interpolate_along, prepare_within
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One way of filling in between two keys."""
+    """One way of filling in between two keys: a row of the table `MODES`.
+
+    The formulas are in `docs/conventions.md`, and those of single modes in `algebras`. Source: Kamarianakis, Lydatakis
+    and Papagiannakis, "Never 'Drop the Ball' in the Operating Room"; the smooth modes are this program's own.
+
+    See Also
+    --------
+    interpolate : Poses between keys, in a mode that is given by its name in `MODES`.
+
+    Examples
+    --------
+    >>> from rigid_motion.motion import MODES
+    >>> MODES["motor_spline"].label, MODES["motor_spline"].is_smooth
+    ('Smooth Screw (PGA)', True)
+    >>> [name for name, mode in MODES.items() if mode.for_streams]
+    ['motor_spline_causal']
+    """
 
     number: int
     """What files store for the mode. Never changed, never used again for another; 0 is Blender's own."""
@@ -28,10 +45,10 @@ class Mode:
     description: str
     """What it does for the motion, in one sentence, as a tooltip shows it."""
 
-    curves: Callable[[Segments], Curves]
+    curves: Callable[[Segments], Curves] = field(repr=False)
     """The fast form."""
 
-    reference: Callable[[Poses, Poses, np.ndarray], Poses]
+    reference: Callable[[Poses, Poses, np.ndarray], Poses] = field(repr=False)
     """The same motion in the algebra it is named after, for single pairs of poses."""
 
     behind: int = 0
@@ -111,6 +128,7 @@ MODES: dict[str, Mode] = {
         for_streams=True,
     ),
 }
+"""Every mode, by the name that functions take it by."""
 
 KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if not mode.for_streams}
 """The modes for keys that are all known from the beginning."""
@@ -143,20 +161,27 @@ def interpolate(
     times : array-like, shape (m,) or (..., m)
         In any order, in the unit of `key_times`; the same for all objects, or a row for each.
     mode : str
-        A key of `MODES`.
+        A name in `MODES`. All are written out, with their sources, in `docs/conventions.md`.
     extrapolate : bool
         Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold.
 
     Returns
     -------
     Poses, shape (m,) or (..., m)
-        With unit quaternions. The arrays may be views that are not contiguous.
+        With unit quaternions, in the unit of the keys' positions. The arrays may be views that are not contiguous.
 
     Raises
     ------
+    TypeError
+        Where the keys are no `Poses`.
     ValueError
         For an unknown mode, shapes that do not fit, times that do not rise, numbers that are not finite, quaternions of
         length zero and scales that are not positive. The message names the key.
+
+    See Also
+    --------
+    interpolate_by_segments : A mode for each segment.
+    in_betweens : Segments at a timing of their own, such as an easing.
 
     Notes
     -----
@@ -164,9 +189,14 @@ def interpolate(
 
     Examples
     --------
-    >>> keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1]])  # a quarter turn about z
-    >>> interpolate([0, 1], keys, [0.5], "dq_sclerp").positions.round(6)
-    array([[ 0.5     , -0.207107,  0.      ]])
+    One metre along x with a quarter turn about z: the screw goes round an axis, and not along the straight line.
+
+    >>> from rigid_motion.motion import Poses, interpolate
+    >>> keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0], [1, 0, 0, 1]])
+    >>> interpolate([0, 1], keys, [0.5], "dq_sclerp").positions.round(6).tolist()
+    [[0.5, -0.207107, 0.0]]
+    >>> interpolate([0, 1], keys, [0.5], "lerp_slerp").positions.round(6).tolist()
+    [[0.5, 0.0, 0.0]]
     """
     curves_of_mode = mode_named(mode).curves
     key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
@@ -174,7 +204,9 @@ def interpolate(
     if keys.shape[-1] == 1:
         # A motion with a single key is a rest at all times: the segment from that key to itself.
         keys, key_times = keys[..., [0, 0]], np.array((0.0, 1.0))
-    if times.ndim == 0 or times.shape not in ((times.shape[-1],), keys.shape[:-1] + times.shape[-1:]):
+    if times.ndim == 0:
+        raise ValueError("times to interpolate at need the shape (m,): of a single one make a list, [time]")
+    if times.shape not in ((times.shape[-1],), keys.shape[:-1] + times.shape[-1:]):
         raise ValueError(f"times of shape {times.shape} do not fit keys of shape {keys.shape}")
     if times.size == 0:
         return keys[..., :0]
@@ -211,17 +243,33 @@ def in_betweens(
         How far each has come in its segment, from 0 at the first key to 1 at the second. Where it passes them, the
         motion of the segment goes on.
     mode : str
-        A key of `MODES`.
+        A name in `MODES`.
 
     Returns
     -------
     Poses, shape (m,)
-        One segment after the other. The arrays may be views that are not contiguous.
+        One segment after the other, with unit quaternions, in the unit of the keys' positions. The arrays may be views
+        that are not contiguous.
 
     Raises
     ------
-    ValueError
-        As `interpolate` does.
+    TypeError, ValueError
+        As `interpolate` does, and for counts that are no whole numbers from 0 on, or not of as many poses as there are
+        progresses.
+
+    See Also
+    --------
+    prepare : The same for several calls with the same keys.
+    interpolate : Poses at times.
+
+    Examples
+    --------
+    Two poses of the first segment, early as an easing has them, and one of the second:
+
+    >>> from rigid_motion.motion import Poses, in_betweens
+    >>> keys = Poses([[0, 0, 0], [1, 0, 0], [1, 2, 0]], [[1, 0, 0, 0]] * 3)
+    >>> in_betweens([0, 1, 2], keys, [2, 1], [0.01, 0.25, 0.5], "lerp_slerp").positions.round(6).tolist()
+    [[0.01, 0.0, 0.0], [0.25, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
     return prepare(key_times, keys, mode)(counts, progress)
 
@@ -229,26 +277,53 @@ def in_betweens(
 def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Callable[..., Poses]:
     """`in_betweens` for several calls with the same keys: what depends on the keys alone is worked out once.
 
+    Parameters
+    ----------
+    key_times : array-like, shape (n,) or (..., n)
+        Strictly rising, in any unit.
+    keys : Poses, shape (n,) or (..., n)
+        As in `interpolate`, at least two a row.
+    mode : str
+        A name in `MODES`.
+
     Returns
     -------
     callable
-        (counts, progress, selected=slice(None)) to Poses of shape (m,), with counts and progress as `in_betweens` takes
-        them. `selected` are the segments that they are for, counted through all objects, one after the other; its step
-        is 1 and its ends are not counted from the end.
+        From (counts, progress, selected=slice(None)) to Poses of shape (m,), with counts and progress as `in_betweens`
+        takes them. `selected` are the segments that they are for, counted through all objects, one after the other; its
+        step is 1 and its ends are not counted from the end.
 
     Raises
     ------
-    ValueError
-        As `interpolate` does; so does what is returned.
+    TypeError, ValueError
+        As `in_betweens` does; so does what is returned.
+
+    See Also
+    --------
+    in_betweens : The same in a single call.
+
+    Examples
+    --------
+    >>> from rigid_motion.motion import Poses, prepare
+    >>> segments = prepare([0, 1, 2], Poses([[0, 0, 0], [1, 0, 0], [1, 2, 0]], [[1, 0, 0, 0]] * 3), "lerp_slerp")
+    >>> segments([1, 1], [0.5, 0.5]).positions.tolist()
+    [[0.5, 0.0, 0.0], [1.0, 1.0, 0.0]]
+    >>> segments([1], [0.25], slice(1, 2)).positions.tolist()
+    [[1.0, 0.5, 0.0]]
     """
     curves_of_mode = mode_named(mode).curves
     key_times = np.asarray(key_times, dtype=np.float64)
     keys = _checked(key_times, keys)
+    if keys.shape[-1] < 2:
+        raise ValueError("in-betweens need at least two keys")
     shape = (*keys.shape[:-1], keys.shape[-1] - 1)
     within = prepare_within(curves_of_mode, key_times, keys)
 
     def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
+        """The poses (m,) of the selected segments, by how many are wanted of each and how far each of them is."""
         counts, progress = np.asarray(counts), np.asarray(progress, dtype=np.float64)
+        if counts.size and (not np.issubdtype(counts.dtype, np.integer) or counts.min() < 0):
+            raise ValueError("counts of in-betweens need to be whole numbers from 0 on, one for each segment")
         expected = shape if selected == slice(None) else (len(range(*selected.indices(math.prod(shape)))),)
         if counts.shape != expected or progress.shape != (int(counts.sum()),):
             raise ValueError(
@@ -263,6 +338,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
 
 def _checked(key_times: np.ndarray, keys: Poses) -> Poses:
     """The keys with unit quaternions, or a ValueError that names the first key that is wrong."""
+    check_poses(keys, "keys")
     if not keys.shape or keys.shape[-1] == 0:
         raise ValueError("interpolation needs at least one key")
     if key_times.shape not in (keys.shape, keys.shape[-1:]):

@@ -7,11 +7,12 @@ one object has arrays of shape (n, 3) and (n, 4), and many objects have (objects
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from .quaternions import conjugate, multiply, rotate
 
@@ -29,8 +30,10 @@ class Poses:
     Parameters
     ----------
     positions : array-like, shape (..., n, 3)
+        In any unit of length. The last of the leading axes is time: one object has (n, 3), many have (objects, n, 3).
     quaternions : array-like, shape (..., n, 4)
-        w, x, y, z. Kept as given: neither normalised nor checked for signs (see `rigid_motion.motion.repair`).
+        w, x, y, z (Hamilton's, as in `mathutils`). Kept as given: neither normalised nor checked for signs, which
+        `repair` does.
     scales : array-like, shape (..., n), optional
         Uniform scales. None means 1 everywhere, and is what every mode runs fastest with.
 
@@ -38,11 +41,42 @@ class Poses:
     ------
     ValueError
         Where the shapes do not fit one another.
+    TypeError
+        Where NumPy is to make one array of poses, or work on them as if they were one: a mean or a sum of quaternions
+        is no rotation. Take `positions` and `quaternions`.
+
+    See Also
+    --------
+    interpolate : Poses between keys.
+    repair : Unit quaternions from recorded ones.
+
+    Notes
+    -----
+    Arrays of float64 are kept, not copied; all others become float64. Whatever indexes the leading axes by NumPy's
+    rules indexes poses, a slice is a view, and a number picks a single pose, of shape (). The length of poses is that
+    of their first axis, which is also what a loop runs over; a single pose has neither. To `==`, poses are the same
+    only where they are the same object.
+
+    Examples
+    --------
+    >>> from rigid_motion.motion import Poses
+    >>> poses = Poses([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[1, 0, 0, 0]] * 3)
+    >>> poses.shape, len(poses[1:])
+    ((3,), 2)
+    >>> poses[poses.positions[:, 0] > 0.5].positions.tolist()
+    [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
+    >>> [pose.positions.tolist() for pose in poses[:2]]
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
     """
 
     positions: np.ndarray
+    """Shape (..., n, 3)."""
+
     quaternions: np.ndarray
+    """w, x, y, z, shape (..., n, 4)."""
+
     scales: np.ndarray | None = None
+    """Shape (..., n), or None for 1 everywhere."""
 
     def __init__(self, positions: ArrayLike, quaternions: ArrayLike, scales: ArrayLike | None = None) -> None:
         positions = np.asarray(positions, dtype=np.float64)
@@ -65,7 +99,26 @@ class Poses:
         return self.positions.shape[:-1]
 
     def __len__(self) -> int:
-        return len(self.positions)
+        if not self.shape:
+            raise TypeError("a single pose, of shape (), has no length")
+        return self.shape[0]
+
+    def __iter__(self) -> Iterator[Poses]:
+        """The poses along the first axis: single ones of one object, or those of each of many objects."""
+        if not self.shape:
+            raise TypeError("a single pose, of shape (), has nothing to go through")
+        return (self[index] for index in range(len(self)))
+
+    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> np.ndarray:
+        """Refuse to be one array: NumPy would take means and sums of quaternions, and leave out scales."""
+        raise TypeError(
+            "poses are no single array: take poses.positions and poses.quaternions, or rows of x, y, z, w, x, y, z by "
+            "np.concatenate((poses.positions, poses.quaternions), axis=-1)"
+        )
+
+    def __array_function__(self, function: Callable, types: tuple, args: tuple, kwargs: dict) -> np.ndarray:
+        """Refuse in words too where NumPy would keep quiet: to `np.array_equal`, what is no array is just not equal."""
+        raise TypeError(f"np.{function.__name__} takes arrays: poses.positions and poses.quaternions are some")
 
     def __getitem__(self, index: Any) -> Poses:
         """The poses at `index` of the leading axes, by NumPy's rules: `poses[3]`, `poses[mask]`, `poses[..., 1:]`."""

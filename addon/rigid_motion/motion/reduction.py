@@ -5,18 +5,18 @@ A key is a pose: all channels together. What is promised of them, and checked; `
 
 from __future__ import annotations
 
-from numbers import Integral
-
 import numpy as np
+from numpy.typing import ArrayLike
 
+from .checks import check_radius, check_recording, check_wishes
 from .key_search import Recording, Search
 from .modes import mode_named
-from .poses import LIMIT, SHORTEST, Poses
+from .poses import Poses
 from .quaternions import align_signs
 
 
 def reduce_keys(
-    times: np.ndarray,
+    times: ArrayLike,
     poses: Poses,
     mode: str = "motor_spline",
     tolerance: float | None = None,
@@ -30,12 +30,12 @@ def reduce_keys(
 
     Parameters
     ----------
-    times : array, shape (n,)
-        Seconds, strictly rising.
+    times : array-like, shape (n,)
+        Strictly rising, in any unit.
     poses : Poses, shape (n,)
         The recording, with unit quaternions.
     mode : str
-        One of `MODES`.
+        A name in `MODES`.
     tolerance : float, optional
         The largest shell error anywhere, in the unit of the positions; with `rms` the root mean square over all
         samples.
@@ -57,11 +57,43 @@ def reduce_keys(
 
     Raises
     ------
+    TypeError
+        Where the recording is no `Poses`.
     ValueError
-        Where it is not one of tolerance and budget that is given, or either or the radius is no sensible number, or a
-        sample is not finite, out of order or of no size.
+        Where not exactly one of tolerance and budget is given, the mode is unknown, either of the two or the radius is
+        no sensible number, or a sample is not finite, out of order or of no size. The message names the sample.
+
+    See Also
+    --------
+    decimate : Keys evenly in time.
+    fit_keys : Poses for the keys that are closer to the recording than its own.
+    best_modes : The mode of each segment.
+    reduce_skeleton_keys : The same for joints that hang on one another.
+
+    Notes
+    -----
+    Keys are taken out and moved as long as that lowers their number or the error (Lyche and Mørken, "Knot removal for
+    parametric B-spline curves and surfaces", 1987), and what several searches found is put together by dynamic
+    programming. It is not always the least number of keys that there is.
+
+    Examples
+    --------
+    Ninety samples of a screw need two keys where screws are what fills in, and more where straight lines are:
+
+    >>> import numpy as np
+    >>> from rigid_motion.motion import Poses, reduce_keys
+    >>> turn = np.linspace(0, np.pi / 2, 90)
+    >>> positions = np.stack((np.cos(turn), np.sin(turn), 0.1 * turn), axis=1)
+    >>> poses = Poses(positions, np.stack((np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)), axis=1))
+    >>> reduce_keys(np.arange(90) / 90, poses, "dq_sclerp", tolerance=0.005).tolist()
+    [0, 89]
+    >>> len(reduce_keys(np.arange(90) / 90, poses, "lerp_slerp", tolerance=0.005))
+    10
+    >>> len(reduce_keys(np.arange(90) / 90, poses, "lerp_slerp", budget=5))
+    5
     """
-    check_wishes(mode, tolerance, budget)
+    mode_named(mode)
+    check_wishes(tolerance, budget)
     check_radius(radius)
     times = np.asarray(times, dtype=np.float64)
     check_recording(times, poses)
@@ -70,38 +102,3 @@ def reduce_keys(
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     search = Search(Recording(times, poses, mode, radius, tolerance or 1.0), rms=rms)
     return search.within(tries) if tolerance is not None else search.within_budget(budget)
-
-
-def check_wishes(mode: str, tolerance: float | None, budget: int | None) -> None:
-    """A ValueError that says what is wrong with what is asked for."""
-    if (tolerance is None) == (budget is None):
-        raise ValueError("key reduction needs either a tolerance or a budget of keys")
-    mode_named(mode)
-    if tolerance is not None and not 1.0 / LIMIT < float(tolerance) < LIMIT:
-        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
-    if budget is not None and (isinstance(budget, bool) or not isinstance(budget, Integral)):
-        raise ValueError(f"a budget of {budget} is no whole number of keys")
-    if budget is not None and budget < 2:
-        raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")
-
-
-def check_radius(radius: float) -> None:
-    """A ValueError where the shell's radius is no length: without turns it is zero."""
-    if not 0.0 <= radius < LIMIT:
-        raise ValueError(f"a radius of {radius} is not a number from 0 to {LIMIT:g}")
-
-
-def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
-    """A ValueError that names the first sample (n,) that is wrong."""
-    if times.shape != poses.shape:
-        raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}")
-    numbers = np.column_stack((times, poses.positions, poses.quaternions))
-    finite = (np.abs(numbers) < LIMIT).all(axis=1)
-    if not finite.all():
-        raise ValueError(f"{whose}sample {int(np.argmin(finite))} is not finite, or has a number beyond {LIMIT:g}")
-    if not (turns := poses.quaternions.any(axis=1)).all():
-        raise ValueError(f"{whose}sample {int(np.argmin(turns))} has a quaternion of length zero")
-    if poses.scales is not None and not (sound := (poses.scales > 1.0 / LIMIT) & (poses.scales < LIMIT)).all():
-        raise ValueError(f"{whose}sample {int(np.argmin(sound))} has a scale that is not a positive number")
-    if np.any(early := np.diff(times) <= SHORTEST):
-        raise ValueError(f"{whose}sample {int(np.argmax(early)) + 1} is not later than the one before it")

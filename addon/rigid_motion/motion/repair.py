@@ -9,7 +9,9 @@ from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from .checks import check_poses
 from .poses import SHORTEST, Poses
 from .quaternions import align_signs, normalise
 
@@ -37,7 +39,19 @@ UNIT_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Repair:
-    """One kind of fault that was found."""
+    """One kind of fault that was found. As a string it is a sentence.
+
+    See Also
+    --------
+    repair : What finds and repairs it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rigid_motion.motion import Repair
+    >>> print(Repair("undid sign flips of quaternions", np.array([3, 8])))
+    undid sign flips of quaternions (2: row 3, 8)
+    """
 
     fault: str
     """What it was, and what was done about it."""
@@ -50,15 +64,16 @@ class Repair:
         return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > MOST_NAMED else ''})"
 
 
-def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Repair]]:
+def repair(times: ArrayLike, poses: Poses) -> tuple[np.ndarray, Poses, list[Repair]]:
     """Make a recording fit for interpolation.
 
     Parameters
     ----------
-    times : array, shape (n,)
+    times : array-like, shape (n,)
         Seconds, as recorded.
     poses : Poses, shape (n,) or (joints, n)
-        As recorded: rows of NaN, quaternions of any length and sign. Of several joints a row is as good as its worst.
+        As recorded, in any unit: rows of NaN, quaternions of any length and sign. Of several joints a row is as good as
+        its worst.
 
     Returns
     -------
@@ -69,12 +84,40 @@ def repair(times: np.ndarray, poses: Poses) -> tuple[np.ndarray, Poses, list[Rep
     repairs : list of Repair
         What was done, in the order it was done; empty for a recording without a fault.
 
+    Raises
+    ------
+    TypeError
+        Where the recording is no `Poses`.
+    ValueError
+        Where there are not as many times as poses. No other fault of a recording is an error.
+
+    See Also
+    --------
+    reduce_keys : Few keys of a repaired recording.
+
     Notes
     -----
     Of several rows with one time the last is kept, being the newest. Of times that run backwards, as few rows are
     dropped as can be, so that one wild time stamp does not cost the rest of the recording; nor does one at an end make
     it last for years. Gaps stay gaps.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rigid_motion.motion import Poses, repair
+    >>> poses = Poses([[0, 0, 0], [np.nan, 0, 0], [2, 0, 0]], [[2, 0, 0, 0], [1, 0, 0, 0], [-1, 0, 0, 0]])
+    >>> times, poses, repairs = repair([0.0, 0.1, 0.2], poses)
+    >>> poses.quaternions[:, 0].tolist()
+    [1.0, 1.0]
+    >>> times.tolist(), len(repairs)
+    ([0.0, 0.2], 3)
+    >>> print(repairs[0])
+    dropped rows with numbers that are missing, not finite or too large (1: row 1)
     """
+    check_poses(poses, "poses")
+    times = np.asarray(times, dtype=np.float64)
+    if times.ndim != 1 or poses.shape[-1:] != times.shape:
+        raise ValueError(f"times of shape {times.shape} do not fit poses of shape {poses.shape}")
     repairs: list[Repair] = []
     rows = np.arange(len(times))
 

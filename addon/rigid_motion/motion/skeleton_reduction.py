@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .checks import check_poses, check_recording, check_wishes
 from .key_search import Keys, Recording, Search
 from .measures import shell_error
-from .modes import interpolate
+from .modes import interpolate, mode_named
 from .poses import LIMIT, PackedPoses, Poses, inverse, placed
 from .quaternions import align_signs, normalise
-from .reduction import check_recording, check_wishes
 from .skeletons import Skeleton
 
 SOME_TURN = 1e-12
@@ -56,17 +56,17 @@ def reduce_skeleton_keys(
     Parameters
     ----------
     times : array-like, shape (n,)
-        Seconds, strictly rising.
+        Strictly rising, in any unit.
     poses : Poses, shape (joints, n)
         The recording: each joint in its parent's space, with unit quaternions.
     parents : array-like of int, shape (joints,)
         The number of each joint's parent, -1 for roots.
     mode : str
-        What fills in between keys, one of `MODES`.
+        What fills in between keys, a name in `MODES`.
     tolerance : float, optional
         The largest shell error of any joint at any sample, in the root's space and in the unit of the positions.
     radius : float or array-like, shape (joints,)
-        Of the ball at each joint that the shell error is of.
+        Of the ball at each joint that the shell error is of, in the unit of the positions.
     shared : bool
         Key poses: all joints have keys at the same samples. Otherwise each has its own, the fewest in all.
     budget : int, optional
@@ -88,11 +88,39 @@ def reduce_skeleton_keys(
 
     Raises
     ------
+    TypeError
+        Where the recording is no `Poses`.
     ValueError
         As `reduce_keys` does, and where joints hang on one another in a circle, or radii or weights make no sense. The
         message names the joint.
+
+    See Also
+    --------
+    reduce_keys : The same for one object.
+    standing : Which joints stand on the ground, for weights.
+
+    Notes
+    -----
+    The error in the space of the whole object is that of the Animation Compression Library; key poses that bodies share
+    are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019.
+
+    Examples
+    --------
+    An elbow that turns evenly about its z axis, on a shoulder that stays where it is:
+
+    >>> import numpy as np
+    >>> from rigid_motion.motion import Poses, reduce_skeleton_keys
+    >>> turn = np.linspace(0, np.pi / 2, 30)
+    >>> positions = np.tile([[[0, 0, 1.4]], [[0.3, 0, 0]]], (1, 30, 1))
+    >>> elbow = np.stack((np.cos(turn / 2), 0 * turn, 0 * turn, np.sin(turn / 2)), axis=1)
+    >>> poses = Poses(positions, [np.tile([1, 0, 0, 0], (30, 1)), elbow])
+    >>> keys = reduce_skeleton_keys(np.arange(30) / 30, poses, [-1, 0], "dq_sclerp", tolerance=0.002)
+    >>> [samples.tolist() for samples in keys]
+    [[0], [0, 29]]
     """
-    check_wishes(mode, tolerance, budget)
+    mode_named(mode)
+    check_wishes(tolerance, budget)
+    check_poses(poses, "poses")
     skeleton, times = Skeleton(parents), np.asarray(times, dtype=np.float64)
     if poses.shape != (len(skeleton), *times.shape):
         raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
@@ -103,7 +131,7 @@ def reduce_skeleton_keys(
     if not np.any(weights > 0.0):
         raise ValueError("every joint has a weight of 0: nothing would matter")
     weights = np.broadcast_to(weights if weights.ndim == 2 else weights[:, None], poses.shape)
-    free = ~np.broadcast_to(np.asarray(False if fixed is None else fixed, dtype=bool), (len(skeleton),))
+    free = ~_mask(fixed, len(skeleton))
     if budget is not None and not shared and budget < 2 * np.count_nonzero(free):
         raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     if len(times) <= 1:
@@ -403,6 +431,17 @@ def _moves(poses: Poses) -> np.ndarray:
         axis=1
     )
     return changes if poses.scales is None else changes | (np.ptp(poses.scales, axis=1) > 0.0)
+
+
+def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
+    """Which joints are fixed, shape (joints,). Numbers of joints are refused: 0 and 1 could mean either."""
+    mask = np.zeros(joints, dtype=bool) if fixed is None else np.asarray(fixed)
+    if mask.dtype != bool or mask.shape not in ((), (joints,)):
+        raise ValueError(
+            f"fixed needs True or False for each of {joints} joints: np.isin(np.arange({joints}), fixed) makes that of "
+            "numbers of joints"
+        )
+    return np.broadcast_to(mask, (joints,))
 
 
 def _one_for_each(numbers: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:

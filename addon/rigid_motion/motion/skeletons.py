@@ -11,20 +11,38 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .checks import check_poses
 from .poses import Poses, placed
 
 
 class Skeleton:
-    """Who hangs on whom.
+    """Which joint hangs on which, and where that puts them.
 
     Parameters
     ----------
     parents : array-like of int, shape (joints,)
+        The number of each joint's parent, -1 for roots, in any order.
 
     Raises
     ------
     ValueError
         Where a parent is no joint, or joints hang on one another in a circle. The message names the joint.
+
+    See Also
+    --------
+    reduce_skeleton_keys : Few keys for all joints of a skeleton.
+
+    Examples
+    --------
+    A hip, a knee below it, and a head that hangs on nothing:
+
+    >>> from rigid_motion.motion import Poses, Skeleton
+    >>> skeleton = Skeleton([-1, 0, -1])
+    >>> skeleton, len(skeleton), skeleton.depths.tolist()
+    (Skeleton([-1, 0, -1]), 3, [0, 1, 0])
+    >>> poses = Poses([[[0, 0, 1]], [[0, 0, -0.5]], [[0, 0, 1.75]]], [[[1, 0, 0, 0]]] * 3)
+    >>> skeleton.in_root_space(poses).positions[:, 0].tolist()
+    [[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [0.0, 0.0, 1.75]]
     """
 
     def __init__(self, parents: ArrayLike) -> None:
@@ -41,6 +59,9 @@ class Skeleton:
 
     def __len__(self) -> int:
         return len(self.parents)
+
+    def __repr__(self) -> str:
+        return f"Skeleton({self.parents.tolist()})"
 
     def _depths(self) -> np.ndarray:
         depths, above = np.zeros(len(self.parents), dtype=np.int64), self.parents
@@ -67,7 +88,28 @@ class Skeleton:
         return [np.flatnonzero(row) for row in hangs]
 
     def in_root_space(self, poses: Poses) -> Poses:
-        """Where joints are that have these poses (joints, ...) in their parents' space."""
+        """Where joints are that have these poses in their parents' space.
+
+        Parameters
+        ----------
+        poses : Poses, shape (joints, ...)
+            With unit quaternions.
+
+        Returns
+        -------
+        Poses, shape (joints, ...)
+            In the space that the poses of roots are given in.
+
+        Raises
+        ------
+        TypeError
+            Where they are no `Poses`.
+        ValueError
+            Where there are not as many as joints.
+        """
+        check_poses(poses, "poses")
+        if poses.shape[:1] != (len(self),):
+            raise ValueError(f"poses of shape {poses.shape} do not fit {len(self)} joints, which come first")
         there = poses.copy()
         for joints in self.levels[1:]:
             there[joints] = placed(there[self.parents[joints]], poses[joints])

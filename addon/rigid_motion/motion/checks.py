@@ -1,0 +1,124 @@
+"""Checks of what callers give: each error names the argument or the sample, what is wrong with it, and the way out."""
+
+from __future__ import annotations
+
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .poses import LIMIT, SHORTEST, Poses
+
+KEYS_WANTED = "give rising numbers of samples, as reduce_keys and decimate return them, or a mask of all samples"
+
+
+def check_poses(poses: Poses, name: str) -> None:
+    """A TypeError where an argument of this name is an array, a list or something else instead of poses."""
+    if not isinstance(poses, Poses):
+        raise TypeError(f"{name} need to be Poses, not {type(poses).__name__}: Poses(positions, quaternions)")
+
+
+def check_times(times: np.ndarray, whose: str = "") -> None:
+    """A ValueError that names the first of some times (n,) that is not later than the one before it."""
+    if times.ndim != 1:
+        raise ValueError(f"times of shape {times.shape}: give one row of them, in seconds")
+    if not (finite := np.abs(times) < LIMIT).all():
+        raise ValueError(f"{whose}sample {int(np.argmin(finite))} has a time that is not finite, or beyond {LIMIT:g}")
+    if np.any(early := np.diff(times) <= SHORTEST):
+        raise ValueError(f"{whose}sample {int(np.argmax(early)) + 1} is not later than the one before it")
+
+
+def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
+    """A ValueError that names the first sample (n,) that is wrong."""
+    check_poses(poses, "poses")
+    if times.shape != poses.shape or times.ndim != 1:
+        raise ValueError(f"{times.size} times do not fit poses of shape {poses.shape}: one object has a row of each")
+    numbers = np.column_stack((times, poses.positions, poses.quaternions))
+    finite = (np.abs(numbers) < LIMIT).all(axis=1)
+    if not finite.all():
+        raise ValueError(f"{whose}sample {int(np.argmin(finite))} is not finite, or has a number beyond {LIMIT:g}")
+    if not (turns := poses.quaternions.any(axis=1)).all():
+        raise ValueError(f"{whose}sample {int(np.argmin(turns))} has a quaternion of length zero")
+    if poses.scales is not None and not (sound := (poses.scales > 1.0 / LIMIT) & (poses.scales < LIMIT)).all():
+        raise ValueError(f"{whose}sample {int(np.argmin(sound))} has a scale that is not a positive number")
+    check_times(times, whose)
+
+
+def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
+    """Which of so many samples are keys, as rising numbers, shape (k,), k at least 2.
+
+    Parameters
+    ----------
+    keys : array-like of int, shape (k,), or of bool, shape (samples,)
+        Numbers of samples, or a mask of them.
+    samples : int
+
+    Raises
+    ------
+    ValueError
+        For anything else. Whole numbers that are floats are refused as well: they could be times.
+    """
+    try:
+        given = np.asarray(keys)
+    except ValueError:
+        raise ValueError(f"keys are rows of different lengths: {KEYS_WANTED}, of one object at a time") from None
+    if given.ndim != 1:
+        raise ValueError(f"keys have the shape {given.shape}, not (k,): {KEYS_WANTED}")
+    if given.dtype == bool:
+        if len(given) != samples:
+            raise ValueError(f"keys are a mask of {len(given)} samples, and the recording has {samples}")
+        given = np.flatnonzero(given)
+    if len(given) < 2:
+        raise ValueError(f"{len(given)} keys are too few: a motion begins and ends with one")
+    if np.issubdtype(given.dtype, np.floating):
+        raise ValueError(
+            "keys are floats, and could be times: np.searchsorted(times, keys) finds the samples of times, and "
+            "np.asarray(keys).astype(int) makes whole numbers of numbers of samples"
+        )
+    if not np.issubdtype(given.dtype, np.integer):
+        raise ValueError(f"keys have the type {given.dtype}: {KEYS_WANTED}")
+    if (wrong := (given < 0) | (given >= samples)).any():
+        key = int(np.argmax(wrong))
+        raise ValueError(f"key {key} is sample {given[key]}, and the samples are those from 0 to {samples - 1}")
+    numbers = given.astype(np.int64)
+    if (falls := np.diff(numbers) <= 0).any():
+        key = int(np.argmax(falls)) + 1
+        raise ValueError(
+            f"the keys are not rising: key {key} is sample {numbers[key]}, after sample {numbers[key - 1]}; "
+            "np.unique(keys) puts them in order"
+        )
+    return numbers
+
+
+def check_wishes(tolerance: float | None, budget: int | None) -> None:
+    """A ValueError that says what is wrong with what is asked of key reduction."""
+    if tolerance is None and budget is None:
+        raise ValueError("key reduction needs a tolerance or a budget of keys: give one of the two")
+    if tolerance is not None and budget is not None:
+        raise ValueError("key reduction goes by a tolerance or by a budget of keys: give one of the two, not both")
+    if tolerance is not None and not 1.0 / LIMIT < number(tolerance, "tolerance") < LIMIT:
+        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
+    if budget is not None and (isinstance(budget, bool) or not isinstance(budget, Integral)):
+        raise ValueError(f"a budget of {budget} is no whole number of keys")
+    if budget is not None and budget < 2:
+        raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")
+
+
+def check_radius(radius: float) -> None:
+    """A ValueError where the shell's radius is no length: without turns it is zero."""
+    if not 0.0 <= number(radius, "radius") < LIMIT:
+        raise ValueError(f"a radius of {radius} is not a number from 0 to {LIMIT:g}")
+
+
+def check_radii(radii: ArrayLike) -> None:
+    """The same of one radius or many, in an array of any shape."""
+    for radius in np.unique(np.asarray(radii)):
+        check_radius(radius)
+
+
+def number(value: float, name: str) -> float:
+    """One number, or a ValueError where an argument of this name is none, such as "5mm"."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"a {name} of {value!r} is not a number, in the unit of the recording") from None

@@ -1,0 +1,76 @@
+"""Makes modes.ipynb from the cells of modes.py, and runs it, so that what the notebook shows came out of this checkout.
+Its first picture is modes.png, for the page beside it.
+
+    pip install ".[notebook]"
+    python examples/modes_in_python/make_notebook.py
+
+Made twice with the same packages it is the same file, byte for byte: without times, and with cells that are counted.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+CHECKOUT = HERE.parents[1]
+SOURCE, NOTEBOOK, PICTURE = HERE / "modes.py", HERE / "modes.ipynb", HERE / "modes.png"
+
+LONGEST = 300
+"""Seconds that a cell may take."""
+
+PALETTE = 64
+"""Colours of a picture: enough for smooth lines, and a third of the bytes."""
+
+
+def cells(source: str) -> Iterator[tuple[str, str]]:
+    """The cells of a script, from one `# %%` to the next: "markdown" or "code", and the text."""
+    for cell in re.split(r"^# %%", source, flags=re.MULTILINE)[1:]:
+        head, text = cell.split("\n", 1)
+        if head.strip() == "[markdown]":
+            yield "markdown", re.sub(r"^# ?", "", text.strip(), flags=re.MULTILINE)
+        else:
+            yield "code", text.strip()
+
+
+def smaller(png: bytes) -> bytes:
+    """The same picture in few colours."""
+    from PIL import Image
+
+    picture = Image.open(io.BytesIO(png)).convert("RGB").quantize(PALETTE, dither=Image.Dither.NONE)
+    saved = io.BytesIO()
+    picture.save(saved, "png", optimize=True)
+    return saved.getvalue()
+
+
+def main() -> None:
+    """Write the notebook with the outputs of its cells."""
+    import nbformat
+    from nbclient import NotebookClient
+
+    notebook = nbformat.v4.new_notebook()
+    new = {"markdown": nbformat.v4.new_markdown_cell, "code": nbformat.v4.new_code_cell}
+    found = cells(SOURCE.read_text(encoding="utf-8"))
+    notebook.cells = [new[kind](text, id=f"cell-{number}") for number, (kind, text) in enumerate(found)]
+    notebook.metadata.kernelspec = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    # The kernel is a process of its own: it takes the packages from this checkout too, whatever is installed.
+    packages = [str(CHECKOUT / "addon"), str(CHECKOUT / "scripts")]
+    os.environ["PYTHONPATH"] = os.pathsep.join([*packages, os.environ.get("PYTHONPATH", "")]).rstrip(os.pathsep)
+    NotebookClient(notebook, timeout=LONGEST, record_timing=False).execute()
+    notebook.metadata.pop("language_info", None)
+    outputs = [output.get("data", {}) for cell in notebook.cells for output in cell.get("outputs", ())]
+    shown = [data for data in outputs if "image/png" in data]
+    for data in shown:
+        data["image/png"] = base64.b64encode(smaller(base64.b64decode(data["image/png"]))).decode()
+    PICTURE.write_bytes(base64.b64decode(shown[0]["image/png"]))
+    nbformat.validate(notebook)
+    NOTEBOOK.write_text(nbformat.writes(notebook) + "\n", encoding="utf-8")
+    print(f"{NOTEBOOK}: {NOTEBOOK.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,93 @@
+"""What is public says what it takes, gives and refuses, and its examples are true."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rigid_motion import motion
+from rigid_motion.motion import MODES, Skeleton, best_modes
+
+ADDON = Path(__file__).resolve().parents[2] / "addon"
+CALLABLES = sorted(name for name in motion.__all__ if callable(getattr(motion, name)))
+FUNCTIONS = [name for name in CALLABLES if inspect.isfunction(getattr(motion, name))]
+
+ALONE = """
+import sys
+import numpy
+before = {name.split(".")[0] for name in sys.modules}
+import rigid_motion.motion
+print(*sorted({name.split(".")[0] for name in sys.modules} - before - sys.stdlib_module_names))
+"""
+
+
+def sections(name: str) -> dict[str, str]:
+    """Heading to text of a docstring."""
+    parts = re.split(r"^(\w[\w ]*)\n-+$", inspect.getdoc(getattr(motion, name)), flags=re.MULTILINE)
+    return {heading: text.strip("\n") for heading, text in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def entries(text: str) -> list[str]:
+    """The names that a section of a docstring is about: what stands at the margin, before a colon."""
+    heads = [line.split(" : ")[0] for line in text.splitlines() if line and not line.startswith(" ")]
+    return [name for head in heads for name in head.split(", ")]
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_the_examples_of_what_is_public_are_true(name):
+    documented = getattr(motion, name)
+    # In a namespace of its own, as whoever copies an example has it.
+    found = doctest.DocTestFinder(recurse=False).find(documented, name, globs={})
+    runner = doctest.DocTestRunner(verbose=False)
+    report: list[str] = []
+    for example in found:
+        runner.run(example, out=report.append)
+    assert runner.tries > 0, f"{name} has no example"
+    assert runner.failures == 0, "".join(report)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_argument_is_described_and_none_that_is_not_there(name):
+    described = entries(sections(name)["Parameters"])
+    assert described == list(inspect.signature(getattr(motion, name)).parameters)
+
+
+@pytest.mark.parametrize("name", sorted({*FUNCTIONS, "Poses", "Skeleton"} - {"rms"}))
+def test_errors_are_described(name):
+    assert set(entries(sections(name)["Raises"])) <= {"TypeError", "ValueError"}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_results_are_described(name):
+    assert sections(name)["Returns"]
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_what_to_see_also_is_public(name):
+    assert set(entries(sections(name)["See Also"])) <= set(motion.__all__) - {name}
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_no_signature_shows_an_address(name):
+    assert " at 0x" not in str(inspect.signature(getattr(motion, name)))
+
+
+def test_the_modes_to_choose_from_are_named_in_the_signature():
+    assert inspect.signature(best_modes).parameters["modes"].default == tuple(motion.KEYFRAME_MODES)
+
+
+@pytest.mark.parametrize("value", [*MODES.values(), Skeleton([-1, 0])], ids=str)
+def test_what_a_prompt_shows_can_be_read(value):
+    assert " at 0x" not in repr(value)
+
+
+def test_motion_needs_numpy_alone_and_warns_of_nothing():
+    command = [sys.executable, "-W", "error", "-c", ALONE]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ADDON)
+    assert (done.returncode, done.stdout.split(), done.stderr) == (0, ["rigid_motion"], "")
