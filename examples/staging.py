@@ -27,6 +27,9 @@ from tests.rigs import figure
 
 RESOLUTION = 960, 540
 
+VIEW = 13.0, (0.08, 0.0)
+"""Zoom and offset of the view through the camera: the frame fills what the sidebar leaves of the viewport."""
+
 BLENDER, RIGID = "#C9CED6", "#38B6FF"
 """The colours of what Blender's own in-betweens move, and of what a mode of Rigid Motion does."""
 
@@ -73,7 +76,6 @@ def look(middle: Sequence[float], degrees: Sequence[float], width: float) -> bpy
     camera.location = Vector(middle) + turn @ Vector((0.0, 0.0, 4.0 * width))
     data = camera.data
     data.type, data.sensor_fit, data.ortho_scale, data.clip_end = "ORTHO", "HORIZONTAL", width, 20.0 * width
-    data.passepartout_alpha = 1.0
     return camera
 
 
@@ -141,18 +143,35 @@ def length(metres: float) -> str:
 
 
 def finish(
-    options: argparse.Namespace, name: str, active: bpy.types.Object, still: int, bone: str | None = None
+    options: argparse.Namespace,
+    name: str,
+    active: bpy.types.Object,
+    still: int,
+    *,
+    bone: str | None = None,
+    dress: Callable[[], None] | None = None,
 ) -> None:
-    """Save the scene as it shall open, with an object or bone selected, and render its picture where asked to."""
+    """Save the scene as it shall open, and render its picture where asked to.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    name : str
+        Of the example.
+    active : bpy.types.Object
+        What is selected.
+    still : int
+        The frame of the picture.
+    bone : str, optional
+        What is selected in Pose Mode, of a rig.
+    dress : callable, optional
+        Adds what is in the picture alone.
+    """
     scene = bpy.context.scene
-    scene.frame_set(still)
-    if options.picture:
-        kept = scene.render.filepath
-        render_still(scene, options.output / f"{name}.png")
-        scene.render.filepath = kept
     scene.frame_set(scene.frame_start)
     for obj in scene.objects:
         obj.select_set(obj == active)
+        obj.hide_set(obj.type == "LIGHT")
     bpy.context.view_layer.objects.active = active
     if bone is not None:
         bpy.ops.object.mode_set(mode="POSE")
@@ -160,17 +179,23 @@ def finish(
     _open_in_camera_view()
     save_blend(options.output / f"{name}.blend")
     print(f"written: {name}.blend")
+    if options.picture:
+        if dress is not None:
+            dress()
+        scene.frame_set(still)
+        render_still(scene, options.output / f"{name}.png")
 
 
 def _open_in_camera_view() -> None:
     """Have every 3D viewport look through the camera, in the colours of the materials, with its sidebar open."""
     for screen in bpy.data.screens:
         for space in (space for area in screen.areas for space in area.spaces if space.type == "VIEW_3D"):
-            space.region_3d.view_perspective = "CAMERA"
+            region = space.region_3d
+            region.view_perspective, region.view_camera_zoom, region.view_camera_offset = "CAMERA", *VIEW
             shading = space.shading
             shading.type, shading.light = "SOLID", "STUDIO"
             shading.studio_light, shading.color_type = "paint.sl", "MATERIAL"
             shading.background_type = "WORLD"
             space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
-            space.overlay.show_relationship_lines = False
+            space.overlay.show_relationship_lines = space.overlay.show_cursor = False
             space.show_region_ui = True

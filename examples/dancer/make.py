@@ -58,13 +58,14 @@ def main(arguments: list[str] | None = None) -> None:
     for (name, colour, place), text in zip(LANES, says, strict=True):
         staging.title(camera, place / WIDTH - 0.22, name, text, colour)
         print(f"{name}: {text}")
-    staging.foot(
-        camera, "No joint is off by more than 10 mm on any frame.   Behind: the three key poses before this frame"
-    )
-    if options.picture:
+    staging.foot(camera, "No joint is off by more than 10 mm on any frame")
+
+    def dress() -> None:
+        staging.write(camera, "Behind: the key poses before this frame", 0.019, -0.262, 0.02, palette.DARK.faint)
         for frame in poses[poses < STILL][-GHOSTS:]:
             ghost(reduced.children[0], int(frame))
-    staging.finish(options, "dancer", reduced, STILL, bone="DEF-hand.R")
+
+    staging.finish(options, "dancer", reduced, STILL, bone="DEF-hand.R", dress=dress)
 
 
 def measure(recorded: bpy.types.Object, reduced: bpy.types.Object) -> float:
