@@ -1,22 +1,23 @@
-"""Set up everything that Rigid Motion needs in a folder of its own, then run a part of it. Needs Python and pip only.
+"""Set up everything that Rigid Motion needs in a folder of its own, then run a command. Needs Python and pip only.
 
-    python scripts/bootstrap.py compare                     the main job, on the recordings in assets/
+    python scripts/bootstrap.py compare                     compare the modes, on the recordings in assets/
     python scripts/bootstrap.py compare hand.csv --axes unity --output renders/hand
-    python scripts/bootstrap.py paper                       the paper's figures and its table, reproduced
-    python scripts/bootstrap.py test                        the tests
-    python scripts/bootstrap.py test --blender 4.5.15       the tests, on another Blender
-    python scripts/bootstrap.py bake shot.blend             in-betweens into real keys, or back, in .blend files
-    python scripts/bootstrap.py stream --help               a recording over a network, in real time
-    python scripts/bootstrap.py tasks list renders/hand     the tasks of a comparison, and what is done of them
-    python scripts/bootstrap.py dask scheduler              many machines: Dask's own commands
-    python scripts/bootstrap.py bundle hand.csv             a comparison as a job for render farms
-    python scripts/bootstrap.py openjd run template.json    such a job, on this machine
-    python scripts/bootstrap.py examples lid                small complete cases to begin with: examples/README.md
-    python scripts/bootstrap.py benchmark
-    python scripts/bootstrap.py build                       dist/rigid_motion-VERSION.zip, the extension to install
+    python scripts/bootstrap.py paper                       reproduce the paper's figures and its table
+    python scripts/bootstrap.py test                        run the tests
+    python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
+    python scripts/bootstrap.py bake shot.blend             turn in-betweens of .blend files into real keys, or back
+    python scripts/bootstrap.py stream --help               send a recording over a network, in real time
+    python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
+    python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
+    python scripts/bootstrap.py bundle hand.csv             write a comparison as a job for render farms
+    python scripts/bootstrap.py openjd run template.json    run such a job on this machine
+    python scripts/bootstrap.py examples lid                make small complete cases to begin with: examples/README.md
+    python scripts/bootstrap.py benchmark                   measure how fast the modes are
+    python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
+    python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
 
-The packages go into .venv/ of this checkout; the first run downloads about 400 MB. What is behind the command goes to
-it: `python scripts/bootstrap.py compare --help` shows the options of compare.
+The packages go into .venv/ of this checkout; the first run downloads about 400 MB. All arguments after the command are
+passed on to it: `python scripts/bootstrap.py compare --help` shows the options of compare.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
     "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
-    "test": (["-m", "pytest"], ("test", "farm")),
+    "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
@@ -47,6 +48,7 @@ COMMANDS = {
     "openjd": (["-m", "openjd"], ("farm",)),
     "examples": ([ROOT / "examples" / "make_examples.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
+    "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 

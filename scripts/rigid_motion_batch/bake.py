@@ -1,7 +1,7 @@
 """Bake rigid in-betweens into real keys, or take that back, in .blend files and without a window.
 
-In every file each object and each pose bone with rigid-motion modes gets keys that any program plays; its own keys
-stay in the file for the way back. The result is a new file beside the old one, which stays as it is.
+In each file, every object and every pose bone with rigid-motion modes gets keys that any program can play. Its own keys
+stay in the file, so that it can be un-baked. The result is a new file beside the old one, which stays as it is.
 """
 
 from __future__ import annotations
@@ -76,33 +76,32 @@ examples:
   blender --background --python scripts/bake.py -- shot.blend
 
 what is written:
-  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. It takes its place when it is whole, and was
-  opened again to make sure. A file that is there already is left alone without --overwrite, and one that is read-only
-  with it. With --in-place the file itself is replaced in the same way, and the one before kept as NAME.blend1. A file
-  in which there is nothing to do is not written. What was written is printed on the standard output at the end, a path
-  a line; everything else is on the standard error.
-  Textures and libraries are found from the new place too. A relative output path of the render, and disk caches of
-  simulations (blendcache_NAME), go by the place and the name of the file, as after Save As.
+  NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. The program opens the new file again to check
+  it, and then moves it into place. It replaces an existing file only with --overwrite, and never one that is
+  read-only. With --in-place it replaces the file itself in the same way, and keeps the one before as NAME.blend1. A
+  file in which there is nothing to do is not written. At the end the paths that were written are printed on standard
+  output, one a line; everything else goes to standard error.
+  Textures and libraries are found from the new place, too. A relative output path of the render, and disk caches of
+  simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
 
 what is run:
-  Nothing of the files: scripts and Python expressions in them stay switched off, and stay in them. Where a farm
-  is to run them, it renders with `blender --enable-autoexec`. Baking reads keys, and needs none of them.
+  Nothing in the files: scripts and Python expressions stay in them, switched off. If a farm should run them, let it
+  render with `blender --enable-autoexec`. Baking reads keys, and needs no scripts.
 
 missing libraries:
-  Each is named, with what is missing from it. An object that is missing, that overrides a missing one or moves by a
-  missing Action, cannot be looked at, so it counts as one that could not be done; so does a file that lacks a
-  collection or a scene, which may hold such objects, unless --objects says which are meant. The other objects are
-  done and written, and the file still knows its libraries. Missing meshes, materials, textures and the like are no
-  concern of baking, and do not change the exit code.
+  Each is named, with what is missing from it. An object counts as not done if it is missing, if it overrides a missing
+  one or moves by a missing Action. So does a file that lacks a collection or a scene, which may hold such objects,
+  unless --objects says which ones you mean. The other objects are baked and written, and the file keeps its links.
+  Missing meshes, materials, textures and the like do not matter for baking, and do not change the exit code.
 
 exit code:
-  0    all done, or nothing to do, so that one can go on:
+  0    all done, or nothing to do, so that a second command may follow:
        python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
   1    some objects, bones or files could not be done, and are named with the reason: a driven channel, an infinite
-       key, a missing library, one damaged file of many, a disk that is full, an --objects NAME that nothing has. The
-       others are done.
+       key, a missing library, one damaged file of many, a full disk, an --objects NAME that nothing has. The others
+       are done.
   2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM: the files that were written by then are whole, nothing else was touched
+  130  stopped by Ctrl-C, and 143 by SIGTERM: the files written by then are complete, nothing else was changed
 """
 
 

@@ -3,13 +3,13 @@
     python scripts/benchmark.py
     python scripts/benchmark.py --rounds 30 --output docs/benchmark.md
 
-Each way starts from the keys (positions and quaternions) and ends with positions and quaternions. All take turns,
-round by round, so that a machine that slows down slows all of them; a figure is a way's fastest round, and what counts
-are the ratios. "In the algebra" is the mode written out in NumPy as in the paper, for every in-between anew (this
-program's own reference); "closed form" is the best formula known to this program without a table of segments.
-Key reduction is timed on made-up recordings of growing length, beside the greedy insertion that one would write first;
-real recordings and whole bodies are timed by `scripts/reduction.py`.
-Needs the packages of the "test" extra; pypose (its SE(3) B-spline) is measured where it is installed.
+Each way of computing starts from the keys (positions and quaternions) and ends with positions and quaternions. All ways
+take turns, round by round, so that a machine that slows down slows all of them. The number is that of a way's fastest
+round; compare the ratios. "In the algebra" is the mode written out in NumPy as in the paper, computed anew for every
+in-between (this program's own reference); "closed form" is the best formula known to this program without a table of
+segments. Key reduction is timed on made-up recordings of growing length, beside the greedy insertion that one would
+write first; `scripts/reduction.py` times real recordings and whole bodies. It needs the packages of the "test" extra;
+pypose (its SE(3) B-spline) is measured where it is installed.
 """
 
 from __future__ import annotations
@@ -234,7 +234,7 @@ def race(contestants: dict[tuple[str, str], Callable[[], object]], rounds: int) 
 def report(case: Case, seconds: dict[tuple[str, str], list[float]]) -> Iterator[str]:
     """The case as lines of Markdown: million poses a second, and this program's multiple of each peer."""
     fastest = {name: min(times) for name, times in seconds.items()}
-    yield f"### {case.title[0].upper()}{case.title[1:]}"
+    yield f"## {case.title[0].upper()}{case.title[1:]}"
     yield ""
     yield f"{case.in_betweens} in-betweens from {case.keys.shape[0] * case.keys.shape[1]} keys."
     yield ""
@@ -292,7 +292,7 @@ def greedy(times: np.ndarray, poses: Poses, tolerance: float) -> np.ndarray:
 
 def reductions(counts: tuple[int, ...], tolerance: float = 0.005) -> Iterator[str]:
     """Key reduction as lines of Markdown, beside greedy insertion."""
-    yield "### Key reduction"
+    yield "## Key reduction"
     yield ""
     yield (
         f"A made-up hand at 90 samples a second, `motor_spline` within {tolerance * 1e3:g} mm at a radius of 0.1 m; "

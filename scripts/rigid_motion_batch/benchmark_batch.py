@@ -4,13 +4,13 @@
     python scripts/benchmark_batch.py --clips 40 --films 4 --rounds 1
     python scripts/benchmark_batch.py --output docs/benchmark_batch.md
 
-Clips are pieces of the recordings in `assets/`, each moved elsewhere, so that none is like another. `compare.py` goes
-through all of them with one worker and with two in turns, each time into a new folder; figures are of the fastest
-round. Where Blender renders on the processor, one worker by itself uses several, so there is also one that is kept on
-a single processor (on Linux). Folders are made where `TMPDIR` says, and none is deleted before the end: for minutes
-after many files were deleted, ext4 takes several times as long to make new ones. Memory is the most that a process has
-had (on Linux; elsewhere it is left out): of the program itself, over the number of clips, and of its largest worker,
-over the length of one clip. What counts are the ratios.
+Clips are pieces of the recordings in `assets/`, each moved to another place, so that no two are alike. `compare.py`
+processes all of them with one worker and with two in turn, each time into a new folder; the numbers are those of the
+fastest round. Where Blender renders on the processor, a single worker uses several processors, so one worker is also
+measured on a single processor (on Linux). The folders are made where `TMPDIR` says, and deleted only at the end: for
+minutes after many files were deleted, ext4 takes several times as long to make new ones. Memory is the most that a
+process used (on Linux; elsewhere it is left out): the program itself over the number of clips, and its largest worker
+over the length of one clip. Compare the ratios; the times depend on the machine.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ def workers(title: str, clips: Sequence[Path], folder: Path, rounds: int, *optio
             say(f"{title}, {jobs} at work{' on one processor' if alone else ''} ...")
             some.append(compare(clips, folder, jobs, *options, alone=alone))
     best = {way: min(some, key=lambda run: run.seconds) for way, some in runs.items()}
-    yield f"### {title}"
+    yield f"## {title}"
     yield ""
     yield f"`compare.py CLIP... {' '.join(options)} --jobs N`"
     yield ""
@@ -165,7 +165,7 @@ def workers(title: str, clips: Sequence[Path], folder: Path, rounds: int, *optio
 def memory(folder: Path, clips: Sequence[Path], minutes: Sequence[int]) -> Iterator[str]:
     """What the program and its workers take, as lines of Markdown."""
     options = ("--no-video", "--rates", "10")
-    yield "### Memory"
+    yield "## Memory"
     yield ""
     yield "| clips | of the program, MB | beside |"
     yield "|---:|---:|---:|"

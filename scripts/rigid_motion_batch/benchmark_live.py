@@ -5,10 +5,10 @@
     python scripts/benchmark_live.py --only choosing shots
     python scripts/benchmark_live.py --output docs/benchmark_live.md
 
-Scenes of objects, and a rig, with location and rotation keys, as Blender inserts them, in the screw mode. The same work
-is done in turns with and without rigid motion, so that a machine that slows down slows both; figures are medians, and
-the fastest. What counts are the ratios. Where the project has set itself a goal, it is beside what was measured, met or
-missed.
+Scenes of objects, and a rig, with location and rotation keys as Blender inserts them, in the mode *Screw*. The same
+work is done in turn with and without rigid motion, so that a machine that slows down slows both. Numbers are medians,
+with the fastest in brackets. Compare the ratios; the times depend on the machine. Where the project has set itself a
+goal, the table says whether it was met or missed.
 """
 
 from __future__ import annotations

@@ -27,13 +27,13 @@ class Command:
 
 COMMANDS = {
     "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
-    "bake": Command("bake", "in-betweens of .blend files into real keys, or back"),
+    "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
-    "paper": Command("reproduce_paper", "the paper's figures and its table, reproduced"),
-    "bundle": Command("job_bundle", "a comparison as a job for render farms"),
-    "tasks": Command("workplan.__main__", "single tasks of a comparison: what is done, and why another is not"),
-    "build": Command("build_extension", "the zip that Blender installs"),
-    "benchmark": Command("benchmark", "how fast the modes are, beside other libraries", extra="benchmark"),
+    "paper": Command("reproduce_paper", "reproduce the paper's figures and its table"),
+    "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
+    "tasks": Command("workplan.__main__", "list or run single tasks of a comparison"),
+    "build": Command("build_extension", "build the zip that Blender installs"),
+    "benchmark": Command("benchmark", "measure how fast the modes are, beside other libraries", extra="benchmark"),
 }
 
 

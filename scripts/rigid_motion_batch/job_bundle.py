@@ -1,7 +1,7 @@
 """Write a comparison as an Open Job Description bundle, for render farms to run.
 
-The recordings are read here, to see what there is to do; everything else is done by the farm, in small tasks that may
-run at the same time, fail, be killed and be run again. Takes the options of compare.py.
+The recordings are read here, to find out what there is to do. The farm does everything else, in small tasks that may
+run at the same time, fail, be killed and be run again. It takes the options of compare.py.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ SCRIPT = "job_bundle.py"
 PROGRAM = program_of(SCRIPT)
 
 EPILOG = """
-It writes a folder with template.json (jobtemplate-2023-09), plan.json and parameter_values.json. The last line that it
-prints is a command that runs the job on this machine. docs/farm.md says what a farm needs, and how to submit it.
+It writes a folder with template.json (jobtemplate-2023-09), plan.json and parameter_values.json. The last line printed
+is a command that runs the job on this machine. docs/farm.md says what a farm needs, and how to submit it.
 Exit code: 0 written, 1 written without some recordings that could not be read, 2 not written.
 """
 

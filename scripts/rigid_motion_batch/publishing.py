@@ -32,6 +32,8 @@ def opening(title: str, command: str, about: str, **versions: object) -> list[st
         "",
         *about.split("\n\n")[-1].strip().splitlines(),
         "",
+        "The [glossary](glossary.md) explains the words.",
+        "",
     ]
 
 

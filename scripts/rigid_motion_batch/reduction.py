@@ -4,15 +4,15 @@
     python scripts/reduction.py --recordings FOLDER --bodies FOLDER_OR_FILES
     python scripts/reduction.py --output docs/reduction.md
 
-Every recording is imported as Blender's users do, with a key of location and rotation on every frame. *Reduce Keys to
+Each recording is imported as Blender's users do it, with a key of location and rotation on every frame. *Reduce Keys to
 Poses* keeps the shell error on every frame within `--tolerance`: the largest displacement of any point in a ball of
-`--radius`. Decimate takes each channel for itself and shapes the curve between its keys by free handles. So there are
-three ways to ask it for the same: *as many keys* in each channel; keys on *as many frames*, which is how many poses an
-animator has to look after; and *as good*, the fewest keys that have no larger shell error, found by trying error
-margins. All errors are measured on what Blender shows, on every frame. The numbers that it all comes to are 6 for a key
-with free handles (frame, value, two handles of two), and for a pose its frame and a value in each channel, since
-straight keys need no handles. What the modes fill in between poses is in the file besides, on every frame, but made
-anew from the keys: it is not counted.
+`--radius`. Decimate works on each channel by itself, and shapes the curve between its keys with free handles. So there
+are three ways to compare the two: *as many keys* in each channel; keys on *as many frames*, which is how many poses an
+animator has to look after; and *as good*, the fewest keys without a larger shell error, found by trying error margins.
+All errors are measured on what Blender shows, on every frame. The column *numbers* counts what has to be stored: 6 for
+a key with free handles (frame, value, two handles of two numbers each), and for a pose its frame and a value in each
+channel, since straight keys need no handles. The in-betweens of a mode are in the file, too, on every frame, but the
+program makes them anew from the keys, so they are not counted.
 """
 
 from __future__ import annotations

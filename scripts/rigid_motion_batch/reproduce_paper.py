@@ -1,8 +1,8 @@
 """Reproduce the paper: its figures, its table and its example, from this program, with the paper's numbers beside them.
 
 Kamarianakis, Lydatakis, Papagiannakis, "Never 'Drop the Ball' in the Operating Room", 2021. The table is made from the
-clips in assets/, and with --recordings from those in a folder as well. Whole bodies among these, and those that
---bodies names, are studied as bodies too.
+clips in assets/, and with --recordings also from those in a folder. The section on whole bodies uses the bodies in that
+folder, and those that --bodies names.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ examples:
   python scripts/reproduce_paper.py --no-video --output /tmp/paper
   blender --background --python scripts/reproduce_paper.py -- --no-pictures
 
-It writes OUTPUT/paper.md, the page, with its pictures in OUTPUT/paper/, and every number of it in OUTPUT/*.csv. What is
-done is not done again: after Ctrl-C, or with more recordings, the same call goes on. A second run gives the same
-numbers, those of timing.csv aside. With --only-bodies it writes the section on whole bodies alone, OUTPUT/bodies.md,
-and with --only-sending that on live streams, OUTPUT/sending.md, which take the longest; --docs puts the section into
-the page there, and its other sections stay. The last line it prints is the path of the page.
+It writes the page, OUTPUT/paper.md, with its pictures in OUTPUT/paper/ and all of its numbers in OUTPUT/*.csv. Nothing
+is done twice: after Ctrl-C, or with more recordings, the same command continues. A second run gives the same numbers,
+except those of timing.csv. The two sections that take longest can be written alone: --only-bodies writes the section on
+whole bodies, OUTPUT/bodies.md, and --only-sending that on live streams, OUTPUT/sending.md. --docs then replaces this
+section of the page there, and leaves the others. The last line printed is the path of the page.
 Exit code: 0 done, 1 a part of it failed (the page holds the others), 2 a wrong input or option, 130 stopped by Ctrl-C.
 """
 
@@ -75,9 +75,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         epilog=as_called(EPILOG, SCRIPT),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="recordings to make the table from as well")
+    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings for the table")
     parser.add_argument(
-        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them, to study"
+        "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them"
     )
     alone = parser.add_mutually_exclusive_group()
     for section, what in (("bodies", "whole bodies"), ("sending", "streams that are sent when needed")):
@@ -86,7 +86,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             dest="only",
             action="store_const",
             const=section,
-            help=f"the section on {what}, and nothing else",
+            help=f"write only the section on {what}",
         )
     parser.add_argument(
         "--output", type=Path, default=output_folder("paper"), help="folder to write to (renders/paper)"
@@ -97,11 +97,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         nargs="?",
         const=(CHECKOUT or Path()) / "docs",
         metavar="FOLDER",
-        help="copy the page and its pictures there (docs)",
+        help="copy the page and its pictures to this folder (docs)",
     )
-    parser.add_argument("--no-video", action="store_true", help="pictures, but no film")
-    parser.add_argument("--no-pictures", action="store_true", help="nothing that Blender has to render")
-    parser.add_argument("--rounds", type=_count, default=ROUNDS, metavar="N", help="of the races (%(default)s)")
+    parser.add_argument("--no-video", action="store_true", help="make pictures, but no film")
+    parser.add_argument("--no-pictures", action="store_true", help="make nothing that Blender has to render")
+    parser.add_argument("--rounds", type=_count, default=ROUNDS, metavar="N", help="rounds of the timing (%(default)s)")
     parser.add_argument("--force", action="store_true", help="do everything again")
     return parser.parse_args(arguments)
 

@@ -1,7 +1,7 @@
 """Send a recorded motion over a network in real time, show what arrives, or pass on what many send.
 
-UDP, between processes or machines: `send` plays a recording, `receive` writes what a display would show of it at every
-frame, `relay` is a room where everybody hears all others. docs/streaming.md says what goes over the wire.
+Over UDP, between processes or machines: `send` plays a recording, `receive` writes down what a display would show at
+every frame, and `relay` is a room where everybody hears all others. docs/streaming.md says what goes over the wire.
 """
 
 from __future__ import annotations
@@ -66,14 +66,14 @@ EPILOG = """
 examples, in two terminals:
   python scripts/stream.py receive --port 9000 --output shown.csv
   python scripts/stream.py send hand.csv --to 127.0.0.1:9000
-and of many users, each with a sender and a receiver:
+and for many users, each with a sender and a receiver:
   python scripts/stream.py relay --port 9000
   python scripts/stream.py receive --from 127.0.0.1:9000 --output room.csv
   python scripts/stream.py send hand.csv --to 127.0.0.1:9000
 
 `python scripts/stream.py send --help`, `receive --help` and `relay --help` have the options, and more examples.
-Exit code: 0 done, 2 a wrong option or input, an address that cannot be had, or nobody to hear; 130 stopped by Ctrl-C,
-143 by SIGTERM, with the statistics and the file of what was shown.
+Exit code: 0 done, 2 a wrong option or input, an address that is not available, or no sender to hear; 130 stopped by
+Ctrl-C, 143 by SIGTERM, with the statistics and the file of what was shown.
 """
 
 SEND_EPILOG = """
@@ -82,10 +82,10 @@ examples:
   python scripts/stream.py send log.csv:left --to [::1]:9000 --to studio.local:9000 --tolerance 2mm --delay 0.05
   python scripts/stream.py send hand.csv --axes unity --to 10.0.0.7:9000 --packing smallest_three
   python scripts/stream.py send hand.csv --to 127.0.0.1:9000 --rate 20 --mode motor_spline_causal
-  python scripts/stream.py send hand.csv --port 9001            who says hello there hears it: receive --from
+  python scripts/stream.py send hand.csv --port 9001            for receivers that ask for it: receive --from
 
-With --tolerance a key is sent when the picture would be further off than that, and not before; with --rate so many a
-second. Poses go over the wire in metres and in Blender's axes. It begins at once, whether or not somebody hears it, and
+With --tolerance it sends a key only when the picture would otherwise be off by more than that; with --rate, so many
+keys a second. Poses go over the wire in metres and in Blender's axes. It begins at once, even if nobody listens, and
 takes as long as the recording.
 """
 
@@ -96,10 +96,10 @@ examples:
   python scripts/stream.py receive --port 9000 --bind 0.0.0.0 --output shown.csv     from other machines
   python scripts/stream.py receive --from relay.studio:9000 --output room.csv
 
-FILE has a row for every display frame and stream: device,t,x,y,z,qw,qx,qy,qz, where t is the moment that the frame
-shows, by the sender's clock, in metres and Blender's axes. compare.py reads it: FILE:* are all streams. It takes its
-place when the streams have ended (the senders say so, or are silent for 10 s), after --seconds, or with Ctrl-C. The
-last line that is printed is its path.
+FILE has a row for every display frame and stream: device,t,x,y,z,qw,qx,qy,qz, in metres and Blender's axes. t is the
+moment that the frame shows, by the sender's clock. compare.py reads the file: FILE:* takes all streams. It appears
+when the streams have ended (the senders say so, or are silent for 10 s), after --seconds, or at Ctrl-C. The last line
+printed is its path.
 """
 
 RELAY_EPILOG = """
@@ -108,7 +108,7 @@ examples:
   python scripts/stream.py relay --port 9000 --bind 0.0.0.0      for other machines
   python scripts/stream.py relay --port 9000 --bind ::1          IPv6
 
-It runs until Ctrl-C, or for --seconds, and then says what came from everybody and what went to them.
+It runs until Ctrl-C, or for --seconds, and then reports how much came from each user and went to them.
 """
 
 
@@ -123,62 +123,74 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     sending = commands.add_parser("send", help="play a recording", epilog=as_called(SEND_EPILOG, SCRIPT), **style)
-    sending.add_argument("recording", metavar="RECORDING", help="of one body; FILE:BODY takes one of several")
     sending.add_argument(
-        "--to", action="append", default=[], metavar="HOST:PORT", help="who is to hear it; may be given several times"
+        "recording", metavar="RECORDING", help="a recording of one body; FILE:BODY takes one of several"
+    )
+    sending.add_argument(
+        "--to", action="append", default=[], metavar="HOST:PORT", help="where to send it; may be given several times"
     )
     sending.add_argument("--tolerance", metavar="LENGTH", help=f"largest shell error: 5mm, 0.5cm ({TOLERANCE})")
-    sending.add_argument("--rate", type=_positive, metavar="HZ", help="so many keys a second instead")
+    sending.add_argument("--rate", type=_positive, metavar="HZ", help="send so many keys a second instead")
     sending.add_argument(
         "--delay",
         type=_positive,
         metavar="S",
-        help=f"seconds by which what is shown is behind ({DELAY}; with --rate as little as the mode takes)",
+        help=f"seconds by which the receiver shows it later ({DELAY}; with --rate as short as the mode allows)",
     )
     sending.add_argument(
         "--mode",
         choices=(TWISTS, *MODES),
         metavar="MODE",
-        help=f"what fills in between keys: {TWISTS} (the default), or with --rate dq_sclerp (the default) or another "
+        help=f"mode of the in-betweens: {TWISTS} (the default), or with --rate dq_sclerp (the default) or another "
         f"of {', '.join(MODES)}",
     )
-    sending.add_argument("--packing", choices=PACKINGS, default="double", help="(%(default)s)")
     sending.add_argument(
-        "--heartbeat", type=_heartbeat, default=HEARTBEAT, metavar="S", help="after so long a silence (%(default)s)"
+        "--packing", choices=PACKINGS, default="double", help="how poses are written as bytes (%(default)s)"
     )
-    sending.add_argument("--port", type=_port, default=0, help="of its own, for receive --from (one that is free)")
-    _add_bind(sending, "of its own (loopback where all receivers are on this machine)")
+    sending.add_argument(
+        "--heartbeat",
+        type=_heartbeat,
+        default=HEARTBEAT,
+        metavar="S",
+        help="repeat the newest key after so many seconds of silence (%(default)s)",
+    )
+    sending.add_argument("--port", type=_port, default=0, help="its own port, for receive --from (one that is free)")
+    _add_bind(sending, "to send from (loopback if all receivers are on this machine)")
     _add_axes(sending, "of the recording")
     add_reading_options(sending)
 
     receiving = commands.add_parser(
         "receive", help="write what is shown", epilog=as_called(RECEIVE_EPILOG, SCRIPT), **style
     )
-    receiving.add_argument("--port", type=_port, help="where senders send to; 0 for one that is free")
-    receiving.add_argument("--output", "-o", type=_file, required=True, metavar="FILE.csv")
+    receiving.add_argument("--port", type=_port, help="port that senders send to; 0 for one that is free")
+    receiving.add_argument("--output", "-o", type=_file, required=True, metavar="FILE.csv", help="file to write")
     receiving.add_argument(
-        "--from", dest="asked", metavar="HOST:PORT", help="ask a relay or a sender, and hear nobody else"
+        "--from", dest="asked", metavar="HOST:PORT", help="ask this relay or sender, and listen to nobody else"
     )
-    receiving.add_argument("--seconds", type=_positive, metavar="N", help="stop after so long")
-    receiving.add_argument("--fps", type=_fps, default=72.0, metavar="N", help="display frames a second (%(default)g)")
+    receiving.add_argument("--seconds", type=_positive, metavar="N", help="stop after so many seconds")
+    receiving.add_argument(
+        "--fps", type=_fps, default=72.0, metavar="N", help="frames a second of the display (%(default)g)"
+    )
     receiving.add_argument(
         "--margin",
         type=_not_negative,
         default=MARGIN,
         metavar="S",
-        help="seconds by which packets may take longer than the first, and be in time (%(default)g)",
+        help="how many seconds longer than the first a packet may take and be in time (%(default)g)",
     )
-    receiving.add_argument("--truth", metavar="RECORDING", help="what was sent: say how far off it was shown")
-    _add_bind(receiving, "to be heard at (loopback, or what reaches --from)")
+    receiving.add_argument(
+        "--truth", metavar="RECORDING", help="the recording that was sent: report how far off it was shown"
+    )
+    _add_bind(receiving, "to listen at (loopback, or the one that reaches --from)")
     _add_axes(receiving, "of --truth")
     add_reading_options(receiving)
 
     relaying = commands.add_parser(
         "relay", help="pass on what everybody sends", epilog=as_called(RELAY_EPILOG, SCRIPT), **style
     )
-    relaying.add_argument("--port", type=_port, required=True, help="0 for one that is free")
-    relaying.add_argument("--seconds", type=_positive, metavar="N", help="stop after so long")
-    _add_bind(relaying, "to be heard at (loopback)")
+    relaying.add_argument("--port", type=_port, required=True, help="port to listen at; 0 for one that is free")
+    relaying.add_argument("--seconds", type=_positive, metavar="N", help="stop after so many seconds")
+    _add_bind(relaying, "to listen at (loopback)")
 
     options = parser.parse_args(arguments)
     chosen = {"send": sending, "receive": receiving, "relay": relaying}[options.command]

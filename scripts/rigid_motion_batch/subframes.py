@@ -4,12 +4,12 @@
     python scripts/subframes.py --radius 1
     python scripts/subframes.py --output docs/subframes.md
 
-On whole frames in-betweens are exact; motion blur and slow motion look in between. Objects go from key to key about
-axes and in directions drawn at random, by an angle and a distance that are the same for all segments, eased as Blender
-inserts keys. What Blender shows at sub-frames is compared with what the mode gives there, by the largest displacement
-in the world of any point within a distance (`--radius`) of the origin, and by the angle between.
-Live and baked every frame are measured at quarter frames, baked every 0.25 half-way between those keys, where it is
-worst. Figures are the largest of all, RMS where it says so.
+On whole frames in-betweens are exact, but motion blur and slow motion look between frames. Objects go from key to key
+about axes and in directions drawn at random. All segments have the same angle and distance, and the easing that Blender
+gives new keys. At sub-frames, the pose that Blender shows is compared with the pose that the mode has there. Lengths
+are the largest displacement in the world of any point within a distance (`--radius`) of the origin; degrees are the
+angle between the two poses. *Live* and *baked every frame* are measured at quarter frames, *baked every 0.25* half-way
+between its keys, where it is worst. Numbers are the largest of all, or the RMS where a column says so.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> tup
 
 def table(motion: Motion, radius: float) -> Iterator[str]:
     """The measurements of one motion as lines of Markdown."""
-    yield f"### {motion.describe()}"
+    yield f"## {motion.describe()}"
     yield ""
     yield "| mode | turned by | live, mm | RMS, mm | degrees | baked every 0.25, mm | degrees | baked every frame, mm |"
     yield "|---|---|---:|---:|---:|---:|---:|---:|"

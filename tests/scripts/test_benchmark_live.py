@@ -42,8 +42,8 @@ def tables(lines) -> dict[str, list[list[str]]]:
     found: dict[str, list[list[str]]] = {}
     for line in lines:
         assert "nan" not in line
-        if line.startswith("### "):
-            heading = line.removeprefix("### ")
+        if line.startswith("## "):
+            heading = line.removeprefix("## ")
             found[heading] = []
         elif line.startswith("|"):
             found[heading].append([cell.strip() for cell in line.strip("|").split("|")])
@@ -272,9 +272,9 @@ def test_the_command_goes_through_the_sections_that_it_is_asked_for(monkeypatch,
     assert benchmark_live.main(["--rounds", "1", "--only", "choosing", "baking", "--output", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert "`python scripts/benchmark_live.py --rounds 1 --only choosing baking`" in text
-    assert [line for line in text.splitlines() if line.startswith("###")] == [
-        f"### A mode for {SMALL}, turned by QUATERNION",
-        f"### A mode for {SMALL}, turned by XYZ",
-        "### Baking one object with 5 keys",
+    assert [line for line in text.splitlines() if line.startswith("## ")] == [
+        f"## A mode for {SMALL}, turned by QUATERNION",
+        f"## A mode for {SMALL}, turned by XYZ",
+        "## Baking one object with 5 keys",
     ]
     assert "50 and 100 frames of one object ..." in capsys.readouterr().err

@@ -47,8 +47,8 @@ def test_more_time_is_never_less_than_none(blend: str, words: str):
 
 def test_a_page_in_parts_is_summed_up_by_its_parts():
     assert said(of_live(CHOOSING)) == (
-        "- Filling in, choosing a mode and baking are 3.5 times faster than Blender's own baking, and slower in 1 "
-        "case. - Goals met: 0 of 1. Missed: `set_mode` for all in one call (at most 0.2 s)."
+        "- Computing in-betweens, choosing a mode and baking are 3.5 times faster than Blender's own baking, and "
+        "slower in 1 case. - Goals met: 0 of 1. Missed: `set_mode` for all in one call (at most 0.2 s)."
     )
 
 
@@ -60,7 +60,7 @@ def test_a_page_without_tables_has_no_summary(summary):
 def test_what_is_published_has_its_summary_below_the_title(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     publishing.publish(["# Title", "", "About it.", "", *CHOOSING.splitlines()], tmp_path / "page.md", of_live)
     page = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert page.startswith("# Title\n\n<!-- summary -->\n\n- Filling in")
+    assert page.startswith("# Title\n\n<!-- summary -->\n\n- Computing in-betweens")
     assert page.index("<!-- end of summary -->") < page.index("About it.")
     assert page in capsys.readouterr().out
 
@@ -76,7 +76,7 @@ def test_what_the_papers_page_saves_is_read_from_its_cells(cell: str, saved: flo
     text = said(of_paper(f"# P\n\n**RMS shell error, recordings**\n\n{table}\n"))
     percent = f"{abs(saved):.0f}"
     assert f"here it is {percent}, {percent}, {percent} and {percent} % {'less' if saved > 0.0 else 'more'}" in text
-    assert "reaches the paper's figures in 0 of 4 rows, the narrowest short by 33 points" in text
+    assert "reach the paper's figures in 0 of 4 rows, the narrowest short by 33 points" in text
 
 
 def test_tables_are_read_as_they_were_written():

@@ -23,9 +23,9 @@ from .study.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
 
 DESCRIPTION = """Compare interpolation modes on recorded trajectories.
 
-Of every recording only a few keys a second are kept, evenly or where the motion needs them; each mode fills them in
-again; what was lost is measured, and shown in a video in which the modes move side by side. Without INPUT, the
-recordings in assets/ are compared.
+The program keeps only a few keys a second of each recording, evenly spaced or where the motion needs them. Each mode
+computes the in-betweens again. The program measures how far they are off, and shows it in a report and in a video with
+the modes side by side. Without INPUT it compares the recordings in assets/.
 """
 
 RATES = "5,10,15,20"
@@ -42,16 +42,17 @@ EPILOG = """
 inputs:
   CSV with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM, EuRoC,
   Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, FBX, glTF, .blend; a folder stands for the recordings in it.
-  FILE:BODY takes one body of several, FILE:* all. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of it.
-  Of a .blend a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
-  (FILE.blend:RIG), as Blender shows it in the world, with parents, constraints, drivers and NLA strips. FILE.blend:* is
-  every object that is animated.
+  FILE:BODY takes one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of
+  it. In a .blend, a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
+  (FILE.blend:RIG), moving as Blender shows it in the world, with parents, constraints, drivers and NLA strips.
+  FILE.blend:* takes every animated object.
 
 whole bodies:
-  Each joint has its keys in its parent's space, as a rig has them, and is measured where that puts it. The unit of a
-  body is found by its size, and said; --scale says otherwise. OUTPUT/metrics.csv has the body, its worst joint and how
-  far feet slide that stand, OUTPUT/metrics_joints.csv every joint. In the film each mode moves a rig of its own, which
-  comparison.blend has with the modes on its bones.
+  Each joint has its keys in its parent's space, as in a rig, and its error is measured where the chain of joints puts
+  it. The program works out the unit of a body from its size, and reports it; --scale sets another. OUTPUT/metrics.csv
+  has the whole body, its worst joint, and how far feet slide that should stand still; OUTPUT/metrics_joints.csv has
+  every joint. In the film each mode moves a rig of its own; comparison.blend has these rigs, with the modes set on
+  their bones.
 
 examples:
   python scripts/compare.py
@@ -71,37 +72,39 @@ examples:
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 choosing keys:
-  --decimate uniform keeps --rates keys a second, evenly in time and the same for every mode. With --decimate adaptive
-  each mode gets keys of its own among the recorded samples: the fewest that keep its shell error within --tolerance
-  everywhere, or --budget keys a second, on average over the clip, that make its RMS shell error small. Given neither,
-  --rates are the budgets. Rates that are given beside adaptive keys are kept evenly as well, for comparison. The report
-  then also shows the curve of error over keys, and how many keys every mode needs to be as good as lerp_slerp at 30,
-  20, 15 and 12 a second; that alone takes up to a second for every 100 samples. --fit adds how many it needs where they
-  need not be recorded poses, but are moved to where the motion follows the recording best; two to three times as long.
+  --decimate uniform keeps --rates keys a second, evenly spaced in time and the same for every mode. --decimate adaptive
+  chooses keys for each mode among the recorded samples: with --tolerance, the fewest that keep its shell error within
+  that length everywhere; with --budget, so many keys a second on average over the clip, placed so that its RMS shell
+  error is small. Without either, --rates are the budgets; if you give --rates as well, evenly spaced keys at these
+  rates are added for comparison. With adaptive keys, the report also shows error over number of keys, and how many keys
+  each mode needs to be as good as lerp_slerp at 30, 20, 15 and 12 keys a second; this takes up to a second for every
+  100 samples. --fit also counts keys that are not recorded poses, but moved to where the motion follows the recording
+  best; it takes two to three times as long.
 
 choosing modes:
-  best_of takes in every segment, from key to key, that of the other modes named which comes closest to the recording
-  there. Evenly spaced keys are the same for all; of adaptive ones it has those of the best single mode. The mode of
-  each segment is a column of best_of.keys.csv.
+  best_of takes, in each segment from key to key, the one of the other modes named that comes closest to the recording
+  there. Evenly spaced keys are the same for all modes; with adaptive keys it uses those of the best single mode. A
+  column of best_of.keys.csv has the mode of each segment.
 
-It writes OUTPUT/report.html (all of it in one file; of more than 24 clips each has a page of its own, beside its
-folders), OUTPUT/metrics.csv, with adaptive keys OUTPUT/keys_needed.csv and of whole bodies OUTPUT/decimated.csv, which
-sets them beside Blender's Decimate, and for every clip and choice of keys a folder (OUTPUT/CLIP/10, /budget-10,
-/tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The last
-line it prints is the path of the report.
+what is written:
+  OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
+  numbers, with adaptive keys also OUTPUT/keys_needed.csv, and for whole bodies OUTPUT/decimated.csv, which compares
+  their keys with Blender's Decimate. Every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
+  /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The
+  last line printed is the path of the report.
 
 one folder, one comparison:
-  With the same recordings, more of them or fewer, a second run into a folder goes on. A folder that holds another
-  comparison is refused, and so are files that this program has not written where outputs go: choose another --output,
-  or replace them with --force. Inputs are never replaced. --explain says what a run would do and why, and does nothing.
+  You can run again into the same folder with the same recordings, with more of them or fewer. The program refuses a
+  folder that holds another comparison, and does not replace files that it has not written: choose another --output, or
+  replace them with --force. It never replaces inputs. --explain says what a run would do and why, and does nothing.
 
 many clips:
-  The work is done in small tasks, by as many processes as --jobs says. What is done is kept: stopped by Ctrl-C, a full
-  disk or worse, the same command goes on from there, and with other options it does what these ask for anew. A
-  recording that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With
-  --scheduler the processes are on all machines that a Dask scheduler knows; docs/farm.md says how.
-Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could, or a wrong option, 130 stopped by
-Ctrl-C; after that the report holds what was ready.
+  The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
+  disk or a crash, the same command continues from there; with other options it does only what these change. A recording
+  that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
+  processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
+Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
+stopped by Ctrl-C; the report then holds what was ready.
 """
 
 
@@ -113,7 +116,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         epilog=as_called(EPILOG, SCRIPT),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings; those in assets/ where none is given")
+    parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings (those in assets/)")
     parser.add_argument(
         "--rates", type=_amounts(Uniform), metavar="HZ,...", help=f"keys a second that are kept ({RATES})"
     )
@@ -122,9 +125,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_modes,
         default=DISTINCT,
         metavar="MODE,...",
-        help=f"what fills them in: {DISTINCT} for {', '.join(KEYFRAME_MODES)}, in the film those together that are one "
-        f"motion (the default); {ALL} for each of these on its own; or some of them, {', '.join(STREAM_MODES)} for "
-        f"streams, which know no later keys, and {BEST_OF} for the best of each segment",
+        help=f"modes to compare: {DISTINCT} for {', '.join(KEYFRAME_MODES)}, with one lane in the film for those that "
+        f"give the same motion (the default); {ALL} for the same modes, each in a lane of its own; or names of these, "
+        f"and of {', '.join(STREAM_MODES)} for streams, which know no later keys, and {BEST_OF} for the best mode of "
+        "each segment",
     )
     parser.add_argument(
         "-o",
@@ -139,21 +143,22 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_radii,
         default=EVERYWHERE,
         metavar="M|CSV",
-        help=f"of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table joint,radius_m "
-        "for joints by name",
+        help=f"radius of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table "
+        "joint,radius_m for joints by name",
     )
     add_reading_options(parser)
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
-        "--jobs", type=_jobs, metavar="N", help="processes that work; 0 for none but this one (one for each processor)"
+        "--jobs",
+        type=_jobs,
+        metavar="N",
+        help="worker processes; 0 to work in this one (one for each processor)",
     )
-    workers.add_argument(
-        "--scheduler", metavar="ADDRESS", help="let the workers of a Dask scheduler do it: tcp://HOST:8786"
-    )
+    workers.add_argument("--scheduler", metavar="ADDRESS", help="use the workers of a Dask scheduler: tcp://HOST:8786")
     parser.add_argument(
         "--force",
         action="store_true",
-        help="do everything again, also what is done already; replace another comparison, and files of other programs",
+        help="do everything again; replace another comparison, and files of other programs",
     )
     parser.add_argument("--explain", action="store_true", help="say what would be done and why, and do nothing")
     keys = parser.add_argument_group("choosing keys")
@@ -161,7 +166,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--decimate",
         choices=("uniform", "adaptive"),
         default="uniform",
-        help="keep keys evenly in time, or where each mode needs them (%(default)s)",
+        help="keep keys evenly spaced in time, or where each mode needs them (%(default)s)",
     )
     keys.add_argument(
         "--tolerance",
@@ -175,42 +180,48 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--shared",
         action="store_true",
-        help="key poses: all joints of a body have their keys at the same times; otherwise each where it needs them",
+        help="key poses: all joints of a body have their keys at the same times (each joint where it needs them)",
     )
-    keys.add_argument("--fit", action="store_true", help="count the keys needed also where they are fitted")
+    keys.add_argument(
+        "--fit",
+        action="store_true",
+        help="also count the keys needed if they are fitted, and need not be recorded poses",
+    )
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
-    video.add_argument("--resolution", type=_resolution, default="1280x720", metavar="WxH", help="(%(default)s)")
+    video.add_argument(
+        "--resolution", type=_resolution, default="1280x720", metavar="WxH", help="in pixels (%(default)s)"
+    )
     video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
     video.add_argument(
-        "--slow-motion", type=_positive, default=1.0, metavar="N", help="times slower than life (%(default)s)"
+        "--slow-motion", type=_positive, default=1.0, metavar="N", help="play N times slower (%(default)s)"
     )
     video.add_argument(
         "--object",
         default="drill",
         metavar="OBJECT",
-        help="what moves: drill, controller, or FILE.blend:NAME (%(default)s)",
+        help="the object to show: drill, controller, or FILE.blend:NAME (%(default)s)",
     )
     video.add_argument(
         "--films",
         choices=("fewest", ALL),
         default="fewest",
-        help="of each recording the one with the fewest keys, or with every choice of keys (%(default)s)",
+        help="for each recording one video, with the fewest keys, or one for every choice of keys (%(default)s)",
     )
-    video.add_argument("--theme", choices=THEMES, default="dark", help="(%(default)s)")
+    video.add_argument("--theme", choices=THEMES, default="dark", help="colours of the videos (%(default)s)")
     video.add_argument(
         "--deviation",
         type=_positive,
         metavar="N",
-        help="draw what a mode is off by N times as large; 1 as it is (by default a round number that shows it well)",
+        help="magnify errors N times; 1 shows them as they are (a round number that shows them well)",
     )
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="of workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
+        help="for workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
     )
-    video.add_argument("--samples", type=int, default=16, help="of eevee and cycles (%(default)s)")
+    video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
     try:
         options.stage = StageSettings(

@@ -45,7 +45,7 @@ def long_bakes(sizes: tuple[Size, Size], rounds: int) -> Iterator[str]:
         bpy.context.collection.objects.link(other)
     animation.set_enabled(True)
 
-    yield f"### Baking one object with {long.keys} keys"
+    yield f"## Baking one object with {long.keys} keys"
     yield ""
     yield from TABLE
     for size in sizes:

@@ -20,7 +20,7 @@ WARMING = 8
 def everyday(size: Size, rounds: int) -> Iterator[str]:
     """What everyday edits and playback cost, as lines of Markdown."""
     for rotation_mode in ROTATION_MODES:
-        yield f"### {size}, turned by {rotation_mode}"
+        yield f"## {size}, turned by {rotation_mode}"
         yield ""
         yield "| what | Rigid Motion, ms: median (fastest) | beside, ms: median (fastest) | |"
         yield "|---|---:|---:|---:|"

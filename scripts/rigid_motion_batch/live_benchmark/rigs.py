@@ -60,7 +60,7 @@ def rigs(size: RigSize, rounds: int) -> Iterator[str]:
     add_skin(rig, size.vertices)
     skinned = play(list(rig.pose.bones), few)
 
-    yield f"### A rig of {size}, turned by QUATERNION"
+    yield f"## A rig of {size}, turned by QUATERNION"
     yield ""
     yield from MILLISECONDS
     for what, ours, peer, theirs in (

@@ -41,7 +41,7 @@ def choosing(size: Size, rounds: int) -> Iterator[str]:
         animation.set_enabled(False)
         seconds |= in_turns(min(3, rounds), bake=native.bake, restore=native.restore)
         animation.set_enabled(True)
-        yield f"### A mode for {size}, turned by {rotation_mode}"
+        yield f"## A mode for {size}, turned by {rotation_mode}"
         yield ""
         yield from TABLE
         yield from choosing_rows(seconds, goal=CHOOSING_GOAL)
@@ -70,7 +70,7 @@ def shot(size: Size, rotation_mode: str, motion: str, rounds: int) -> Iterator[s
     baked = file_sizes()
     animation.set_enabled(True)
 
-    yield f"### A shot of {size}, turned by {rotation_mode}, {motion}"
+    yield f"## A shot of {size}, turned by {rotation_mode}, {motion}"
     yield ""
     yield from TABLE
     yield from choosing_rows(seconds)

@@ -106,7 +106,7 @@ def bodies_section(found: BodyResults) -> list[str]:
     if found.counted:
         parts = (_keys, _body_by_body, _errors, _apart, _alone, _limbs_by_body, _both_ways, _beside_the_paper)
         lines += [line for part in parts for line in part(found)]
-        lines += ["", f"All of it is in {listed([f'`{name}`' for name in FILES])}."]
+        lines += ["", f"All numbers are in {listed([f'`{name}`' for name in FILES])}."]
     return lines
 
 
@@ -115,9 +115,10 @@ def bodies_section(found: BodyResults) -> list[str]:
 
 def _opening(found: BodyResults) -> list[str]:
     lines = [
-        "Every joint has its keys in its parent's space, as a rig has them, and is measured where that puts it: in the "
-        "space of the roots, which is that of the recording. The error of a body is the RMS over all joints and "
-        f"samples, of shells of {JOINT * 1e3:.0f} mm around the joints. At a key pose every joint has a key.",
+        "Every joint has its keys in its parent's space, as in a rig. Its error is measured where the chain of joints "
+        "puts it, in the space of the roots, which is that of the recording. The error of a body is the RMS over all "
+        f"joints and samples, of shells of {JOINT * 1e3:.0f} mm around the joints. At a key pose every joint has a "
+        "key.",
         "",
     ]
     if found.counted:
@@ -159,9 +160,9 @@ def _keys(found: BodyResults) -> list[str]:
         "",
         f"**Key poses needed to be as good as `{REFERENCE}`**",
         "",
-        "Key poses a second, and how many fewer they are, or more. Geometric means over bodies, of which "
-        "one counts where it has two samples to a key pose. Those chosen by the motion are chosen to keep the "
-        "largest error small, not the RMS that is asked for. A dash: all samples, on every body.",
+        "Key poses a second, and how many fewer or more they are. Geometric means over bodies; a body counts where "
+        "it has two samples for each key pose. Key poses chosen by the motion are chosen to keep the largest error "
+        "small, not the RMS that is compared. A dash: it takes all samples, on every body.",
         "",
         *grid(
             ["", *(f"{rate}/s, {_number_of(found.counting(rate))}" for rate in rates)],
@@ -317,12 +318,13 @@ def _apart(found: BodyResults) -> list[str]:
         "**Where a screw is something else, and where not**",
         "",
         f"How far `{SCREW}` gets from `{REFERENCE}` at most, in mm, at {listed([f'{rate}/s' for rate in rates])}; "
-        f"{_turned(found)}. First how far any joint but the roots gets about in its parent's space. Then the "
-        "differences: of these joints there; of the same in the space of the roots, these held; of the roots; of all. "
-        f"Last how far `{REFERENCE}` is from the recording at most.",
+        f"{_turned(found)}. The columns: how far any joint but the roots moves in its parent's space; the difference "
+        "of these joints in that space; their difference in the space of the roots, with the roots held still; the "
+        f"difference of the roots; the difference of all joints; and how far `{REFERENCE}` is from the recording at "
+        "most.",
         "",
         *grid(
-            ["body", "joints get about", "in parents' spaces", "roots held", "roots", "all", "from the recording"],
+            ["body", "joints move", "in parents' spaces", "roots held", "roots", "all", "from the recording"],
             [[name, _mm(moved[name]), *(cell(name, column) for column in columns)] for name in names],
         ),
         "",
@@ -346,16 +348,15 @@ def _in_their_parents(found: BodyResults, names: Sequence[str]) -> str:
     parts = []
     if one:
         parts.append(
-            f"In their parents' spaces the joints but the roots of {listed([f'`{name}`' for name in one])} get about "
-            f"by {_mm(max(bodies_by_name[name].moved_m for name in one))} mm at most: screw and SLERP are one motion "
+            f"In their parents' spaces, all joints but the roots of {listed([f'`{name}`' for name in one])} move by at "
+            f"most {_mm(max(bodies_by_name[name].moved_m for name in one))} mm: screw and SLERP are the same motion "
             "there."
         )
     for name in rest:
         row = largest[name]
         carried = max(other.carried_m for other in found.apart if other.body == name)
         parts.append(
-            f"In `{name}` a joint gets about by up to {_mm(bodies_by_name[name].moved_m)} mm, and the two are apart by "
-            "up to "
+            f"In `{name}` a joint moves by up to {_mm(bodies_by_name[name].moved_m)} mm, and the two differ by up to "
             f"{_mm(row.parents_m)} mm in its parent's space ({quoted(row.joint)}) and by {_mm(carried)} mm in that of "
             "the roots."
         )
@@ -404,10 +405,10 @@ def _alone(found: BodyResults) -> list[str]:
         "",
         f"**{listed(kinds).capitalize()} alone**",
         "",
-        "As a tracker on them would have it: each a single rigid body in the space of the roots, with a key at every "
-        f"update, a shell of {RADIUS * 1e3:.0f} mm, and nothing known of the joints between. In a cell: the keys "
-        f"saved, beside evenly spaced ones of `{REFERENCE}`, by evenly spaced ones; and by ones chosen by the motion. "
-        "Geometric means over limbs.",
+        "As a tracker on them would see it: each limb is a single rigid body in the space of the roots, with a key at "
+        f"every update and a shell of {RADIUS * 1e3:.0f} mm, and nothing is known of the joints between. Each cell has "
+        f"the keys saved, compared with evenly spaced keys of `{REFERENCE}`: first by evenly spaced keys, then by keys "
+        "chosen by the motion. Geometric means over limbs.",
         "",
         *table,
         "",
@@ -493,8 +494,8 @@ def _both_ways(found: BodyResults) -> list[str]:
         "",
         "**Through its joints, or alone**",
         "",
-        "The same limbs with the same key times: where their joints put them, each of which has its key; and alone, "
-        f"with a single key. RMS shell error ({RADIUS * 1e3:.0f} mm) in mm, geometric means over limbs.",
+        "The same limbs with the same key times in two ways: through their joints, each of which has its key, and "
+        f"alone, with a single key. RMS shell error ({RADIUS * 1e3:.0f} mm) in mm, geometric means over limbs.",
         "",
         *table,
         "",
@@ -507,9 +508,9 @@ def _both_ways(found: BodyResults) -> list[str]:
             told.append(f"{_at_rates(*ways)} under `{mode}`")
         keys = f"{min(carried)} to {max(carried)}" if min(carried) < max(carried) else f"{max(carried)}"
         lines.append(
-            f"- {kind.capitalize()} are nearer {_nearer(found, kind, rates)}. Alone, the error at "
-            f"{listed([str(rate) for rate in rates])} a second is {'; '.join(told)}. Through joints it takes {keys} "
-            "keys for one."
+            f"- {kind.capitalize()} are closer to the recording {_nearer(found, kind, rates)}. Alone, the error at "
+            f"{listed([str(rate) for rate in rates])} a second is {'; '.join(told)}. Through joints, {keys} keys take "
+            "the place of one."
         )
     lines += ["", _screws_alone(found, kinds, rates)]
     return lines

@@ -38,14 +38,14 @@ def bows_section(found: Results) -> list[str]:
     lines = [
         "## Why a screw wins here and loses there",
         "",
-        "Between two updates the origin runs straight under the state of the art, and on a bow under a screw. How "
-        "much of that bow the recorded path has is a number k. With a the way from the straight line to where the "
-        "origin was recorded, and b that to where the screw has it, summed over all samples between updates,",
+        "Between two updates, the state of the art moves the origin straight, and a screw moves it on a bow. The "
+        "number k says how much of that bow the recorded path has. For each sample between updates, a leads from the "
+        "straight line to where the origin was recorded, and b to where the screw puts it. Summed over all samples,",
         "",
         *(f"    {line}" for line in FORMULA),
         "",
-        "So k is 1 where the path has all of the bow, and 0 where it has none of it; and since a - b is the screw's "
-        "error, that has the smaller RMS position error where k is above a half, exactly. In a cell: k, and the "
+        "So k is 1 where the path has all of the bow, and 0 where it has none of it. Since a - b is the screw's "
+        "error, the screw has the smaller RMS position error exactly where k is above a half. Each cell has k, and the "
         "screw's error as a multiple of the state of the art's.",
         "",
         *grid(
@@ -69,25 +69,24 @@ def bows_section(found: Results) -> list[str]:
     wins = {rate: [at[clip, rate].share > 0.5 for clip in clips if (clip, rate) in at] for rate in rates}
     low, high = min(rates), max(rates)
     lines.append(
-        f"At {low} updates a second the screw is nearer on {sum(wins[low])} of {len(wins[low])} clips, at {high} on "
+        f"At {low} updates a second the screw is closer on {sum(wins[low])} of {len(wins[low])} clips, at {high} on "
         f"{sum(wins[high])} of {len(wins[high])}"
         + (": between updates far apart a hand does more than one screw." if sum(wins[low]) < sum(wins[high]) else ".")
     )
     left = [one.error for one in found.bows if one.updates >= claims.TABLE[-1].state_of_the_art]
     if left:
         lines.append(
-            "How much can be gained is bounded by what is at stake: of the state of the art's error at "
-            f"{claims.TABLE[-1].state_of_the_art} updates a second and more, the screw left {min(left):.0%} where it "
-            f"was best and {max(left):.0%} where it was worst."
+            "How much a screw can change is limited: of the state of the art's error at "
+            f"{claims.TABLE[-1].state_of_the_art} updates a second and more, it left {min(left):.0%} where it was best "
+            f"and {max(left):.0%} where it was worst."
         )
     splines = [mode for mode in SPLINES if np.isfinite(found.saved(mode)).any()]
     if splines:
         told = [f"`{mode}` {less(found.saved(mode))}" for mode in splines]
         lines.append(
-            "What a straight line and a screw have in common is the corner at every update, and that costs more than "
-            f"either's path between them: without it, {listed(told)}. Keys where the motion needs them, instead of "
-            f"evenly in time, add to that where nobody waits for a stream: `{SPLINES[0]}` "
-            f"{less(found.saved(SPLINES[0], ADAPTIVE))}."
+            "A straight line and a screw both have a corner at every update, and that costs more than the path between "
+            f"updates does. Bandwidth without corners: {listed(told)}. Keys placed where the motion needs them save "
+            f"more, where no stream has to wait for them: `{SPLINES[0]}` {less(found.saved(SPLINES[0], ADAPTIVE))}."
         )
     return lines
 

@@ -26,13 +26,13 @@ def running_time(found: Results) -> list[str]:
     lines = [
         "## Running time",
         "",
-        f"Of a generated frame, {FRAMES_PER_S:.0f} a second for {USERS} users, as a multiple of the state of the "
-        f"art's in the same round; the median of all rounds and its {CONFIDENCE:.0%} confidence interval (bootstrap "
-        f"over rounds). All take turns. The paper: {1.0 - claims.TIME_SAVED:.3f}. In brackets, processor time. These "
-        "numbers differ from run to run and from machine to machine; all others on this page do not.",
+        f"The time to compute a frame, at {FRAMES_PER_S:.0f} frames a second for {USERS} users, as a multiple of the "
+        "state of the art's time in the same round: the median of all rounds, and its "
+        f"{CONFIDENCE:.0%} confidence interval (bootstrap over rounds). All modes take turns. The paper has "
+        f"{1.0 - claims.TIME_SAVED:.3f}. Processor time is in brackets. These numbers differ from run to run and from "
+        "machine to machine; all others on this page do not.",
         "",
-        "This program's own forms work out a segment once and then fill in its frames, so fewer updates make them "
-        "quicker.",
+        "This program computes a segment once, and then the frames in it, so fewer updates make it faster.",
         "",
     ]
     for pace, title in (
@@ -42,16 +42,17 @@ def running_time(found: Results) -> list[str]:
     ):
         lines += [f"**{title}**", "", *_timing_grid(found, pace), ""]
     lines += [
-        "**The algebras as they are written**, every frame encoded, filled in and extracted anew, as the paper's "
-        "engines do: all frames as one array, and one after the other. The products of multivectors are general ones "
-        "here, of 16 or 32 coefficients, where an engine would write out those that are not zero; one frame after "
-        "the other is for the most part the cost of calling NumPy. So neither is a verdict on an engine in C#",
+        "**The algebras as they are written**: every frame is encoded, interpolated and extracted anew, as the paper's "
+        "engines do, with all frames as one array, and one after the other. Two things keep this from being a verdict "
+        "on an engine in C#. The products of multivectors are general ones here, of 16 or 32 coefficients, where an "
+        "engine would compute only those that are not zero. And one frame after the other costs mostly the calls of "
+        "NumPy.",
         "",
         *_algebra_grid(found),
         "",
         _times_of_the_blend(found),
-        f"The {claims.ENERGY_SAVED:.0%} of energy that the paper saved cannot be measured here: a processor's time is "
-        "what there is, and it leaves out the radio, which fewer updates would spare.",
+        f"The {claims.ENERGY_SAVED:.0%} of energy that the paper saved cannot be measured here: only the processor's "
+        "time can, which leaves out the radio, and fewer updates would spare that.",
     ]
     return lines
 
@@ -104,9 +105,9 @@ def bandwidth(found: Results) -> list[str]:
     return [
         "## Bytes",
         "",
-        f"The example of the text: {listed(example)}. Counted from packets that were packed: "
-        f"{listed([f'{count:.0f} n' for count in doubles])}, {'the same' if same else 'not the same'}. With the "
-        f"header of {HEADER.itemsize} bytes that a receiver needs besides (checksum, stream, number, time stamp, age):",
+        f"The example in the paper's text: {listed(example)}. Counted on real packets: "
+        f"{listed([f'{count:.0f} n' for count in doubles])}, {'the same' if same else 'not the same'}. A receiver also "
+        f"needs a header of {HEADER.itemsize} bytes (checksum, stream, number, time stamp, age). With and without it:",
         "",
         *grid(
             [

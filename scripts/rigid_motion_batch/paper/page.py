@@ -94,9 +94,10 @@ def _opening(found: Results) -> list[str]:
         "",
         "Kamarianakis, Lydatakis and Papagiannakis, *Never 'Drop the Ball' in the Operating Room: An efficient "
         "hand-based VR HMD controller interpolation algorithm, for collaborative, networked virtual environments* "
-        "(2021, [arXiv 2107.04875](https://arxiv.org/abs/2107.04875)): its figures, its table and its example again, "
-        "by `python scripts/reproduce_paper.py`. Every number here was measured by that command, and is in a file "
-        "that it wrote; what the paper says stands beside it.",
+        "(2021, [arXiv 2107.04875](https://arxiv.org/abs/2107.04875)). This page is for its readers: it has the "
+        "figures, the table and the example of the paper, measured again by `python scripts/reproduce_paper.py`, with "
+        "the paper's own numbers beside them. Every number is also in a file that the command wrote. The "
+        "[glossary](glossary.md) explains the words.",
         "",
     ]
     for one in found.sets:
@@ -118,9 +119,9 @@ def _shell_error(found: Results) -> list[str]:
     return [
         "## The shell error",
         "",
-        f"The farthest that any point within {1e3 * RADIUS:.0f} mm of a body's origin is from where it was recorded at "
-        "that moment: one length for place and turn together, whatever the body's axes. Of a whole clip it is the root "
-        "mean square (RMS) over all samples.",
+        f"The largest distance of any point within {1e3 * RADIUS:.0f} mm of a body's origin from where it was recorded "
+        "at that moment. It is one length for position and rotation together, and does not depend on the body's axes. "
+        "The error of a whole clip is the root mean square (RMS) over all samples.",
         *picture,
     ]
 
@@ -132,8 +133,9 @@ def _in_short(found: Results) -> list[str]:
     lines = [
         "## In short",
         "",
-        f"Updates a second that are as good as {rates} of the state of the art, positions and quaternions apart "
-        f"(`{REFERENCE}`), on the {found.sets[0]}, by the {next(iter(YARDSTICKS.values()))}:",
+        f"The state of the art interpolates positions and quaternions separately (`{REFERENCE}`). At {rates} updates a "
+        f"second it has a certain {next(iter(YARDSTICKS.values()))} on the {found.sets[0]}. To have no larger an "
+        "error, the other ways need:",
         "",
         f"- The paper: {percents([row.saved for row in claims.TABLE])} less bandwidth.",
         f"- A screw (`{SCREW}`): {less(found.saved(SCREW))}. {verdict(found.saved(SCREW))}",
@@ -142,13 +144,14 @@ def _in_short(found: Results) -> list[str]:
     for mode in SPLINES:
         if mode in MODES and np.isfinite(found.saved(mode)).any():
             ahead = MODES[mode].ahead
-            wait = f"for {ahead} update more to wait for" if ahead else "without waiting for any update more"
+            wait = f"which has to wait for {ahead} more update" if ahead else "which waits for no later update"
             lines.append(f"- `{mode}`, {wait}: {less(found.saved(mode))}. {verdict(found.saved(mode))}")
     for mode in (REFERENCE, SPLINES[0]):
         saved = found.saved(mode, ADAPTIVE)
         if np.isfinite(saved).any():
             lines.append(
-                f"- `{mode}` with keys where it needs them, which takes the whole recording: {less(saved)}. "
+                f"- `{mode}` with keys placed where it needs them, for which the whole recording has to be known: "
+                f"{less(saved)}. "
                 f"{verdict(saved)}"
             )
     lines += sending_section.in_short(found.sending, found.sets[0])
@@ -171,11 +174,11 @@ def _triangle(found: Results) -> list[str]:
         "",
         "![A triangle between two extreme poses, by LERP in yellow and by SLERP in green](paper/triangle.png)",
         "",
-        f"{len(found.steps)} in-betweens at even steps. Both run from the one pose to the other, and SLERP turns "
-        f"evenly: {found.steps[0].slerp_turned_deg:.1f}° at every step, where LERP turns "
-        f"{found.steps[0].lerp_turned_deg:.1f}° at the first and {_middle_step(found.steps):.1f}° half-way. They are "
-        f"apart by {far.apart_m * 1e3:.0f} mm at most, on a way of metres, and by {off.apart_deg:.1f}°. On the short "
-        "ways between two updates of a hand it is far less: see the table.",
+        f"{len(found.steps)} in-betweens at even steps. Both go from the one pose to the other. SLERP turns evenly, by "
+        f"{found.steps[0].slerp_turned_deg:.1f}° at every step; LERP turns by {found.steps[0].lerp_turned_deg:.1f}° at "
+        f"the first step and by {_middle_step(found.steps):.1f}° half-way. They differ by at most "
+        f"{far.apart_m * 1e3:.0f} mm, on a path of metres, and by {off.apart_deg:.1f}°. On the short paths between two "
+        "updates of a hand they differ far less: see the table.",
     ]
 
 
@@ -189,9 +192,9 @@ def _strips(found: Results) -> list[str]:
         "",
         "![A drill at seven moments under the state of the art, dual quaternions and multivectors](paper/strips.png)",
         "",
-        "A tool that turns about its tip, from the first pose and the last alone. The tip leaves its place by "
-        f"{listed(told)}. Position and rotation apart take the origin straight; a screw takes the tool about the "
-        "point that it turned about.",
+        "A tool that turns about its tip, computed from its first and its last pose only. The tip leaves its place by "
+        f"{listed(told)}. If position and rotation are interpolated separately, the origin moves straight; a screw "
+        "turns the tool about the point that it turned about.",
     ]
 
 
@@ -203,7 +206,7 @@ def _engines(found: Results) -> list[str]:
         "",
         "![Sequence diagram: sender, receiver and display, with an alternative for each algebra](paper/engines.svg)",
         "",
-        "Drawn from the program's own table of modes. What is sent is the same for all.",
+        "Drawn from the program's own table of modes. The sender sends the same for all of them.",
     ]
 
 
@@ -224,10 +227,10 @@ def _catching(found: Results) -> list[str]:
         lines += ["[The same as a film](paper/catching.mp4).", ""]
     lines += [
         "A third person's view of `throw.csv`, with hands made up around it: the tool and both hands are streams of "
-        f"their own, packed, sent over a link of {1e3 * LINK.latency:.0f} ms and filled in by the receiver. In a "
-        "cell: the RMS shell error of the tool in mm; the most that the tool slips in the hand that holds it, in mm; "
-        "the gap between tool and hand at the catch, in mm. Errors and gaps are over several senders that begin one "
-        "after the other.",
+        f"their own, packed, sent over a link of {1e3 * LINK.latency:.0f} ms and interpolated by the receiver. Each "
+        "cell has three numbers in mm: the RMS shell error of the tool; how far the tool slips at most in the hand "
+        "that holds it; and the gap between tool and hand at the catch. Errors and gaps are over several senders that "
+        "begin one after the other.",
         "",
         *grid(
             ["mode", *(f"{rate}/s" for rate in rates)],
@@ -251,16 +254,16 @@ def _catching(found: Results) -> list[str]:
     if steady and loose:
         lines.append(
             f"Under {listed(steady)} a tool stays in the hand that holds it, whatever point of the hand is tracked; "
-            f"under {listed(loose)} it slips. That is a gain of screws which no error of a single body shows."
+            f"under {listed(loose)} it slips. No error of a single body shows this advantage of screws."
         )
     best = {rate: min(modes, key=lambda mode: at[mode, rate].rms_shell_m) for rate in rates}
     better = [f"{rate}/s" for rate in rates if at[SCREW, rate].rms_shell_m < at[REFERENCE, rate].rms_shell_m]
     where = (
-        f"nearer than the state of the art at {listed(better)}" if better else "further off than the state of the art"
+        f"closer than the state of the art at {listed(better)}" if better else "further off than the state of the art"
     )
     lines.append(
-        f"Over the whole throw a screw is {where}: in the air a body turns about its centre of mass, and that runs on "
-        f"a parabola. Nearest is {listed([f'`{best[rate]}` at {rate}/s' for rate in rates])}."
+        f"Over the whole throw a screw is {where}: in the air a body turns about its centre of mass, which moves on a "
+        f"parabola. Closest is {listed([f'`{best[rate]}` at {rate}/s' for rate in rates])}."
     )
     return lines
 
@@ -274,9 +277,9 @@ def _table(found: Results) -> list[str]:
         "The lowest rate at which a mode is as good as the state of the art at its rate, and the bandwidth saved, or "
         "how much more it takes. As good means no larger an error, by three yardsticks set beforehand. Geometric "
         "means over clips, of which one counts where it has two samples to an update: "
-        f"{_clips_counted(found)}. The first row after the paper's is a check: the state of the art held against "
-        f"itself, which needs what it has but for {_check(found):.0%} at most. Rates that were as good on some clips "
-        "only say on how many. A dash: on none.",
+        f"{_clips_counted(found)}. The first row after the paper's is a check, which compares the state of the art "
+        f"with itself: it should need its own rates, and does to within {_check(found):.0%}. Where a rate was as good "
+        "on some clips only, the cell says on how many. A dash: on none.",
         "",
     ]
     for one in found.sets:
@@ -335,8 +338,8 @@ def _clip_by_clip(found: Results) -> list[str]:
     return [
         "## Clip by clip",
         "",
-        f"The bandwidth saved by the {name}, in a cell by {listed([f'`{mode}`' for mode in shown])}. All of it, with "
-        "the other modes and yardsticks, is in `table.csv`.",
+        f"The bandwidth saved for the same {name}; each cell has that of {listed([f'`{mode}`' for mode in shown])}. "
+        "`table.csv` has all of it, with the other modes and yardsticks.",
         "",
         *grid(["clip", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)], rows),
     ]
@@ -362,10 +365,10 @@ def _look_ahead(found: Results) -> list[str]:
     return [
         "## What it has to wait for",
         "",
-        "A receiver fills in between two updates, so it shows every pose an interval late; a spline that takes the "
-        "update after as well is later by one more. Milliseconds from an update to its pose on the screen, the link "
-        "not counted, at the rates of the table above. Keys where they are needed take the whole recording: no "
-        "stream has that.",
+        "A receiver interpolates between two updates, so it shows every pose one interval late. A spline that also "
+        "needs the update after these two is late by one more interval. The table has the milliseconds from an update "
+        "to its pose on the screen, without the time on the link, at the rates of the table above. Modes with keys "
+        "where needed are left out: choosing these keys takes the whole recording, which no stream has.",
         "",
         *grid(["mode", "behind", "ahead", *(f"{row.quality}, {row.state_of_the_art}/s" for row in claims.TABLE)], rows),
     ]
@@ -378,10 +381,12 @@ def _files(found: Results) -> list[str]:
         "| file | what |",
         "|---|---|",
         "| `table.csv` | every cell of Table 1, for every clip and set of clips |",
-        "| `errors.csv` | the curves behind it: errors of every mode at every rate that was tried |",
-        "| `bows.csv`, `look_ahead.csv`, `clips.csv` | k; the waiting; the clips, and those left out |",
-        "| `timing.csv` | the races |",
-        "| `catching.csv`, `triangle.csv`, `strips.csv` | the figures in numbers |",
+        "| `errors.csv` | the curves behind the table: errors of every mode at every rate that was tried |",
+        "| `bows.csv` | the number k |",
+        "| `look_ahead.csv` | what each mode has to wait for |",
+        "| `clips.csv` | the clips, and those left out |",
+        "| `timing.csv` | running times |",
+        "| `catching.csv`, `triangle.csv`, `strips.csv` | the numbers of the figures |",
         "| `bandwidth.csv` | bytes |",
         "| `sending.csv`, `sent.csv` | streams that are sent when needed: every cell, and every stream behind it |",
     ]

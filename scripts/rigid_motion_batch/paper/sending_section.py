@@ -25,13 +25,13 @@ def sending_section(found: Sequence[SentNeeded], sets: Sequence[str]) -> list[st
     lines = [
         HEADING,
         "",
-        "The same question for a live stream: a sender that knows every pose, and what the receiver shows, sends a "
-        "key when what is shown would be off by more than a tolerance, and chooses the one that carries furthest. The "
-        "play-out may be behind by more than the one interval of the even stream: the delays are multiples of that "
-        f"interval, and nothing else is looked ahead. `{TWISTS}` sends how the body moves along with where it is, 13 "
-        "numbers instead of 7. In a cell: updates a second that are as good as the even stream of the state of the "
-        f"art at its rate, and how many fewer. Heartbeats, the newest key again after {HEARTBEAT:g} s of silence, are "
-        "counted among the updates.",
+        "The same question for a live stream. The sender knows every pose, and what the receiver shows. It sends a key "
+        "when the picture would otherwise be off by more than a tolerance, and chooses the key that keeps the picture "
+        "within it for longest. The play-out may be behind by more than the one interval of the even stream: the "
+        "delays are multiples of that interval, and the sender looks no further ahead. "
+        f"`{TWISTS}` sends how the body moves along with where it is, 13 numbers instead of 7. Each cell has the "
+        "updates a second that are as good as the even stream of the state of the art at its rate, and how many fewer "
+        f"that is. Heartbeats (the newest key again after {HEARTBEAT:g} s of silence) count as updates.",
         "",
     ]
     for one in there:

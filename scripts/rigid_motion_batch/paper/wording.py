@@ -37,11 +37,11 @@ def _less_or_more(saved: float, word: str) -> str:
 
 
 def verdict(saved: Sequence[float]) -> str:
-    """Whether the paper's saving is there."""
-    good = [row.quality.lower() for row in holding(saved)]
-    if len(good) == len(claims.TABLE):
-        return "That is the paper's saving in every row."
-    return f"The paper's saving is there for {listed(good)}." if good else "The paper's saving is in no row."
+    """At which of the paper's rates its saving is reached."""
+    reached = [str(row.state_of_the_art) for row in holding(saved)]
+    if len(reached) == len(claims.TABLE):
+        return "This reaches the paper's saving at every rate."
+    return f"This reaches the paper's saving {f'at {listed(reached)} only' if reached else 'at no rate'}."
 
 
 def holding(saved: Sequence[float]) -> list[claims.Row]:

@@ -21,9 +21,9 @@ def _live_edits(page: str) -> str:
     played = [numbers(one.row("all frames played")[3])[0] for one in everyday]
     scene = everyday[0].section.rpartition(", turned by")[0]
     return (
-        f"Measured: edits, playback and files with modes, beside Blender without. Of {scene}, an edit of one key takes "
-        f"{' and '.join(dict.fromkeys(edits))} (quaternions and Euler angles), and playback {span(played, 2)} times as "
-        "long."
+        f"Measured: edits, playback and files with modes, beside Blender without. With {scene}, an edit of one key "
+        f"takes {' and '.join(dict.fromkeys(edits))} (quaternions and Euler angles), and playback {span(played, 2)} "
+        "times as long."
     )
 
 
@@ -33,7 +33,9 @@ def _live_beside_baking(page: str) -> str:
     slower = sum(row[3].endswith("times as long") for row in rows)
     if not ratios:
         raise LookupError("no baking")
-    text = f"Filling in, choosing a mode and baking are {span(ratios)} times faster than Blender's own baking"
+    text = (
+        f"Computing in-betweens, choosing a mode and baking are {span(ratios)} times faster than Blender's own baking"
+    )
     return f"{text}, and slower in {slower} case{'s' * (slower > 1)}." if slower else f"{text}, and nowhere slower."
 
 
@@ -112,7 +114,8 @@ def _bodies_beside_greedy(page: str) -> str:
     optimal = sum(keys == best for keys, best in known)
     return (
         f"Key poses of whole bodies are {span(ratios, 2)} times as many as by greedy insertion; the goal was missed in "
-        f"{missed} of {len(ratios)} cases, and {optimal} of the {len(known)} whose optimum is known are at it."
+        f"{missed} of {len(ratios)} cases. In {optimal} of the {len(known)} cases whose optimum is known, they are the "
+        "optimum."
     )
 
 
@@ -121,8 +124,8 @@ def _beside_ozz(page: str) -> str:
     rows = [row for row in found.rows if row[4]]
     missed = sum("missed" in row[4] for row in rows)
     return (
-        f"Of the keys that ozz-animation needs it takes {span([float(row[3]) for row in rows], 2)} times as many at "
-        f"the same error; the goal was missed by {missed} of {len(rows)} modes."
+        f"For the same error it takes {span([float(row[3]) for row in rows], 2)} times the keys of ozz-animation; the "
+        f"goal was missed by {missed} of {len(rows)} modes."
     )
 
 
@@ -191,6 +194,6 @@ def _baked_between(page: str) -> str:
         for column in ("baked every 0.25, mm", "baked every frame, mm")
     )
     return (
-        f"Baked every quarter of a frame, {span(finely, 2)} times that is left. Where it hurts: baked on whole frames "
-        f"it is {span(whole, 2)} times as much, so that is no way out."
+        f"Baking every quarter of a frame leaves {span(finely, 2)} times that error. Where it hurts: baking on whole "
+        f"frames leaves {span(whole, 2)} times, so it does not help."
     )

@@ -47,8 +47,9 @@ def _papers_question(page: str) -> str:
     saved = _saved(table, screw)
     verdict = "which is the paper's saving" if min(_margins(saved, paper)) >= 0 else "which is not what the paper says"
     return (
-        "Measured: how many updates a second each mode needs to be as good as position and rotation apart at 30, 20, "
-        f"15 and 12. The paper has {_less(paper)} for screws and motors; here it is {_less(saved)}, {verdict}."
+        "Measured: how many updates a second each mode needs to be as good as position and rotation interpolated "
+        f"separately at 30, 20, 15 and 12. The paper has {_less(paper)} for screws and motors; here it is "
+        f"{_less(saved)}, {verdict}."
     )
 
 
@@ -59,9 +60,10 @@ def _what_saves(page: str) -> str:
     margins = _margins(chosen, paper)
     held = sum(margin >= 0 for margin in margins)
     return (
-        f"What saves is to go smoothly through the keys (`motor_spline`: {_less(smooth)}, a stream waits for an update "
-        f"more) and to put them where they are needed (with it {_less(chosen)}, which takes the whole recording). That "
-        f"reaches the paper's figures in {held} of {len(margins)} rows, the narrowest {_margin(min(margins))}."
+        f"Two things save updates: to pass through the keys smoothly (`motor_spline`: {_less(smooth)}, but a stream "
+        f"waits for one more update), and to place the keys where they are needed (both together: {_less(chosen)}, but "
+        "that takes the whole recording). Together they reach the paper's figures in "
+        f"{held} of {len(margins)} rows, the narrowest {_margin(min(margins))}."
     )
 
 
@@ -86,9 +88,9 @@ def _streams(page: str) -> str:
         raise LookupError("no streams")
     first = "`motor_twists`, 2 intervals"
     return (
-        f"A live sender that sends when needed has {_less(_saved(sent[0], first), 'fewer')} updates at a delay of 2 "
-        f"intervals instead of 1, but only {_less(_saved(packed[0], first), 'fewer')} numbers, since an update then "
-        "has 13 and not 7."
+        f"A live sender that sends only when needed has {_less(_saved(sent[0], first), 'fewer')} updates at a delay of "
+        f"2 intervals instead of 1, but only {_less(_saved(packed[0], first), 'fewer')} numbers, because an update "
+        "then has 13 numbers instead of 7."
     )
 
 

@@ -11,7 +11,7 @@ from .options import TICKS, ReadingOptions
 
 def add_reading_options(parser: argparse.ArgumentParser) -> None:
     """Add a group of options, of which `reading_options` makes one thing."""
-    group = parser.add_argument_group("reading", "What recordings do not say of themselves; docs/csv.md has examples.")
+    group = parser.add_argument_group("reading", "For recordings that leave something out; docs/csv.md has examples.")
     group.add_argument(
         "--columns",
         type=_columns,
@@ -19,7 +19,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         metavar="t=NAME,...",
         help="columns of CSVs by name: t, x, y, z, qx, qy, qz, qw, rx, ry, rz (Euler angles), scale, device",
     )
-    group.add_argument("--time-unit", choices=TICKS, help="what times count, whatever the file says")
+    group.add_argument("--time-unit", choices=TICKS, help="unit of the times, whatever the file says")
     group.add_argument("--scale", type=_scale, metavar="M", help="metres in a unit of length: 0.01 for centimetres")
     group.add_argument(
         "--euler",
@@ -28,7 +28,7 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="order of the Euler angles of CSVs: YXZ about the moved axes (intrinsic), zxy about those of the world",
     )
     group.add_argument(
-        "--degrees", action="store_true", help="they are degrees; otherwise as their names say, or radians"
+        "--degrees", action="store_true", help="the Euler angles are in degrees (as the columns' names say, or radians)"
     )
 
 

@@ -65,11 +65,12 @@ def _bodies(bodies: list[Body], left_out: list[str]) -> Iterator[str]:
     yield "## Whole bodies"
     yield ""
     yield from _paragraph(f"""
-Bodies are imported by Blender's own importers, BVH turned by quaternions; of recordings longer than {MOST_FRAMES}
-frames, these first. Where the armature itself is animated it is a joint too, the one that all others hang on. They are
-made the same size: the largest extent of the joints in the first frame, along any axis, becomes {HEIGHT:g} m. The error
-is that of every joint with all that it hangs on, the largest displacement of any point in a ball of
-{100.0 * RADIUS:g} cm around it, on every frame; {1e3 * TOLERANCE:g} mm are allowed unless told otherwise.
+Blender's own importers read the bodies, BVH with quaternions as the rotation mode. Of longer recordings the first
+{MOST_FRAMES} frames are taken. If the armature itself is animated, it counts as a joint, on which all others hang. All
+bodies are made the same size: the largest extent of the joints in the first frame, along any axis, becomes {HEIGHT:g}
+m. The error is measured where the chain of joints puts a joint: it is the largest displacement of any point in a ball
+of {100.0 * RADIUS:g} cm around the joint, on every frame. The tolerance is {1e3 * TOLERANCE:g} mm unless a section
+says otherwise.
 """)
     yield "| body | joints | frames | frames a second | largest extent in the file |"
     yield "|---|---:|---:|---:|---:|"
@@ -84,11 +85,11 @@ def _greedy(bodies: list[Body]) -> Iterator[str]:
     yield "### Key poses beside greedy insertion"
     yield ""
     yield from _paragraph(f"""
-All joints have keys on the same frames. *Greedy* puts in one key at a time, on the frame that is off most, until none
-is by too much; then every key in turn is taken out that can be. The *optimum* is the fewest there can be, by a dynamic
-programme that tries every frame as the next key; where what is between two keys depends on two more, it is found for at
-most {against_greedy.SHORT} frames. The goal is at most {against_greedy.GOAL:g} of the greedy keys. Where the optimum
-is above that, no choice of keys could meet it.
+All joints have keys on the same frames. *Greedy* adds one key at a time, on the frame with the largest error, until
+all errors are within the tolerance; then it takes out every key that it can do without. The *optimum* is the smallest
+possible number of keys, found by dynamic programming, which tries every frame as the next key; for modes that look at
+four keys, only bodies of at most {against_greedy.SHORT} frames have it. The goal is at most {against_greedy.GOAL:g} of
+the greedy keys. Where the optimum is above that, no choice of keys could meet the goal.
 """)
     _say("greedy insertion ...")
     yield from against_greedy.report(bodies, TOLERANCE)
@@ -99,11 +100,12 @@ def _decimate(decimated: list[tuple[Body, list[against_decimate.Left]]]) -> Iter
     yield "### Keys beside Blender's Decimate"
     yield ""
     yield from _paragraph(f"""
-`{MODE}`, with keys of each joint's own and as key poses; and Decimate on all F-curves with one error margin, found by
-bisection so that the body is off by the same, measured on what the F-curves show. Counted are channels that vary in the
-recording by more than {VARIES:g} (of the file's unit, a quaternion's component or a radian). The numbers are a frame
-and a value in each of its channels for a key of a joint, the frame only once for a key pose; six for a key with free
-handles; and two for a straight one, as imported. Imported keys may be between frames; what shows there is not measured.
+`{MODE}` with keys of each joint's own, and with key poses, beside Decimate on all F-curves. Decimate gets one error
+margin, found by bisection so that the body has the same largest error, measured on what the F-curves show. Only
+channels count that vary in the recording by more than {VARIES:g} (of the file's unit, a quaternion's component or a
+radian). The column *numbers* counts what has to be stored: for a key of a joint its frame and a value in each channel,
+where a key pose has its frame only once; six for a key with free handles; and two for a straight key, as imported.
+Imported keys may lie between frames; what Blender shows there is not measured.
 """)
     yield from against_decimate.HEADER
     for body, left in decimated:
@@ -122,12 +124,13 @@ def _ozz(found: dict[str, Body]) -> Iterator[str]:
     yield from _paragraph(f"""
 {body.name} in its own size ({body.extent:.2f} m): with {against_published.OZZ_KEYS} of
 {against_published.OZZ_BEFORE} keys ozz-animation is off by {1e3 * against_published.OZZ_LARGEST:g} mm at
-{100.0 * against_published.OZZ_RADIUS:g} cm from the joints. Each joint has keys of its own here, within the same error
-of any point in a ball of that radius. Translation, rotation and scale are tracks of their own there, so a key of a
-joint counts once for its translation and once for its rotation, where these vary. A track that stays where it is keeps
-one key in ozz-animation, and none at its identity (`Decimate` in `src/animation/offline/decimate.h` takes the last key
-away for as long as the one before, or the identity, is within the tolerance); they are counted so here. Translations
-that change by less than a hundredth of the tolerance are kept constant first. The goal is half as many.
+{100.0 * against_published.OZZ_RADIUS:g} cm from the joints. Here each joint gets keys of its own, within the same error
+for any point in a ball of that radius. In ozz-animation, translation, rotation and scale are separate tracks, so a key
+of a joint counts once for its translation and once for its rotation, where these vary. A track that does not change
+keeps one key in ozz-animation, and none if it is the identity (`Decimate` in `src/animation/offline/decimate.h` takes
+the last key away as long as the one before, or the identity, is within the tolerance); it is counted in the same way
+here. Before the search, translations that change by less than a hundredth of the tolerance are made constant. The goal
+is half as many keys.
 """)
     _say("ozz-animation ...")
     yield from against_published.ozz(body)
@@ -139,10 +142,10 @@ def _salient_poses(bodies: list[Body]) -> Iterator[str]:
     yield ""
     yield from _paragraph(f"""
 Its authors (Roberts, Lewis and Anjyo, "Optimal and interactive keyframe selection for motion capture", 2019) report
-medians over 20 clips of their own, which are not at hand: what is below is of other motions, and no race. Key poses
-under `{MODE}`, with a budget; the errors are displacements of the joints themselves, and the mean is that of all joints
-and frames. That they measure the same is an assumption. The median is of the bodies here that are long enough to
-leave two poses.
+medians over 20 clips of their own, which are not available. The numbers below are of other motions, so this is no fair
+race. They are for key poses under `{MODE}`, with a budget. The errors are displacements of the joints themselves, and
+the mean is over all joints and frames; we assume that the authors measure the same. The median is over the bodies here
+that are long enough to leave two poses.
 """)
     _say("Salient Poses ...")
     yield from against_published.salient_poses(bodies, MODE)
@@ -153,10 +156,10 @@ def _feet(bodies: list[Body]) -> Iterator[str]:
     yield "### Feet that stand"
     yield ""
     yield from _paragraph(f"""
-A joint of a foot (its name tells) stands where it is slower than {100.0 * feet.STILL:g} cm/s in the recording, at most
-{100.0 * feet.LOW:g} cm above the lowest that it gets, for at least {feet.SHORTEST:g} s. Its slide is how far it gets
-meanwhile, across the ground, from where it began to stand: the largest, and the sum over all contacts; `{MODE}`. Feet
-that weigh {feet.WEIGHT:g} keep to {1e3 * TOLERANCE / feet.WEIGHT:g} mm.
+A joint of a foot (known by its name) stands while it is slower than {100.0 * feet.STILL:g} cm/s in the recording and at
+most {100.0 * feet.LOW:g} cm above its lowest place, for at least {feet.SHORTEST:g} s. Its slide is how far it moves
+across the ground meanwhile, from where it began to stand. The table has the largest slide, and the sum over all
+contacts, under `{MODE}`. Feet with a weight of {feet.WEIGHT:g} stay within {1e3 * TOLERANCE / feet.WEIGHT:g} mm.
 """)
     _say("feet ...")
     yield from feet.report(bodies, MODE, TOLERANCE)
@@ -167,8 +170,8 @@ def _timing(paths: list[Path], found: dict[str, Body], recordings: list[tuple[st
     yield "### Time"
     yield ""
     yield from _paragraph(f"""
-`{timing.MODE}`, the faster of {timing.RUNS} runs, and in multiples of what greedy insertion of key poses takes for the
-same in this run. Seconds are those of the machine at hand, which may have had other work to do.
+The time of `{timing.MODE}`, the faster of {timing.RUNS} runs, and as a multiple of the time that greedy insertion of
+key poses takes for the same in this run. Seconds are those of one machine, which may have had other work to do.
 """)
     _say("time ...")
     timed: list[tuple[Body, float | None]] = []
@@ -181,13 +184,13 @@ same in this run. Seconds are those of the machine at hand, which may have had o
     yield from timing.bodies(timed or [(body.of_size(HEIGHT), None) for body in found.values()], TOLERANCE)
     yield ""
     if CYCLE in found:
-        yield f"A frame should cost at most {timing.GOAL_LONGER:g} times as much in a recording that is longer:"
+        yield f"In a longer recording, a frame should take at most {timing.GOAL_LONGER:g} times as long:"
         yield ""
         yield from timing.longer(found[CYCLE].of_size(HEIGHT), CYCLE_FRAMES, TOLERANCE)
         yield ""
     yield from _paragraph(f"""
-Single recordings, their first {timing.SAMPLES} samples within {1e3 * timing.SINGLE_TOLERANCE:g} mm at a radius of
-{timing.SINGLE_RADIUS:g} m; the goal is {timing.GOAL_SINGLE:g} s:
+The time of single recordings: their first {timing.SAMPLES} samples, within {1e3 * timing.SINGLE_TOLERANCE:g} mm at a
+radius of {timing.SINGLE_RADIUS:g} m. The goal is {timing.GOAL_SINGLE:g} s:
 """)
     yield from timing.recordings(recordings)
     yield ""

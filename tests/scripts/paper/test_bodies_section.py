@@ -115,8 +115,8 @@ def test_every_file_is_on_the_page_and_halved_numbers_change_it():
         if name != "limbs":
             assert section(**{name: halved}) != before, name
     carried = [replace(limb, chain=3 + limb.number) for limb in LIMB_ROWS]
-    assert "it takes 3 to 4 keys for one" in section(limbs=carried)
-    assert "it takes 7 keys for one" in before
+    assert "3 to 4 keys take the place of one" in section(limbs=carried)
+    assert "7 keys take the place of one" in before
 
 
 def test_it_says_at_which_rates_which_bodies_count():
@@ -172,11 +172,11 @@ def test_what_no_keys_reach_is_a_dash_and_on_some_bodies_it_says_on_how_many():
 
 def test_where_joints_only_turn_screw_and_slerp_are_called_one_motion():
     text = section()
-    assert "but the roots of `fast` get about by 0 mm at most: screw and SLERP are one motion there." in text
-    assert "In `slow` a joint gets about by up to 12.3 mm" in text
-    assert "apart by up to 2.1 mm in its parent's space (`Thigh`) and by 3.2 mm in that of the roots" in text
+    assert "all joints but the roots of `fast` move by at most 0 mm: screw and SLERP are the same motion there." in text
+    assert "In `slow` a joint moves by up to 12.3 mm" in text
+    assert "two differ by up to 2.1 mm in its parent's space (`Thigh`) and by 3.2 mm in that of the roots" in text
     moved = [replace(row, parents_m=0.5) for row in ROWS["apart"]]
-    assert "are one motion" not in section(apart=moved)
+    assert "are the same motion" not in section(apart=moved)
 
 
 def test_whose_the_difference_is_follows_the_numbers():
@@ -197,16 +197,18 @@ def test_that_both_turn_alike_is_told_only_where_it_is_measured():
 
 def test_which_way_is_nearer_follows_the_numbers():
     assert (
-        "- Hands are nearer alone, under every mode. Alone, the error at 5 and 10 a second is 10.0% less" in section()
+        "- Hands are closer to the recording alone, under every mode. Alone, the error at 5 and 10 a second is 10.0% "
+        in section()
     )
     rows = [replace(row, rms_shell_m=9.0) if row.way == ALONE else row for row in ROWS["errors"]]
-    assert "- Feet are nearer through their joints, under every mode." in section(errors=rows)
+    assert "- Feet are closer to the recording through their joints, under every mode." in section(errors=rows)
     rows = [
         replace(row, rms_shell_m=9.0) if row.way == ALONE and (row.mode, row.rate) != ("pga_lerp", 5) else row
         for row in ROWS["errors"]
     ]
-    assert "- Heads are nearer alone under `pga_lerp` at 5/s, and through their joints otherwise." in section(
-        errors=rows
+    assert (
+        "- Heads are closer to the recording alone under `pga_lerp` at 5/s, and through their joints otherwise."
+        in section(errors=rows)
     )
 
 

@@ -134,7 +134,7 @@ def half(row):
 
 @pytest.mark.parametrize(
     ("share", "verdict"),
-    [(0.3, "That is the paper's saving in every row."), (0.95, "The paper's saving is in no row.")],
+    [(0.3, "This reaches the paper's saving at every rate."), (0.95, "This reaches the paper's saving at no rate.")],
 )
 def test_the_verdict_is_that_of_the_numbers(tmp_path: Path, share: float, verdict: str):
     rows = [cell for mode in MODES for cell in needed(RECORDINGS, mode, share if mode == "dq_sclerp" else 1.0)]
@@ -167,9 +167,11 @@ def test_the_gain_of_screws_in_a_hand_is_told_only_where_it_is_measured(tmp_path
 
 
 def test_bytes_that_are_not_those_of_the_paper_are_called_so(tmp_path: Path):
-    assert "the same. With" in written(tmp_path)
+    assert "the same. A receiver also" in written(tmp_path)
     _, rows = FILES["bandwidth.csv"]
-    assert "not the same. With" in written(tmp_path, bandwidth=[replace(row, bytes_per_s=1000.0) for row in rows])
+    assert "not the same. A receiver also" in written(
+        tmp_path, bandwidth=[replace(row, bytes_per_s=1000.0) for row in rows]
+    )
 
 
 def test_energy_is_not_claimed(tmp_path: Path):

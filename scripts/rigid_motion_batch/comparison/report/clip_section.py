@@ -181,12 +181,14 @@ def _rate_section(name: str, clip: str, result: Result, films: Films, folder: Pa
 def _said_of_body(rows: Sequence[Metrics]) -> str:
     """What the numbers of a whole body are of."""
     first = rows[0]
-    said = f"Over all {first.joints} joints, each in the root's space; the largest is that of the worst joint."
+    said = (
+        f"Over all {first.joints} joints, where the chain of joints puts them; the largest is that of the worst joint."
+    )
     if first.recorded_slide_m is None:
         return said
     return (
-        f"{said} Feet slide: the farthest that a joint which stands on the ground gets meanwhile; in the recording "
-        f"itself {rounded(1e3 * first.recorded_slide_m)} mm."
+        f"{said} Feet slide: the farthest that a joint moves while it stands on the ground; in the recording itself "
+        f"{rounded(1e3 * first.recorded_slide_m)} mm."
     )
 
 
@@ -215,7 +217,7 @@ def _film(name: str, film: Path | None, folder: Path) -> Markup:
     if not film.is_file():
         return element(
             "div",
-            element("p", "The video is being rendered, and shows here once it is there.", class_="note"),
+            element("p", "The video is being rendered, and will appear here.", class_="note"),
             class_="film coming",
             data_coming=link,
         )

@@ -80,10 +80,10 @@ def _said(ours: Iterable[KeysOfBody]) -> str:
     """What is compared with what."""
     shared = any(row.how == SHARED for row in ours)
     return (
-        "Of a rig with a key on every sample, between straight lines or smooth, Decimate is given the one error margin "
-        "for all F-curves with which it leaves the fewest keys and no larger error. Ours are "
-        f"{'key poses of all joints together' if shared else 'keys of each joint for itself'}: a key is the pose of a "
-        "joint; its numbers are its turn, its place where that varies, and its time, which a key pose has once. A key "
-        "of Decimate is one of a single F-curve, with free handles: six numbers. What a mode fills in between its keys "
-        "is worked out from them, and not counted."
+        "Decimate gets a rig with a key on every sample, joined by straight lines or smooth curves, and one error "
+        "margin for all F-curves: the one that leaves the fewest keys with no larger error. Our keys are "
+        f"{'key poses of all joints together' if shared else 'keys of each joint for itself'}. Such a key is the pose "
+        "of a joint; its numbers are its rotation, its location where that varies, and its time, which a key pose has "
+        "once. A key of Decimate belongs to a single F-curve and has free handles: six numbers. The in-betweens of a "
+        "mode are computed from its keys, and not counted."
     )

@@ -125,8 +125,8 @@ def _what_is_identical(summary: Summary, labels: dict[str, str]) -> list[str]:
         return []
     where = "" if summary.errors[..., 0].size == 1 else f", on every clip {_every(summary)}"
     return [
-        f"Identical in-betweens came from {'; and from '.join(same)}{where}. They share a line in the plots, and here "
-        "the first of them speaks for the others."
+        f"Identical in-betweens came from {'; and from '.join(same)}{where}. They share a line in the charts, and the "
+        "sentences below name only the first of them."
     ]
 
 
@@ -168,8 +168,8 @@ def _keys_for_the_same_error(summary: Summary, labels: dict[str, str]) -> list[s
     paper = UPDATES_IN_THE_PAPER.get(highest)
     beside = f"; the paper's table has {paper} instead of {highest}" if paper else ""
     return [
-        f"The error of {labels[summary.reference]} at {highest} keys/s was reached {listed(needed)} keys/s (read off "
-        f"between the rates of this run{beside})."
+        f"The error of {labels[summary.reference]} at {highest} keys/s was reached {listed(needed)} keys/s "
+        f"(interpolated between the rates of this run{beside})."
     ]
 
 

@@ -18,8 +18,8 @@ SPACINGS = {"uniform": "evenly spaced", "adaptive": "adaptive", "fitted": "adapt
 """What the decimations are called."""
 
 HOW_TO_READ = (
-    "Solid: keys where the mode needs them. Dashed: evenly spaced keys. The further to the lower left, the fewer keys "
-    "for an error."
+    "Solid: keys placed where the mode needs them. Dashed: evenly spaced keys. The further a line is to the lower "
+    "left, the fewer keys the mode needs for the same error."
 )
 
 
@@ -28,12 +28,12 @@ def keys_section(clips: Sequence[KeysNeeded]) -> Markup:
     together = overall(clips)
     reference = label(REFERENCE)
     explained = (
-        f"How many keys give the RMS shell error that {reference} has with evenly spaced keys at the rate at the head "
-        "of the column: keys that are evenly spaced too, or chosen by the motion. In per cent: of the keys of "
-        f"{reference}."
+        f"At the rate at the head of each column, {reference} with evenly spaced keys has a certain RMS shell error. "
+        "The cell says how many keys a mode needs for the same error, evenly spaced or chosen by the motion, and how "
+        f"many per cent of the keys of {reference} that is."
     )
     if together.shares.shape[1] == len(DECIMATIONS):
-        explained += " Fitted keys are no recorded poses, but moved to where the motion follows the recording best."
+        explained += " Fitted keys are not recorded poses, but moved to where the motion follows the recording best."
     if len(clips) > 1:
         explained += f" Geometric means over the {len(clips)} clips."
     return element(

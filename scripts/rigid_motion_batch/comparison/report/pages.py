@@ -311,9 +311,9 @@ def _opening_of_clips(choices: Sequence[Choice], count: int) -> str:
     ]
     caption = f"All {count} clips"
     explained = (
-        f"For every choice of keys: the RMS shell error of {label_of(REFERENCE)}, or of the first mode of a run "
-        "without it (within a tolerance, its keys a second), and the mode that came closest (or did with the fewest "
-        "keys), with its share of that. A click on a heading sorts."
+        f"Each column has the RMS shell error of {label_of(REFERENCE)} (within a tolerance, its keys a second), or of "
+        "the first mode in a run without it. Below is the mode that came closest (or needed the fewest keys), with its "
+        "number as a share of the first. Click on a heading to sort."
     )
     opening = element(
         "section",
@@ -387,23 +387,22 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
     measures = [
         (
             "Shell error",
-            f"The largest displacement of any point within {radius} of the body's origin{of_joints}: "
-            "position and rotation together, as a body of that size shows them.",
+            f"The largest distance by which any point within {radius} of the body's origin{of_joints} is out of place: "
+            "position and rotation together, as they show on a body of that size.",
         ),
         ("Position, rotation", "The distance of the origin, and the angle of the rotation, from the recorded ones."),
         (
             "Velocity",
-            "How much the origin's velocity differs from the recorded one: an in-between that jerks at the "
-            "keys shows here first.",
+            "How much the origin's velocity differs from the recorded one. A jerk at a key shows here first.",
         ),
         (
             "RMS, 95th percentile, largest",
-            "Over the recording's own samples between the first and the last key, the keys themselves among them.",
+            "Over all samples of the recording from the first key to the last, with the keys themselves.",
         ),
         (
             "Bytes/s",
-            "Of the keys that were kept: seven double-precision numbers, 56 bytes, for a key. Keys that are not evenly "
-            "spaced need their times too, which are not counted. Where every segment has a mode of its own, a key has "
+            "Size of the keys that were kept: seven double-precision numbers, 56 bytes, for each key. Keys that are "
+            "not evenly spaced also need their times, which are not counted. With a mode for every segment, a key has "
             "one byte more.",
         ),
     ]
@@ -411,7 +410,7 @@ def _modes_section(summary: Summary, settings: Settings) -> Markup:
         "section",
         element("h2", "Modes and measures"),
         element("dl", modes, class_="cards"),
-        element("h3", "How far off is measured as"),
+        element("h3", "How errors are measured"),
         element(
             "dl",
             [element("div", element("dt", name), element("dd", meaning)) for name, meaning in measures],
@@ -445,8 +444,8 @@ def _settings_section(summaries: Sequence[Summary], settings: Settings) -> Marku
         ),
         element(
             "p",
-            "All numbers, at full precision, are in metrics.csv beside this page; the keys and every in-between are in "
-            "the folders of the clips, one for each choice of keys.",
+            "metrics.csv beside this page has all numbers at full precision. The folders of the clips have the keys "
+            "and every in-between, one folder for each choice of keys.",
             class_="note",
         ),
         id="settings",

@@ -14,8 +14,8 @@ from .markup import Content, Markup, element
 
 HEADINGS = {
     Uniform: "Keys evenly spaced",
-    Budget: "As many keys, where the motion needs them",
-    Tolerance: "As few keys as keep to a tolerance",
+    Budget: "As many keys, placed where the motion needs them",
+    Tolerance: "The fewest keys within a tolerance",
 }
 """Of the parts of the summary, where there are several kinds of choices."""
 
@@ -40,12 +40,12 @@ def _summarised(summary: Summary, chart: str) -> list[Content]:
         mean = f", geometric mean over the {len(summary.clips)} clips" if len(summary.clips) > 1 else ""
         measure = "Number of keys" if summary.kind is Tolerance else "RMS shell error"
         where = "within the same tolerance" if summary.kind is Tolerance else "at the same rate"
-        meaning = "as many" if summary.kind is Tolerance else "as far off"
+        meaning = "the same number" if summary.kind is Tolerance else "the same error"
         content += [
             element("h3", f"{summary.what.capitalize()} relative to {reference}"),
             element(
                 "p",
-                f"{measure} as a multiple of that of {reference} {where}{mean}: 1.00 is {meaning}, lower is better.",
+                f"{measure} as a multiple of that of {reference} {where}{mean}: 1.00 means {meaning}, lower is better.",
                 class_="note",
             ),
             element(
@@ -96,10 +96,9 @@ def lead(summaries: Sequence[Summary]) -> Markup:
     clips, modes = len(summaries[0].clips), len(summaries[0].modes)
     return element(
         "p",
-        f"{'One recorded clip' if clips == 1 else f'{clips} recorded clips, each'} thinned to "
-        f"{', and to '.join(map(_kept, summaries))} and filled in again by "
-        f"{'one mode' if modes == 1 else f'{modes} modes'} of interpolation: how far is the in-between motion from "
-        "what was recorded?",
+        f"{'One recorded clip was' if clips == 1 else f'{clips} recorded clips were each'} reduced to "
+        f"{', and to '.join(map(_kept, summaries))}. Then {'one mode' if modes == 1 else f'{modes} modes'} of "
+        "interpolation computed the in-betweens again. This report shows how far they are from what was recorded.",
         class_="lead",
     )
 
@@ -107,6 +106,6 @@ def lead(summaries: Sequence[Summary]) -> Markup:
 def _kept(summary: Summary) -> str:
     """The keys that are kept, in a sentence."""
     if summary.kind is Tolerance:
-        return f"the fewest keys that keep a mode within {listed(summary.amounts)} everywhere,"
-    where = " on average, wherever a mode needs them," if summary.kind is Budget else ""
+        return f"the fewest keys with which a mode stays within {listed(summary.amounts)} everywhere"
+    where = " on average, placed where a mode needs them," if summary.kind is Budget else ""
     return f"{listed(summary.amounts)} keys a second{where}"

@@ -258,7 +258,7 @@ def test_a_run_without_videos_does_not_speak_of_them(page: Page) -> None:
 def test_a_single_clip_at_a_single_rate_under_a_single_mode_is_a_report_too(tmp_path: Path) -> None:
     page = report(tmp_path, [reconstruct(swinging_clip(seconds=0.4), "5", ("pga_lerp",))])
     lead = next(text for _, text in page.find("p", class_="lead"))
-    assert lead.startswith("One recorded clip thinned to 5 keys a second and filled in again by one mode")
+    assert lead.startswith("One recorded clip was reduced to 5 keys a second. Then one mode of interpolation")
     assert "Error over rate" not in page.source
 
 
@@ -414,7 +414,7 @@ def test_modes_with_keys_of_their_own_have_their_numbers_and_marks(adaptive: tup
 def test_the_lead_and_the_settings_tell_the_choices_apart(adaptive: tuple[Page, list[KeysNeeded]]) -> None:
     page, _ = adaptive
     lead = next(text for _, text in page.find("p", class_="lead"))
-    assert "thinned to 10 keys a second, and to the fewest keys that keep a mode within 5 mm and 2 cm" in lead
+    assert "reduced to 10 keys a second, and to the fewest keys with which a mode stays within 5 mm and 2 cm" in lead
     facts = " ".join(text for _, text in page.find("dl", class_="facts"))
     assert "Rates10 keys/s" in facts
     assert "Tolerances5 mm and 2 cm" in facts

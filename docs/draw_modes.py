@@ -1,0 +1,143 @@
+"""Draw each mode between the same keys: where the body goes, and how fast, for the reference of the modes.
+
+python docs/draw_modes.py
+
+It writes docs/modes/MODE.svg. The body turns by 150 degrees and comes back by 120, growing by half on the way.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+DOCS = Path(__file__).resolve().parent
+sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
+
+from rigid_motion.motion import MODES, Poses, interpolate
+from rigid_motion_batch.comparison.palette import THEMES, colour_of, colour_on
+from rigid_motion_batch.comparison.report.markup import Markup, element
+from rigid_motion_batch.files import write_text
+
+TIMES = np.array((0.0, 1.0, 2.0))
+POINTS = np.array(((0.0, 0.0), (1.0, 0.35), (2.0, 0.0)))
+DEGREES = np.array((0.0, 150.0, 30.0))
+SIZES = np.array((1.0, 1.0, 1.5))
+
+STEPS = 12
+"""Bodies and dots in a segment."""
+
+FINE = 120
+"""Samples of a segment for its lines."""
+
+HALF = 0.16
+"""Of the bar that stands for the body, in metres."""
+
+WIDTH, HEIGHT = 720, 270
+SCALE = 160.0
+"""Pixels to a metre."""
+
+LEFT, BASE = 40.0, 180.0
+"""Where the first key stands, in pixels."""
+
+GRAPH = (460.0, 60.0, 240.0, 170.0)
+"""Left, top, width and height of the graph of the speed."""
+
+FASTEST = 3.0
+"""Metres a unit of time at the top of the graph."""
+
+STYLE = """
+.mode{stroke:LIGHT;fill:none}.dot{fill:LIGHT}.faint{stroke:#9aa4b2;fill:none}.key{stroke:#1b2026;stroke-width:4}
+.words{fill:#1b2026}.path{stroke-width:2.5}.body{stroke-width:1.5;opacity:.55}
+text{font:14px system-ui,"Segoe UI",Roboto,"Liberation Sans",sans-serif}
+@media(prefers-color-scheme:dark){.mode{stroke:DARK}.dot{fill:DARK}.key{stroke:#e6eaee}.words{fill:#e6eaee}
+.faint{stroke:#58626e}}
+"""
+
+
+def main() -> None:
+    """Write a picture for each mode."""
+    for mode in MODES:
+        style = STYLE.replace("LIGHT", colour_on(THEMES["light"], mode)).replace("DARK", colour_of(mode))
+        picture = element(
+            "svg",
+            element("title", f"{MODES[mode].label}: path and speed"),
+            element("style", Markup(style)),
+            path_of(mode),
+            speed_of(mode),
+            xmlns="http://www.w3.org/2000/svg",
+            viewBox=f"0 0 {WIDTH} {HEIGHT}",
+            width=WIDTH,
+            height=HEIGHT,
+            role="img",
+        )
+        write_text(DOCS / "modes" / f"{mode}.svg", picture + "\n")
+
+
+def keys() -> Poses:
+    """The three of `POINTS`, `DEGREES` and `SIZES`, in a plane."""
+    half = 0.5 * np.radians(DEGREES)
+    turned = np.stack((np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)), axis=1)
+    return Poses(np.column_stack((POINTS, np.zeros(len(POINTS)))), turned, SIZES)
+
+
+def path_of(mode: str) -> list[Markup]:
+    """The way of the body's middle, and the body at even times, thick on the keys."""
+    way = interpolate(TIMES, keys(), moments(FINE), mode)
+    bodies = interpolate(TIMES, keys(), moments(STEPS), mode)
+    dots = [
+        element("circle", cx=x, cy=y, r=2.5, class_="dot") for x, y in _on_paper(bodies.positions).round(1).tolist()
+    ]
+    return [
+        element("path", d=bars(bodies), class_="mode body"),
+        element("path", d=polyline(_on_paper(way.positions)), class_="mode path"),
+        *dots,
+        element("path", d=bars(keys()), class_="key"),
+        element("text", "path; a bar is the body, at even times", x=20, y=28, class_="words"),
+    ]
+
+
+def speed_of(mode: str) -> list[Markup]:
+    """How fast the body's middle is, over time."""
+    times = moments(FINE)
+    positions = interpolate(TIMES, keys(), times, mode).positions
+    speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)
+    left, top, width, height = GRAPH
+    across = left + width * 0.5 * (times[1:] + times[:-1]) / TIMES[-1]
+    up = top + height * (1.0 - speeds / FASTEST)
+    pieces = np.split(np.stack((across, up), axis=1), [FINE])
+    ticks = [f"M{left + width * time / TIMES[-1]:.1f} {top}v{height}" for time in TIMES.tolist()]
+    return [
+        element("path", d=f"M{left} {top + height}h{width}" + "".join(ticks), class_="faint"),
+        element("path", d="".join(map(polyline, pieces)), class_="mode path"),
+        element("text", "speed of the middle", x=left, y=28, class_="words"),
+        element("text", "time", x=left + width, y=top + height + 22, class_="words", text_anchor="end"),
+        element("text", "0", x=left - 14, y=top + height + 5, class_="words"),
+    ]
+
+
+def moments(count: int) -> np.ndarray:
+    """So many even steps in each segment."""
+    return np.linspace(TIMES[0], TIMES[-1], count * (len(TIMES) - 1) + 1)
+
+
+def bars(poses: Poses) -> str:
+    """The body, along its own y axis, as an SVG path."""
+    angles = 2.0 * np.arctan2(poses.quaternions[:, 3], poses.quaternions[:, 0])
+    along = HALF * np.stack((-np.sin(angles), np.cos(angles)), axis=1) * poses.scales[:, None]
+    ends = [_on_paper(poses.positions[:, :2] + sign * along) for sign in (-1.0, 1.0)]
+    return "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in zip(*ends, strict=True))
+
+
+def polyline(points: np.ndarray) -> str:
+    """A line through points (n, 2) in pixels."""
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+
+
+def _on_paper(points: np.ndarray) -> np.ndarray:
+    return np.stack((LEFT + SCALE * points[:, 0], BASE - SCALE * points[:, 1]), axis=1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""The directive `command`: what a command says of itself and of its options when it is asked for --help."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
+
+READER = Path(__file__).with_name("help_of.py")
+
+TITLE = re.compile(r"(?m)^(\w[\w ,-]*):\n(?=  )")
+"""What begins a part of an epilog: a word or two on a line of its own, and lines that are indented."""
+
+
+class Command(SphinxDirective):
+    """A script or a package of this checkout, or one of its subcommands: `{command} scripts/stream.py send`."""
+
+    required_arguments = 1
+    final_argument_whitespace = True
+
+    def run(self) -> list[nodes.Node]:
+        asked, *subcommands = self.arguments[0].split()
+        root = Path(self.config.root_of_project)
+        if asked.endswith(".py"):
+            self.env.note_dependency(str(root / asked))
+        told = help_of(root, asked, *subcommands)
+        name = "-".join([re.split(r"[./]", asked.removesuffix(".py"))[-1], *subcommands])
+        usage = re.sub(r"\n\s+", "\n    ", told["usage"])
+        found = [*prose(told["description"]), nodes.literal_block(usage, usage, language="text")]
+        for group in told["groups"]:
+            found.append(option_list(name, group["options"]))
+        return found + epilog(told["epilog"])
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.add_config_value("root_of_project", "", "env")
+    app.add_directive("command", Command)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def help_of(root: Path, asked: str, *subcommands: str) -> dict:
+    """What `help_of.py` finds out about a script or a package of the checkout at `root`."""
+    environment = {**os.environ, "COLUMNS": "80", "NO_COLOR": "1", "PYTHONPATH": str(root / "scripts")}
+    run = [sys.executable, str(READER), str(root / asked) if asked.endswith(".py") else asked, *subcommands]
+    done = subprocess.run(run, capture_output=True, text=True, encoding="utf-8", env=environment)
+    if done.returncode != 0:
+        raise ExtensionError(f"{asked} has no help to give:\n{done.stderr}")
+    return json.loads(done.stdout.splitlines()[-1])  # Blender may have had something to say before.
+
+
+def option_list(name: str, options: list[dict[str, str]]) -> nodes.definition_list:
+    """Options and what they do, each with a place to link to: `#compare-rates`."""
+    listed = nodes.definition_list(classes=["options"])
+    for option in options:
+        term = nodes.term("", "", nodes.literal(option["written"], option["written"]))
+        longest = max(re.findall(r"--?[\w-]+", option["written"]), default=option["written"], key=len)
+        term["ids"] = [f"{name}-{nodes.make_id(longest)}"]
+        meaning = nodes.definition("", nodes.paragraph("", "", *inline_code(option["help"])))
+        listed += nodes.definition_list_item("", term, meaning)
+    return listed
+
+
+def epilog(text: str) -> list[nodes.Node]:
+    """The parts of an epilog, with their titles: examples as they are typed, everything else as text."""
+    first, *parts = TITLE.split(text.strip("\n"))
+    found = prose(first)
+    for title, body in zip(parts[::2], parts[1::2], strict=True):
+        indented = re.match(r"(?:  .*\n?|\n)*", body).group()
+        found.append(nodes.rubric(title, title[0].upper() + title[1:]))
+        found += prose(textwrap.dedent(indented)) + prose(body[len(indented) :])
+    return found
+
+
+def prose(text: str) -> list[nodes.Node]:
+    """Paragraphs; what is indented, typed or set in columns stays line by line."""
+    found: list[nodes.Node] = []
+    for block in re.split(r"\n\s*\n", text.strip("\n")):
+        if not block.strip():
+            continue
+        if re.search(r"(?m)^(\s|python |blender )|\S   +\S", block):
+            lines = textwrap.dedent(block)
+            found.append(nodes.literal_block(lines, lines, language="text"))
+        else:
+            found.append(nodes.paragraph("", "", *inline_code(block)))
+    return found
+
+
+def inline_code(text: str) -> list[nodes.Node]:
+    """Text in which what stands in backquotes is code."""
+    parts = text.split("`")
+    return [nodes.literal(part, part) if i % 2 else nodes.Text(part) for i, part in enumerate(parts) if part]

@@ -1,0 +1,60 @@
+"""Pages that are files elsewhere in the checkout, such as CHANGELOG.md, and links between these and docs/."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from pathlib import Path, PurePosixPath
+
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
+
+HOME = {"README.md": "index"}
+"""A file that has a page in its place."""
+
+SHOWN = {
+    "CONTRIBUTING.md": "contributing",
+    "CHANGELOG.md": "changelog",
+    "assets/README.md": "assets",
+    "examples/modes_in_python/README.md": "notebook",
+}
+"""Files to the pages of the site that show them; what these have in docs/ is for people who read it there."""
+
+PAGES = HOME | SHOWN
+
+LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)\s]+)")
+"""The path that a link or a picture of a Markdown file names."""
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("source-read", read_elsewhere)
+    app.connect("doctree-read", lead_to_pages)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def read_elsewhere(app: Sphinx, page: str, source: list[str]) -> None:
+    """Show a file in the place of its page, with links that count from docs/."""
+    for name, shown_as in SHOWN.items():
+        if shown_as == page:
+            file = Path(app.srcdir).parent / name
+            app.env.note_dependency(str(file), docname=page)
+            source[0] = as_in_docs(file.read_text(encoding="utf-8"), posixpath.dirname(name))
+
+
+def as_in_docs(text: str, folder: str) -> str:
+    """The text of a file in this folder of the checkout, as it would be in docs/."""
+    return LINK.sub(lambda link: posixpath.relpath(posixpath.join(folder, link[1]), "docs"), text)
+
+
+def lead_to_pages(app: Sphinx, doctree: nodes.document) -> None:
+    """Turn links to files that are pages of the site into links to these pages."""
+    root = Path(app.srcdir).parent
+    for link in list(doctree.findall(addnodes.download_reference)):
+        target, _, anchor = link["reftarget"].partition("#")
+        _, path = app.env.relfn2path(target, app.env.docname)
+        file = Path(path).resolve()
+        name = str(PurePosixPath(*file.relative_to(root).parts)) if file.is_relative_to(root) else ""
+        if name in PAGES:
+            uri = app.builder.get_relative_uri(app.env.docname, PAGES[name]) + (f"#{anchor}" if anchor else "")
+            link.replace_self(nodes.reference("", "", *link.children, refuri=uri, internal=True))

@@ -1,0 +1,119 @@
+"""Build the documentation site from docs/, with Sphinx: pages that open from a folder, without a network.
+
+Whatever Sphinx warns of is an error: a link that leads nowhere, a formula that cannot be set, a name without an entry.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+BESIDE = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "assets/README.md", "examples")
+"""What pages show or link to that is not in docs/."""
+
+EPILOG = """
+examples:
+  python scripts/bootstrap.py docs
+  python scripts/bootstrap.py docs --output ~/rigid-motion-site
+
+A site that is there already is replaced, once the new one is whole; the last line printed is the path of index.html.
+Another folder that is there and not empty is left alone.
+Exit code: 0 done, 1 Sphinx warned of something, 2 it could not be built.
+"""
+
+
+class SiteError(Exception):
+    """Why there is no site, in words for whoever asked for it."""
+
+
+def build(folder: Path) -> Path:
+    """Build the site in a folder, which is replaced, and return the path of its first page.
+
+    Raises
+    ------
+    SiteError
+        Where Sphinx is missing or the folder is something else than a site. The message says the way out.
+    subprocess.CalledProcessError
+        Where Sphinx warns of something, which it has printed then. The folder is as it was.
+    OSError
+        Where the folder cannot be written.
+    """
+    if find_spec("sphinx") is None:
+        raise SiteError("Sphinx is missing: run `python scripts/bootstrap.py docs`, which brings it")
+    folder = Path(os.path.abspath(folder))
+    if folder.exists() and not (folder.is_dir() and (is_site(folder) or not any(folder.iterdir()))):
+        raise SiteError(f"{folder} is there already, and no site: give another folder")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as beside:
+        built, kept = Path(beside) / "site", Path(beside) / "before"
+        pages = stage(Path(beside) / "checkout")
+        options = [
+            "-q",
+            "-W",
+            "--keep-going",
+            "-b",
+            "html",
+            "-c",
+            str(ROOT / "docs"),
+            "-d",
+            str(Path(beside) / "known"),
+        ]
+        subprocess.run([sys.executable, "-m", "sphinx", *options, str(pages), str(built)], check=True)
+        if folder.exists():
+            folder.rename(kept)
+        built.rename(folder)
+    return folder / "index.html"
+
+
+def stage(folder: Path) -> Path:
+    """Copy all that pages are made of, and return the copy of docs/: Sphinx adds a page for each public name to it."""
+    pages = folder / "docs"
+    shutil.copytree(ROOT / "docs", pages, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    for name in BESIDE:
+        (folder / name).parent.mkdir(exist_ok=True)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, folder / name)
+    return pages
+
+
+def is_site(folder: Path) -> bool:
+    """Whether a folder is what `build` leaves."""
+    return (folder / "index.html").is_file() and (folder / ".buildinfo").is_file()
+
+
+def main(arguments: list[str]) -> int:
+    """Build, and return the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="build_site.py",
+        description=__doc__,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    default = ROOT / "dist" / "site"
+    parser.add_argument("--output", type=Path, default=default, metavar="DIR", help="folder of the site (dist/site)")
+    options = parser.parse_args(arguments)
+    try:
+        page = build(options.output.expanduser())
+    except SiteError as error:
+        print(f"build_site.py: {error}", file=sys.stderr)
+        return 2
+    except subprocess.CalledProcessError:
+        print("build_site.py: no site, because of what is above", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"build_site.py: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    print(page)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,56 @@
+"""The glossary lists what it explains, and links between the pages of the checkout lead somewhere."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+GLOSSARY = ROOT / "docs" / "glossary.md"
+PAGES = sorted(page for folder in (".", "docs", "assets", "examples/*") for page in ROOT.glob(f"{folder}/*.md"))
+
+
+def anchors(page: str) -> list[str]:
+    """Of the headings of a page, as GitHub and MyST make them."""
+    headings = re.findall(r"^#+ (.+)$", page, re.MULTILINE)
+    return [re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings]
+
+
+def links(page: str) -> list[str]:
+    """Of a page to others of the checkout, or to places on it."""
+    found = re.findall(r"\]\(([^)\s]+)\)", page)
+    return [link for link in found if not re.match(r"[a-z]+:", link)]
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_links_lead_to_files_and_headings_that_exist(path: Path):
+    page = path.read_text(encoding="utf-8")
+    for link in links(page):
+        name, _, place = link.partition("#")
+        target = path.parent / name if name else path
+        assert target.exists(), link
+        if place:
+            assert place in anchors(target.read_text(encoding="utf-8")), link
+
+
+def test_the_glossary_lists_all_of_its_entries_in_order():
+    page = GLOSSARY.read_text(encoding="utf-8")
+    listed, *groups = re.split(r"^## .+$", page, flags=re.MULTILINE)
+    rows = re.findall(r"^- \*\*(.+?)\*\*: ((?:.|\n(?!-))+)", listed, re.MULTILINE)
+    assert [name for name, _ in rows] == re.findall(r"^## (.+)$", page, re.MULTILINE)
+    for (name, row), group in zip(rows, groups, strict=True):
+        entries = anchors(group)
+        assert [link.removeprefix("#") for link in links(row)] == entries, name
+        assert entries == sorted(entries), name
+
+
+def test_every_entry_of_the_glossary_says_something():
+    entries = re.split(r"^### ", GLOSSARY.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    assert [entry for entry in entries if len(entry.partition("\n")[2].split()) < 10] == []
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/animators.md", "docs/comparing.md", "docs/streaming.md"])
+def test_pages_lead_to_the_glossary(name: str):
+    assert "glossary.md#" in (ROOT / name).read_text(encoding="utf-8")
