@@ -6,6 +6,7 @@
     python scripts/bootstrap.py test                        run the tests
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
     python scripts/bootstrap.py bake shot.blend             turn in-betweens of .blend files into real keys, or back
+    python scripts/bootstrap.py reduce shot.blend           keep few keys, in .blend files and of recordings
     python scripts/bootstrap.py stream --help               send a recording over a network, in real time
     python scripts/bootstrap.py tasks list renders/hand     list the tasks of a comparison, and which are done
     python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
@@ -41,6 +42,7 @@ COMMANDS = {
     "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
+    "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
     "tasks": (["-m", "rigid_motion_batch.workplan"], ()),
     "dask": (["-m", "dask"], ("farm",)),

@@ -1,13 +1,9 @@
-"""What `bake.py` bakes or un-bakes in the open file: objects, and the bones of rigs together."""
+"""What `bake.py` does to the objects and bones of the open file: baking, and taking it back."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
-
-import bpy
+from collections.abc import Iterable, Mapping, Sequence
 
 from rigid_motion import animation
 from rigid_motion.animation import Refused
@@ -17,38 +13,12 @@ from rigid_motion.animation.actions.refusals import refuse_numbers
 from rigid_motion.animation.actions.slots import SlotTransform, slot_transforms_of
 from rigid_motion.animation.actions.sources import Source
 from rigid_motion.animation.inbetweens.mode_keys import segment_modes
-from rigid_motion.animation.transforms import Transform, transform_of
+from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.blend_targets import Action, Result
 
 FEW = 4
 """As many bones are named; of more it is said how many they are."""
-
-
-@dataclass
-class Result:
-    """What came of acting on several targets."""
-
-    done: dict[Transform, str] = field(default_factory=dict)
-    """The modes of each, as menus show them."""
-
-    refused: dict[Transform, str] = field(default_factory=dict)
-    """Why each could not be done, and the way out."""
-
-    span: str = ""
-    """The frames that it was done on."""
-
-
-@dataclass(frozen=True)
-class Action:
-    """What is done to targets: baking, or un-baking."""
-
-    done: str
-    suffix: str
-    concerned: Callable[[Sequence[Transform]], list[Transform]]
-    """Those of several that there is something to do to, possible or not."""
-
-    act: Callable[[Sequence[Transform]], Result]
-    """Do it to several of one object, in one go."""
 
 
 def baking(step: float, first: float | None, last: float | None) -> Action:
@@ -59,9 +29,9 @@ def baking(step: float, first: float | None, last: float | None) -> Action:
         fit = [target for target in targets if target not in problems]
         modes, refusals = modes_of(fit), []
         begin, end = animation.bake(fit, step=step, first=first, last=last, refused=refusals) if fit else (0.0, 0.0)
-        return _result(targets, modes, problems | _by_target(refusals, fit), f"frames {begin:g} to {end:g}")
+        return _result(targets, modes, problems | _by_target(refusals, fit), f", frames {begin:g} to {end:g}")
 
-    return Action("baked", "-baked", with_rigid_segments, bake)
+    return Action("Baking", "baked", "-baked", with_rigid_segments, bake)
 
 
 def unbaking() -> Action:
@@ -72,14 +42,17 @@ def unbaking() -> Action:
         animation.unbake(targets, refused=refusals)
         return _result(targets, modes_of(targets), _by_target(refusals, targets))
 
-    return Action("un-baked", "-unbaked", lambda targets: list(filter(animation.is_baked, targets)), unbake)
+    return Action(
+        "Un-baking", "un-baked", "-unbaked", lambda targets: list(filter(animation.is_baked, targets)), unbake
+    )
 
 
 def _result(
     targets: Sequence[Transform], modes: Mapping[Transform, str], problems: Mapping[Transform, str], span: str = ""
 ) -> Result:
     done = {target: modes[target] for target in targets if target not in problems}
-    return Result(done, {target: text.removeprefix(f"{target.name}: ") for target, text in problems.items()}, span)
+    refused = {target: text.removeprefix(f"{target.name}: ") for target, text in problems.items()}
+    return Result(list(done), refused, told=f"{span}{described(done)}")
 
 
 def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dict[Transform, str]:
@@ -90,34 +63,6 @@ def _by_target(refusals: Iterable[Refused], targets: Sequence[Transform]) -> dic
         target = next(one for one in longest_first if one not in found and text.startswith(one.name))
         found[target] = text
     return found
-
-
-def groups_of(obj: bpy.types.Object) -> Iterator[list[Transform]]:
-    """What is done in one go of an object: all bones of a rig, and then its own motion.
-
-    The other way round each bone would be compared with what it was in the Action of which a copy is there already.
-    """
-    if obj.pose is not None and len(obj.pose.bones):
-        yield [transform_of(bone) for bone in obj.pose.bones]
-    yield [transform_of(obj)]
-
-
-def matching(target: Transform, asked: Iterable[str]) -> set[str]:
-    """The names and patterns that a target fits. Those of a rig mean its bones too, and RIG/BONE means a bone."""
-    return {one for one in asked for name in {target.name, target.animated.name} if _fits(name, one)}
-
-
-def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
-    """The names and patterns that an object fits, or may have bones for that nobody can look at."""
-    return {one for one in asked if any(_fits(obj.name, part) for part in (one, *_before_slashes(one)))}
-
-
-def _before_slashes(pattern: str) -> list[str]:
-    return [pattern[:place] for place, letter in enumerate(pattern) if letter == "/"]
-
-
-def _fits(name: str, pattern: str) -> bool:
-    return name == pattern or fnmatchcase(name, pattern)
 
 
 def with_rigid_segments(targets: Sequence[Transform]) -> list[Transform]:
@@ -161,12 +106,6 @@ def modes_of(targets: Sequence[Transform]) -> dict[Transform, str]:
         target: ", ".join(KEYFRAME_MODES[mode].label if mode in KEYFRAME_MODES else "Blender" for mode in found)
         for target, found in modes.items()
     }
-
-
-def title_of(targets: Sequence[Transform]) -> str:
-    """One target by its name, and several bones by how many they are of which rig."""
-    rig = targets[0].animated.name
-    return targets[0].name if len(targets) == 1 else f"{rig}: {len(targets)} bones"
 
 
 def described(modes: Mapping[Transform, str]) -> str:

@@ -28,6 +28,7 @@ class Command:
 COMMANDS = {
     "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
     "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
+    "reduce": Command("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
     "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
     "paper": Command("reproduce_paper", "reproduce the paper's figures and its table"),
     "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
@@ -87,4 +88,5 @@ examples:
   {INSTALLED} compare                                  the motions that come with the program
   {INSTALLED} compare hand.csv --axes unity
   {INSTALLED} compare take.csv --decimate adaptive --tolerance 5mm --no-video
-  {INSTALLED} bake shot.blend"""
+  {INSTALLED} bake shot.blend
+  {INSTALLED} reduce shot.blend --tolerance 5mm"""

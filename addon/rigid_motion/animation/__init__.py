@@ -11,6 +11,7 @@ from . import properties
 from .actions.channels import channelbag_of, read_poses, write_channel
 from .actions.sources import MODE_IDS
 from .baking.bake import bake, bake_poses, is_baked, unbake
+from .baking.fewer_keys import NeedsItsKeys
 from .baking.reducing import (
     Reduction,
     WholeRig,
@@ -31,6 +32,7 @@ from .transforms import Refused
 
 __all__ = [
     "MODE_IDS",
+    "NeedsItsKeys",
     "Reduction",
     "Refused",
     "WholeRig",

@@ -13,7 +13,7 @@ from .. import animation
 from ..animation import Refused
 from ..animation.baking.copies import BAKED, REDUCED, entries_of
 from ..animation.baking.originals import WAYS_BACK
-from ..animation.baking.sizes import metres_per_unit
+from ..animation.baking.sizes import first_tolerance
 from ..animation.inbetweens.live import paused
 from ..animation.inbetweens.mending import with_troubles
 from ..animation.inbetweens.polls import with_in_betweens, with_modes, with_more_keys_than
@@ -48,9 +48,6 @@ SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
-
-OF_A_RIG = 0.003
-"""The tolerance that the keys of a rig are reduced to at first, of its size: 5 mm for a grown-up."""
 
 
 class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
@@ -364,7 +361,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(self.each_target(context))
         if not self.properties.is_property_set("tolerance"):
-            self.tolerance = _first_tolerance(context.scene, targets)
+            self.tolerance = first_tolerance(context.scene, targets)
         if not self.radius and len(targets) == 1:
             self.radius = animation.radius_of(targets[0].carrier)
         return self.act(targets, lambda refused: self._reduce(context.scene, targets, refused))
@@ -390,14 +387,6 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         if len(reduced) == len(targets) == 1:
             return summaries[0]
         return "; ".join(f"{target.name}: {summary}" for target, summary in zip(reduced, summaries, strict=True))
-
-
-def _first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform]) -> float:
-    """What to begin with, in the scene's units."""
-    sizes = [max(target.animated.dimensions) for target in targets if target.prefix]
-    if not sizes or max(sizes) <= 0.0:
-        return 0.001 / metres_per_unit(scene)
-    return float(f"{OF_A_RIG * max(sizes):.2g}")
 
 
 class RIGID_MOTION_OT_restore_keys(_OfRigsToo, _OnChanged, bpy.types.Operator):

@@ -25,6 +25,10 @@ SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
 
 
+class NeedsItsKeys(Refused):
+    """Something is as reduced as the tolerance allows."""
+
+
 @dataclass(frozen=True)
 class WholeRig:
     """What became of all bones of a rig that were given fewer keys together."""

@@ -24,6 +24,7 @@ from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import (
     SMALLEST,
     FewerKeys,
+    NeedsItsKeys,
     WholeRig,
     goes_elsewhere,
     samples_of,
@@ -166,7 +167,7 @@ class _Rig:
         chosen = {number: own for number, own in chosen.items() if len(own) < len(before[number])}
         if not chosen:
             way_out = ", or give each bone keys of its own" if shared else ""
-            raise Refused(
+            raise NeedsItsKeys(
                 f"{self.rig.name}: its bones need their keys on all of {len(self.frames)} frames to stay within the "
                 f"tolerance: allow a larger one{way_out}"
             )

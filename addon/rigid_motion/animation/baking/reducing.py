@@ -25,7 +25,7 @@ from ..inbetweens.mode_keys import segment_modes, set_mode_in
 from ..transforms import Refused, Transform, is_ours, transform_of
 from .bake import go_back
 from .copies import REDUCED, entries_in_use, entries_of
-from .fewer_keys import FewerKeys, WholeRig, fewer_keys
+from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys
 from .fewer_rig_keys import Plans, fewer_keys_of_rigs
 from .originals import (
     discard_originals,
@@ -124,14 +124,14 @@ def reduce_keys_of(
                 raise found
             if not found:
                 before = sum(len(distinct(source.keyed_frames)) for _, source in keyed)
-                raise Refused(_why_no_fewer(transform, before, keeps_scale=False))
+                raise _no_fewer(transform, before, keeps_scale=False)
             return found
         size = radius or radius_of(transform.carrier)
         found = [fewer_keys(transform, *one, mode, tolerance, size, best_of=best_of) for one in keyed]
         fewer = [reduced for reduced in found if len(reduced.key_frames) < reduced.before]
         if not fewer:
             before, keeps_scale = sum(kept.before for kept in found), any(kept.keeps_scale for kept in found)
-            raise Refused(_why_no_fewer(transform, before, keeps_scale=keeps_scale))
+            raise _no_fewer(transform, before, keeps_scale=keeps_scale)
         return fewer
 
     def act(transform: Transform, fewer: list[FewerKeys]) -> None:
@@ -246,15 +246,15 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
         set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
 
 
-def _why_no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> str:
+def _no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> Refused:
     if count <= 2:
-        return _why_nothing_is_keyed(transform, count)
+        return Refused(_why_nothing_is_keyed(transform, count))
     if keeps_scale:
-        return (
+        return Refused(
             f"{transform.name} keeps its {count} keys: its scale changes differently along its axes, which is no "
             "part of a pose; move that animation to a child, or remove keys of the scale by hand"
         )
-    return f"{transform.name} needs its {count} keys to stay within the tolerance: allow a larger one"
+    return NeedsItsKeys(f"{transform.name} needs its {count} keys to stay within the tolerance: allow a larger one")
 
 
 def _why_nothing_is_keyed(transform: Transform, count: int) -> str:

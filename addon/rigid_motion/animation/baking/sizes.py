@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 import numpy as np
 
@@ -9,6 +11,9 @@ from ..transforms import Transform
 
 SOME_SIZE = 0.1
 """The radius, in metres, of what has no size."""
+
+OF_A_RIG = 0.003
+"""The tolerance that the keys of a rig are reduced to at first, of its size: 5 mm for a grown-up."""
 
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
@@ -31,6 +36,14 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     elif obj.type == "CAMERA":
         size = obj.data.display_size * size_of(evaluated.matrix_world)
     return size or SOME_SIZE / metres_per_unit(bpy.context.scene)
+
+
+def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform]) -> float:
+    """What to begin with: a millimetre, and of a rig a share of its size; in the scene's units."""
+    sizes = [max(target.animated.dimensions) for target in targets if target.prefix]
+    if not sizes or max(sizes) <= 0.0:
+        return 0.001 / metres_per_unit(scene)
+    return float(f"{OF_A_RIG * max(sizes):.2g}")
 
 
 def metres_per_unit(scene: bpy.types.Scene) -> float:

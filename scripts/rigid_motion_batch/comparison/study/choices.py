@@ -199,8 +199,23 @@ class Tolerance(Choice):
         return ""
 
     def tolerance(self, clip: Clip) -> float:
+        return self.metres(clip.metres_per_unit)
+
+    def metres(self, per_unit: float) -> float:
+        """The length in metres, given how many a unit of the recording has."""
         number, unit = self._parts()
-        return float(number) * (METRES[unit] if unit else clip.metres_per_unit)
+        return float(number) * (METRES[unit] if unit else per_unit)
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it says its unit, and does not go by that of the recording."""
+        return bool(self._parts()[1])
+
+    def alike(self, metres: float, per_unit: float) -> str:
+        """Another length, in metres, written in the unit that this one is in."""
+        _, unit = self._parts()
+        length = round(metres / (METRES[unit] if unit else per_unit), 4)
+        return f"{length:.3g} {unit}".strip()
 
     @property
     def size(self) -> float:

@@ -1,0 +1,96 @@
+"""What is done to the open file: an action on objects and on the bones of rigs, and which of them are meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+
+import bpy
+
+from rigid_motion.animation.transforms import Transform, transform_of
+
+
+@dataclass
+class Result:
+    """What came of acting on several targets."""
+
+    done: list[Transform] = field(default_factory=list)
+
+    refused: dict[Transform, str] = field(default_factory=dict)
+    """Why each could not be done, and the way out."""
+
+    left: dict[Transform, str] = field(default_factory=dict)
+    """Why there was nothing to do to each after all."""
+
+    told: str = ""
+    """What there is to say of those that were done; begins with a comma or a semicolon."""
+
+    def refusals(self) -> Iterator[tuple[str, str, int]]:
+        """Which targets were refused, why, and how many they are: all bones of a rig at once where it is the rig's."""
+        reasons = set(self.refused.values())
+        if len(reasons) == 1 < len(self.refused) and not (self.done or self.left):
+            yield title_of(list(self.refused)), *reasons, len(self.refused)
+        else:
+            yield from ((target.name, reason, 1) for target, reason in self.refused.items())
+
+    def told_of_left(self) -> str:
+        """Which targets were left as they are, and why; of several bones the reason of one."""
+        (first, reason), *others = self.left.items()
+        example = f", such as {first.name}" if any(other != reason for _, other in others) else ""
+        left = "are left as they are" if others else "is left as it is"
+        return f"{title_of(list(self.left))} {left}{example}: {reason}"
+
+
+@dataclass(frozen=True)
+class Action:
+    """What is done to targets, such as baking."""
+
+    doing: str
+    """The work, as a heading: "Baking"."""
+
+    done: str
+    """What becomes of targets: "baked"."""
+
+    suffix: str
+    """Of the names of files that are written."""
+
+    concerned: Callable[[Sequence[Transform]], list[Transform]]
+    """Those of several that there is something to do to, possible or not."""
+
+    act: Callable[[Sequence[Transform]], Result]
+    """Do it to several of one object, in one go."""
+
+
+def groups_of(obj: bpy.types.Object) -> Iterator[list[Transform]]:
+    """What is done in one go of an object: all bones of a rig, and then its own motion.
+
+    The other way round each bone would be compared with what it was in the Action of which a copy is there already.
+    """
+    if obj.pose is not None and len(obj.pose.bones):
+        yield [transform_of(bone) for bone in obj.pose.bones]
+    yield [transform_of(obj)]
+
+
+def matching(target: Transform, asked: Iterable[str]) -> set[str]:
+    """The names and patterns that a target fits. Those of a rig mean its bones too, and RIG/BONE means a bone."""
+    return {one for one in asked for name in {target.name, target.animated.name} if _fits(name, one)}
+
+
+def matching_missing(obj: bpy.types.Object, asked: Iterable[str]) -> set[str]:
+    """The names and patterns that an object fits, or may have bones for that nobody can look at."""
+    return {one for one in asked if any(_fits(obj.name, part) for part in (one, *_before_slashes(one)))}
+
+
+def _before_slashes(pattern: str) -> list[str]:
+    return [pattern[:place] for place, letter in enumerate(pattern) if letter == "/"]
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return name == pattern or fnmatchcase(name, pattern)
+
+
+def title_of(targets: Sequence[Transform]) -> str:
+    """One target by its name, and several bones by how many they are of which rig."""
+    rig = targets[0].animated.name
+    return targets[0].name if len(targets) == 1 else f"{rig}: {len(targets)} bones"

@@ -1,0 +1,121 @@
+"""Recorded motions as .blend files of their own: an object or a rig with few keys, and the mode on them.
+
+In metres and Blender's axes, where it was recorded; the first sample is on frame 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from rigid_motion import animation
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.motion.quaternions import align_signs
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.blend_files import FileProblem
+from rigid_motion_batch.blend_targets import Result
+from rigid_motion_batch.comparison.stage.armature import Rest, Rig
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.reduce_targets import Wishes, reduced
+from rigid_motion_batch.trajectories.rigs import LAST_FRAME
+
+RATES = 1, 240
+"""Frames a second that a file may be given for the rate of its recording."""
+
+CLOSEST = 0.01
+"""Frames between keys that Blender takes for two."""
+
+ON_A_FRAME = 1e-3
+"""What is as near to a whole frame is put on it."""
+
+SINGLE = float(np.finfo(np.float32).eps)
+"""By what share numbers of Blender are off."""
+
+ARROW = 0.2
+"""Metres: how large the axes are drawn that move as a rigid body did."""
+
+
+def rate_of(clip: Clip) -> float:
+    """Frames a second with a sample on every frame; of a recording that is not even, the nearest whole number."""
+    whole = float(np.clip(round(1.0 / float(np.median(np.diff(clip.times)))), *RATES))
+    even = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0])
+    return even if RATES[0] <= even <= RATES[1] and _are_on_frames(clip, even) > _are_on_frames(clip, whole) else whole
+
+
+def _are_on_frames(clip: Clip, rate: float) -> bool:
+    return bool(np.all(frames_of(clip, rate) % 1.0 == 0.0))
+
+
+def frames_of(clip: Clip, rate: float) -> np.ndarray:
+    """On which frames the samples are, shape (n,), the first on frame 1."""
+    frames = 1.0 + (clip.times - clip.times[0]) * rate
+    return np.where(np.abs(frames - np.round(frames)) < ON_A_FRAME, np.round(frames), frames)
+
+
+def new_file(clip: Clip, tolerance: float, fps: int | None) -> np.ndarray:
+    """Begin a file for a recording, and return on which frames its samples are, shape (n,).
+
+    Raises
+    ------
+    FileProblem
+        Where Blender has no room for it: it is too long, too fast, or too far away to be within the tolerance (metres).
+    """
+    rate = fps or rate_of(clip)
+    frames = frames_of(clip, rate)
+    if frames[-1] > LAST_FRAME:
+        raise FileProblem(f"at {rate:g} frames a second this has more than {LAST_FRAME} frames: give a smaller --fps")
+    if float(np.diff(frames).min()) < CLOSEST:
+        raise FileProblem(f"at {rate:g} frames a second some samples are on one frame to Blender: thin them out")
+    farthest = float(np.abs(clip.in_metres(clip.poses).positions).max())
+    if farthest * SINGLE > tolerance:
+        raise FileProblem(
+            f"this is up to {farthest:.3g} m from its origin, where Blender's numbers are coarser than the tolerance: "
+            "move the origin nearer in the recording"
+        )
+    with hushed():
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = bpy.context.scene
+    scene.render.fps = max(round(rate), 1)
+    scene.render.fps_base = scene.render.fps / rate
+    scene.frame_start, scene.frame_end = 1, int(frames[-1])
+    return frames
+
+
+def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name: str) -> bpy.types.Object:
+    """Put axes into the open file that move as a rigid body did, with keys at these samples (k,) of all frames (n,)."""
+    obj = bpy.data.objects.new(name, None)
+    obj.empty_display_type, obj.empty_display_size = "ARROWS", ARROW
+    obj.rotation_mode = "QUATERNION"
+    bpy.context.scene.collection.objects.link(obj)
+    poses = to_blender(clip.in_metres(clip.poses[keys]), clip.axes)
+    animation.write_channel(obj, "location", frames[keys], poses.positions)
+    animation.write_channel(obj, "rotation_quaternion", frames[keys], align_signs(poses.quaternions))
+    if poses.scales is not None:
+        animation.write_channel(obj, "scale", frames[keys], np.repeat(poses.scales[:, None], 3, axis=1))
+    animation.set_mode(obj, mode)
+    return obj
+
+
+def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Result:
+    """Put a rig into the open file that moves as a whole body did, its samples on frames (n,), with few keys.
+
+    Returns
+    -------
+    Result
+        What became of the bones that move; of those that were left, all keys have the mode.
+    """
+    rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
+    rig = Rig(name, rest, clip.figure.joints, bpy.context.scene.collection)
+    channels = rig.channels_of(to_blender(clip.in_metres(clip.poses), clip.axes))
+    for bone in range(len(rig.bones)):
+        rig.key(bone, frames, channels[bone])
+    keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
+    if not keyed:
+        return Result()
+    result = reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
+    if result.left:
+        animation.set_mode(list(result.left), wishes.mode)
+    return result

@@ -1,0 +1,228 @@
+"""What `reduce.py` does to recordings: the few samples that a mode needs as keys, in a table or in a .blend file.
+
+A rigid motion becomes NAME-keys.csv, in the recording's own axes and units, and on request NAME-keys.blend; a whole
+body becomes NAME-keys.blend, with a rig.
+"""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rigid_motion_batch.blend_files import FileProblem, refuse_read_only, refuse_to_replace, write_file
+from rigid_motion_batch.blend_jobs import place_of
+from rigid_motion_batch.comparison.study.choices import Tolerance
+from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.comparison.study.metrics import write_poses
+from rigid_motion_batch.comparison.study.radii import RIGID
+from rigid_motion_batch.comparison.study.reading import folder_names, read_source
+from rigid_motion_batch.comparison.study.reconstructions import fill_in
+from rigid_motion_batch.keyed_files import key_body, key_object, new_file
+from rigid_motion_batch.reduce_targets import Wishes, fewer, off
+from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked, counted
+from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
+from rigid_motion_batch.trajectories.reading import split_source
+
+TOLERANCE = Tolerance("5mm")
+"""Where none is given."""
+
+SUFFIX = "-keys"
+"""Of the names of files that are written."""
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A recording to be done."""
+
+    source: str
+    """The file, and the body where one was named."""
+
+    @property
+    def title(self) -> str:
+        return os.path.basename(self.source)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How recordings are to be read."""
+
+    axes: str | None
+    """None for those of each format."""
+
+    options: ReadingOptions
+
+
+@dataclass(frozen=True)
+class Writing:
+    """What is to be written of recordings, and where."""
+
+    folder: Path | None
+    """None for beside each recording."""
+
+    overwrite: bool
+    dry_run: bool
+    blend: bool
+    """Whether rigid motions become .blend files too."""
+
+    fps: int | None
+    """None for the rate of each recording."""
+
+
+class RecordingRun:
+    """Doing recordings, one after the other.
+
+    Parameters
+    ----------
+    wishes : Wishes
+    reading : Reading
+    writing : Writing
+    inputs : iterable of str
+        All that is to be read, which nothing is written over.
+    note, stop_if_asked : callable
+    """
+
+    def __init__(
+        self,
+        wishes: Wishes,
+        reading: Reading,
+        writing: Writing,
+        inputs: Iterable[str],
+        note: Note,
+        stop_if_asked: StopIfAsked,
+    ) -> None:
+        self.wishes, self.reading, self.writing = wishes, reading, writing
+        self._note, self._stop_if_asked = note, stop_if_asked
+        self._would = "would be " if writing.dry_run else ""
+        self._inputs = {place_of(_file_of(source)) for source in inputs}
+        self._written: dict[str, str] = {}
+
+    def do(self, job: Recorded) -> Outcome:
+        """Read a recording, and write the keys of each of its bodies."""
+        outcome = Outcome()
+        try:
+            clips, note = read_source(job.source, self.reading.axes, self.reading.options)
+        except TrajectoryError as error:
+            self._note(str(error))
+            return Outcome(failed=True, unreadable=True)
+        except Exception as error:
+            self._tell_failure(job.source, error)
+            return Outcome(failed=True)
+        if note:
+            self._note(note)
+        file = _file_of(job.source)
+        for clip, name in zip(clips, _names(file, clips), strict=True):
+            self._stop_if_asked()
+            title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
+            try:
+                self._do_clip(title, clip, file, name, outcome)
+            except FileProblem as problem:
+                outcome.failed = True
+                self._note(f"{title}: {problem}")
+            except Exception as error:
+                outcome.failed = True
+                self._tell_failure(title, error)
+        return outcome
+
+    def _tell_failure(self, title: str, error: Exception) -> None:
+        """What nobody foresaw in one recording must not keep the others from being done."""
+        self._note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
+        traceback.print_exception(error)
+
+    def _do_clip(self, title: str, clip: Clip, file: Path, name: str, outcome: Outcome) -> None:
+        for repair in clip.repairs:
+            self._note(f"{title}: {repair}")
+        begin = (self.writing.folder or file.parent) / f"{name}{SUFFIX}"
+        if clip.figure is not None:
+            self._do_body(title, clip, file, name, begin.with_name(f"{begin.name}.blend"), outcome)
+            return
+        table = begin.with_name(f"{begin.name}.csv")
+        scene = begin.with_name(f"{begin.name}.blend") if self.writing.blend else None
+        self._do_rigid(title, clip, file, name, table, scene, outcome)
+
+    def _do_rigid(
+        self, title: str, clip: Clip, file: Path, name: str, table: Path, scene: Path | None, outcome: Outcome
+    ) -> None:
+        for path in filter(None, (table, scene)):
+            self._refuse(title, path)
+        mode, radius, tolerance = self.wishes.mode, self.wishes.radius or RIGID, self.wishes.tolerance or TOLERANCE
+        frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps) if scene else None
+        keys = tolerance.keys(clip, mode, radius)
+        largest = float(fill_in(clip, tolerance, {mode: keys}, radius).errors[mode].shell.max())
+        self._stop_if_asked()
+        if frames is not None:
+            key_object(clip, keys, frames, mode, name)
+        told = fewer(len(clip.times), len(keys)) + off(tolerance, largest, clip.metres_per_unit)
+        self._note(f"{title}: {self._would}reduced{told}")
+        if scene:
+            self._save(file, scene)
+        if not self.writing.dry_run:
+            try:
+                write_poses(table, clip.times[keys], clip.poses[keys])
+            except OSError as error:
+                raise FileProblem(f"{table} could not be written ({error.strerror}): use another --output") from None
+        outcome.objects += 1
+        for path in filter(None, (table, scene)):
+            self._tell_written(title, path, outcome)
+
+    def _do_body(self, title: str, clip: Clip, file: Path, name: str, scene: Path, outcome: Outcome) -> None:
+        self._refuse(title, scene)
+        tolerance = self.wishes.tolerance or TOLERANCE
+        frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps)
+        result = key_body(clip, frames, replace(self.wishes, tolerance=tolerance), name)
+        self._stop_if_asked()
+        for bones, reason, count in result.refusals():
+            outcome.refused += count
+            self._note(f"{title}: {bones}: not reduced: {reason}")
+        if result.left:
+            self._note(f"{title}: {result.told_of_left()}")
+        if result.done:
+            self._note(f"{title}: {counted(len(result.done), 'bone')} {self._would}reduced{result.told}")
+        if not (result.done or result.left):
+            why = "nothing could be reduced" if result.refused else "nothing of this body moves"
+            self._note(f"{title}: {why}; left alone")
+            return
+        self._save(file, scene)
+        outcome.bones += len(result.done)
+        self._tell_written(title, scene, outcome)
+
+    def _refuse(self, title: str, path: Path) -> None:
+        """Raise FileProblem where a file must not or cannot be written: better said before hours go into it."""
+        place = place_of(path)
+        if place in self._inputs:
+            raise FileProblem(f"this would be written over {path}, which is to be read too: leave one of them out")
+        if place in self._written:
+            raise FileProblem(f"{self._written[place]} was written to {path} too: use another --output for one of them")
+        refuse_to_replace(path, overwrite=self.writing.overwrite)
+        refuse_read_only(path)
+        self._written[place] = title
+
+    def _save(self, file: Path, scene: Path) -> None:
+        if not self.writing.dry_run:
+            write_file(file, scene, self._stop_if_asked)
+
+    def _tell_written(self, title: str, path: Path, outcome: Outcome) -> None:
+        self._note(f"{title}: {self._would}written to {path}")
+        outcome.written.append(path)
+
+
+def _file_of(source: str) -> Path:
+    """The file of a recording, without the body; all of it where there is no such file."""
+    try:
+        return split_source(source)[0]
+    except TrajectoryError:
+        return Path(source)
+
+
+def _names(file: Path, clips: Sequence[Clip]) -> list[str]:
+    """What the files of clips are called: as the recording, and where bodies of it were named, as these too."""
+    stem = file.stem
+    if len(clips) > 1:
+        bodies = [clip.name.removeprefix(f"{stem}-") for clip in clips]
+    elif clips[0].body:
+        bodies = [clips[0].body]
+    else:
+        return [stem]
+    return [f"{stem}-{body}" for body in folder_names(bodies)]

@@ -1,0 +1,138 @@
+"""What `reduce.py` does to the objects and bones of the open file: Reduce Keys to Poses, as in Blender's window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+
+from rigid_motion import animation
+from rigid_motion.animation import NeedsItsKeys, Reduction, Refused
+from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit
+from rigid_motion.animation.inbetweens.polls import with_more_keys_than
+from rigid_motion.animation.transforms import Transform
+from rigid_motion_batch.blend_targets import Action, Result
+from rigid_motion_batch.comparison.study.choices import Tolerance
+from rigid_motion_batch.figures import unit_of
+from rigid_motion_batch.sessions import counted
+
+FEWEST = 2
+"""So many keys are as few as a motion has."""
+
+LEAST = 1e-6
+"""Millimetres: no tolerance is smaller."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How few keys are wanted, of what."""
+
+    mode: str
+    tolerance: Tolerance | None
+    """What each thing begins with in Blender's window, or `reduce.py` with recordings, where None."""
+
+    radius: float | None
+    """Of the shell in metres; what each object and bone measures, or what `compare` takes of recordings, where None."""
+
+    shared: bool
+    """Whether all bones of a rig get keys on the same frames."""
+
+    discard: bool = False
+    """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
+
+
+def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
+    """Fewer keys for what has more than two; and for what was asked for by its very name, if only to say why not."""
+
+    def concerned(targets: Sequence[Transform]) -> list[Transform]:
+        keyed = set(with_more_keys_than(targets, FEWEST))
+        named = set(asked or ())
+        return [target for target in targets if target in keyed or (target.name in named and not _has_bones(target))]
+
+    def reduce(targets: Sequence[Transform]) -> Result:
+        return reduced(targets, wishes)
+
+    return Action("Reducing", "reduced", "-reduced", concerned, reduce)
+
+
+def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
+    """Leave targets of the open file the few keys that they need."""
+    scene = bpy.context.scene
+    unit = metres_per_unit(scene)
+    tolerance = wishes.tolerance or _written(first_tolerance(scene, targets) * unit)
+    before = [len(target.motion.bakes) for target in targets]
+    refusals: list[Refused] = []
+    animation.reduce_keys_of(
+        targets,
+        wishes.mode,
+        tolerance.metres(unit) / unit,
+        None if wishes.radius is None else wishes.radius / unit,
+        shared=wishes.shared,
+        refused=refusals,
+    )
+    done = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
+    # Refusals come in the order of what refused.
+    problems = dict(zip([target for target in targets if target not in done], refusals, strict=True))
+    doubt = _doubt(targets, wishes.tolerance, unit)
+    left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
+    reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
+    told = f"{_described(animation.total_reduction(done), tolerance, unit)}{doubt}" if done else ""
+    if wishes.discard and done:
+        animation.discard_dense_keys(done)
+    return Result(
+        done,
+        {target: reason for target, reason in reasons.items() if target not in left},
+        {target: f"{reason}{doubt}" for target, reason in reasons.items() if target in left},
+        told,
+    )
+
+
+def _described(reduction: Reduction, tolerance: Tolerance, unit: float) -> str:
+    """How many keys there were and are, and how far off they are; lengths of the reduction are of `unit` metres."""
+    rig = reduction.rig
+    told = fewer(reduction.before, reduction.after)
+    told += f" on {counted(rig.frames, 'frame')}" if rig else ""
+    told += off(tolerance, reduction.largest_error * unit, unit)
+    if rig and rig.slide_before > 0.0:
+        before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
+        told += f"; feet slide {after}, and {before} before"
+    return told
+
+
+def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
+    """What to think of where a tolerance is in metres, and a rig hardly is: importers leave it in units of its own."""
+    size = max(targets[0].animated.dimensions) * unit if targets[0].prefix else 0.0
+    name, length = unit_of(size)
+    if tolerance is None or not tolerance.is_length or length == 1.0:
+        return ""
+    meant = tolerance.metres(unit) / (unit * length)
+    return f"; it is {size:.3g} m large in this file: if these are {name}, give --tolerance {meant:.6g}"
+
+
+def fewer(before: int, after: int) -> str:
+    """How many keys became how many."""
+    return f", {before} -> {after} keys"
+
+
+def off(tolerance: Tolerance, metres: float, per_unit: float) -> str:
+    """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
+    return f", {tolerance.alike(metres, per_unit)} off at most ({allowed} allowed)"
+
+
+def _written(metres: float) -> Tolerance:
+    """A length as a user would write it."""
+    number, unit = (metres, "m") if metres >= 1.0 else (1e3 * metres, "mm")
+    return Tolerance(f"{max(number, LEAST):.6f}{unit}")
+
+
+def _has_bones(target: Transform) -> bool:
+    """Whether the name of an object stands for the bones of a rig."""
+    return not target.prefix and target.carrier.pose is not None
+
+
+def _reason(target: Transform, refusal: Refused) -> str:
+    """A refusal without the name that it begins with: the target's, or that of its rig."""
+    begin = next((name for name in (target.name, target.animated.name) if str(refusal).startswith(name)), "")
+    return str(refusal).removeprefix(begin).removeprefix(":").strip()

@@ -1,0 +1,178 @@
+"""What the tests of reduce.py share: running it, what to run it on, and how far what it made is off."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import write_channel
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch import reduce
+from tests.animation.farm import on_a_farm, played_on_a_farm
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import new_object
+from tests.recordings import RECORDINGS
+from tests.scripts.baking import new_file, save
+from tests.scripts.bvh_bodies import write_body
+
+WALK = RECORDINGS.parent / "rigs" / "pab_walk.fbx"
+"""Other people's."""
+
+FRAMES = np.arange(1.0, 91.0)
+"""Of the dense keys in the scenes."""
+
+RADIUS = 0.1
+"""Metres: what is looked at around an origin, where the size of a thing does not say."""
+
+ROUNDING = 2e-5
+"""Metres: single precision of matrices, through a chain of bones."""
+
+BALL = RADIUS * normalise(np.random.default_rng(5).normal(size=(64, 3)))
+"""Points that far from an origin, in all directions."""
+
+
+def run(*arguments: object) -> int:
+    return reduce.main([str(argument) for argument in arguments])
+
+
+def exit_code(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        run(*arguments)
+    return ended.value.code
+
+
+def swing(count: int, seed: int = 0) -> Poses:
+    """A smooth motion through half a metre and a turn, faster and slower by turns, of so many poses."""
+    random = np.random.default_rng(seed)
+    phases = np.linspace(0.0, 5.0, count)[:, None] * random.uniform(0.5, 1.5, 3) + random.uniform(0.0, 6.0, 3)
+    angles = np.linspace(0.0, 3.0, count) + 0.2 * np.sin(np.linspace(0.0, 12.0, count))
+    axis = normalise(random.normal(size=3))
+    turns = np.column_stack((np.cos(angles), np.sin(angles)[:, None] * axis))
+    return Poses(0.5 * np.sin(phases), turns)
+
+
+def key_densely(carrier: bpy.types.Object | bpy.types.PoseBone, poses: Poses, frames: np.ndarray = FRAMES) -> None:
+    """A key of location and rotation on every frame, as a simulation or motion capture leaves them."""
+    carrier.rotation_mode = "QUATERNION"
+    animated = carrier.id_data
+    prefix = transform_of(carrier).prefix
+    write_channel(animated, f"{prefix}location", frames, poses.positions)
+    write_channel(animated, f"{prefix}rotation_quaternion", frames, poses.quaternions)
+
+
+def object_file(path: Path, *names: str) -> Path:
+    """A file with objects that have a key on every frame, saved by a Blender without the extension."""
+    new_file()
+    for seed, name in enumerate(names or ("Tool",)):
+        obj = new_object(name)
+        obj.empty_display_size = RADIUS
+        key_densely(obj, swing(len(FRAMES), seed))
+    path.parent.mkdir(exist_ok=True)
+    return save(path)
+
+
+def rig_file(path: Path) -> Path:
+    """A file with a chain of three bones that turn on every frame, and an empty at the end of each: "at BONE"."""
+    new_file()
+    data = bpy.data.armatures.new("Rig")
+    rig = new_object("Rig", data=data)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for number, name in enumerate(("Root", "Arm", "Hand")):
+        bone = data.edit_bones.new(name)
+        bone.head, bone.tail, bone.parent = (0.0, 0.0, 0.3 * number), (0.0, 0.0, 0.3 * number + 0.3), parent
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for seed, bone in enumerate(rig.pose.bones):
+        key_densely(bone, swing(len(FRAMES), seed + 20))
+        probe = new_object(f"at {bone.name}")
+        probe.parent, probe.parent_type, probe.parent_bone = rig, "BONE", bone.name
+    return save(path)
+
+
+def reduced_name(path: Path) -> Path:
+    return path.with_name(f"{path.stem}-reduced.blend")
+
+
+def played(path: Path, *names: str) -> np.ndarray:
+    """World matrices on all frames (objects, n, 4, 4), in a Blender that has never heard of the extension."""
+    return played_on_a_farm(path, names, FRAMES)[1]
+
+
+def displacement(worlds: np.ndarray, truth: np.ndarray, points: np.ndarray = BALL) -> float:
+    """How far any of these points of an object is from where it was, on any frame."""
+    offset = (worlds - truth)[..., :3, :]
+    return float(np.linalg.norm(points @ offset[..., :3].swapaxes(-1, -2) + offset[..., None, :, 3], axis=-1).max())
+
+
+def count_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> int:
+    return len(curves_of(carrier)["location", 0].keyframe_points)
+
+
+def write_csv(path: Path, seconds: float = 2.0, rate: float = 90.0) -> tuple[np.ndarray, Poses]:
+    """A recording in Blender's axes and metres, and what it is of."""
+    times = np.arange(round(seconds * rate) + 1) / rate
+    poses = swing(len(times), 3)
+    rows = np.column_stack((times, poses.positions, poses.quaternions)).tolist()
+    lines = ["t,x,y,z,qw,qx,qy,qz", *(",".join(map(repr, row)) for row in rows)]
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    return times, poses
+
+
+def read_table(path: Path) -> tuple[np.ndarray, Poses]:
+    header, *lines = path.read_text(encoding="utf-8").splitlines()
+    assert header == "t,x,y,z,qw,qx,qy,qz"
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines])
+    return rows[:, 0], Poses(rows[:, 1:4], rows[:, 4:])
+
+
+def worlds_of(poses: Poses) -> np.ndarray:
+    """Matrices (n, 4, 4), by the formula of unit quaternions and not by this program."""
+    w, x, y, z = poses.quaternions.T
+    worlds = np.zeros((len(w), 4, 4))
+    worlds[:, 3, 3], worlds[:, :3, 3] = 1.0, poses.positions
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    worlds[:, :3, :3] = np.array(rows).transpose(2, 0, 1)
+    return worlds
+
+
+def hand_made(folder: Path) -> Path:
+    write_body(folder / "body.bvh")
+    return folder / "body.bvh"
+
+
+HEADS = """
+for path, end in ((path, ".npy"), (source, " of source.npy")):
+    if path.endswith(".blend"):
+        bpy.ops.wm.open_mainfile(filepath=path)
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        importer = bpy.ops.import_scene.fbx if path.endswith(".fbx") else bpy.ops.import_anim.bvh
+        importer(filepath=path)
+    scene = bpy.context.scene
+    rig = max((obj for obj in bpy.data.objects if obj.type == "ARMATURE"), key=lambda obj: len(obj.pose.bones))
+    first, last = (round(frame) for frame in rig.animation_data.action.frame_range)
+    rows = []
+    for frame in range(first, last + 1):
+        scene.frame_set(frame)
+        shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        heads = {bone.name: shown.matrix_world @ bone.head for bone in shown.pose.bones}
+        rows.append([heads[name] for name in sorted(heads)])
+    np.save(found + end, np.array(rows))
+"""
+
+
+def heads_of(made: Path, source: Path, tmp_path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Where all bones begin (frames, bones, 3): as two files play, or as Blender itself imports one."""
+    on_a_farm(f"source = {str(source)!r}\n{HEADS}", made, tmp_path / "heads")
+    return np.load(tmp_path / "heads.npy"), np.load(tmp_path / "heads of source.npy")

@@ -1,0 +1,340 @@
+"""reduce.py on .blend files, as people run it: what it plays, what it leaves alone, what it says."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion import animation
+from rigid_motion.animation import MODE_IDS, key_frames, modes_of
+from rigid_motion_batch import blend_files, reduce
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import new_object
+from tests.scripts.baking import extension, new_file, open_again, save
+from tests.scripts.reducing import (
+    FRAMES,
+    ROUNDING,
+    WALK,
+    count_keys,
+    displacement,
+    exit_code,
+    hand_made,
+    heads_of,
+    key_densely,
+    object_file,
+    played,
+    reduced_name,
+    rig_file,
+    run,
+    swing,
+    write_csv,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp", "lerp_slerp"])
+def test_an_object_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, mode):
+    path = object_file(tmp_path / "shot.blend")
+    before = path.read_bytes()
+    assert run(path, "--tolerance", "5mm", "--mode", mode) == 0
+    assert path.read_bytes() == before
+    assert sorted(os.listdir(tmp_path)) == ["shot-reduced.blend", "shot.blend"]
+    assert 0.0 < displacement(played(reduced_name(path), "Tool"), played(path, "Tool")) <= 5e-3 + ROUNDING
+    with extension():
+        open_again(reduced_name(path))
+        tool = bpy.data.objects["Tool"]
+        assert 2 < count_keys(tool) < len(FRAMES) / 2
+        assert set(modes_of(tool, key_frames(tool)[:-1])) == {mode}
+
+
+def test_the_larger_a_tolerance_or_the_smaller_a_radius_the_fewer_keys(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    counts = []
+    for tolerance, radius in (("5mm", 1.0), ("5mm", 0.1), ("2cm", 0.1)):
+        assert run(path, "--tolerance", tolerance, "--radius", radius, "--overwrite") == 0
+        open_again(reduced_name(path))
+        counts.append(count_keys(bpy.data.objects["Tool"]))
+    assert counts == sorted(set(counts), reverse=True)
+
+
+def test_a_tolerance_in_metres_is_that_in_a_scene_of_centimetres(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    save(path)
+    assert run(path, "--tolerance", "0.05mm", "--radius", 1e-3) == 0
+    off = displacement(played(reduced_name(path), "Tool"), played(path, "Tool"))
+    assert 1e-3 < off <= 5e-3 + ROUNDING, "5 thousandths of a centimetre"
+
+
+def test_a_rig_with_few_keys_plays_within_the_tolerance_in_any_blender(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    before, probes = path.read_bytes(), ("at Root", "at Arm", "at Hand")
+    assert run(path, "--tolerance", "5mm") == 0
+    assert path.read_bytes() == before
+    at_ends = np.zeros((1, 3))  # The end of a bone is as far from its head as its radius.
+    assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), at_ends) <= 5e-3 + ROUNDING
+    open_again(reduced_name(path))
+    counts = [count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones]
+    assert sum(counts) < 3 * len(FRAMES) / 2
+    assert f"Rig: 3 bones reduced, {3 * len(FRAMES)} -> {sum(counts)} keys" in capsys.readouterr().err
+
+
+@pytest.mark.recordings
+def test_a_recorded_walk_that_was_imported_plays_within_the_tolerance_in_any_blender(tmp_path):
+    new_file()
+    bpy.ops.import_scene.fbx(filepath=str(WALK))
+    path = save(tmp_path / "walk.blend")
+    before = path.read_bytes()
+    assert run(path, "--objects", "Hips/*", "--tolerance", "5mm") == 0
+    assert path.read_bytes() == before
+    shown, recorded = heads_of(reduced_name(path), path, tmp_path)
+    assert 0.0 < np.linalg.norm(shown - recorded, axis=-1).max() <= 5e-3 + ROUNDING
+    open_again(reduced_name(path))
+    bones = bpy.data.objects["Hips"].pose.bones
+    assert sum(map(count_keys, bones)) < len(bones) * len(shown) / 4
+
+
+def test_key_poses_are_on_the_same_frames_for_all_bones(tmp_path):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--tolerance", "1cm", "--shared") == 0
+    open_again(reduced_name(path))
+    frames = [
+        [point.co.x for point in curves_of(bone)["location", 0].keyframe_points]
+        for bone in bpy.data.objects["Rig"].pose.bones
+    ]
+    assert frames[0] == frames[1] == frames[2]
+    assert len(frames[0]) < len(FRAMES)
+
+
+def test_objects_and_bones_are_chosen_by_name(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    key_densely(new_object("Camera"), swing(len(FRAMES), 7))
+    key_densely(new_object("Tool"), swing(len(FRAMES), 8))
+    save(path)
+    assert run(path, "--objects", "Camera,Rig/[AH]*", "--tolerance", "1cm") == 0
+    open_again(reduced_name(path))
+    rig = bpy.data.objects["Rig"]
+    carriers = {"Camera": bpy.data.objects["Camera"], "Tool": bpy.data.objects["Tool"], **dict(rig.pose.bones.items())}
+    assert {name for name, carrier in carriers.items() if count_keys(carrier) < len(FRAMES)} == {
+        *("Camera", "Arm", "Hand")
+    }
+    assert "1 object and 2 bones reduced" in capsys.readouterr().err
+
+
+def test_the_dense_keys_stay_in_the_file_for_restore_keys(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    assert run(path) == 0
+    with extension():
+        open_again(reduced_name(path))
+        tool = bpy.data.objects["Tool"]
+        animation.restore_keys(tool)
+        assert count_keys(tool) == len(FRAMES)
+
+
+def test_the_dense_keys_are_left_out_where_that_is_asked_for(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    assert run(path, "--discard") == 0
+    with extension():
+        open_again(reduced_name(path))
+        assert not animation.is_reduced(bpy.data.objects["Tool"])
+        assert [action.name for action in bpy.data.actions] == [bpy.data.objects["Tool"].animation_data.action.name]
+
+
+def test_bones_that_need_their_keys_are_told_of_together(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--tolerance", "0.00001mm", "--shared") == 0
+    assert "Rig: 3 bones are left as they are: its bones need their keys on all of 90 frames" in capsys.readouterr().err
+    assert not reduced_name(path).exists()
+
+
+def test_what_needs_its_keys_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
+    path = object_file(tmp_path / "shot.blend")
+    assert run(path, "--tolerance", "0.00001mm") == 0
+    said = capsys.readouterr().err
+    assert f"Tool is left as it is: needs its {len(FRAMES)} keys to stay within the tolerance: allow a larger" in said
+    assert "nothing to be reduced; left alone" in said
+    assert os.listdir(tmp_path) == ["shot.blend"]
+
+
+def test_what_is_asked_for_by_name_and_has_no_keys_is_told_why(tmp_path, capsys):
+    path = object_file(tmp_path / "shot.blend")
+    still = new_object("Still")
+    still.constraints.new("COPY_LOCATION").target = bpy.data.objects["Tool"]
+    save(path)
+    assert run(path, "--objects", "Still") == 1
+    assert "Still: not reduced: has no keys of location, rotation or scale, constraints" in capsys.readouterr().err
+    assert not reduced_name(path).exists()
+
+
+def test_a_rig_in_other_units_than_the_tolerance_is_told_of(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    rig = bpy.data.objects["Rig"]
+    rig.scale = (200.0,) * 3
+    save(path)
+    assert run(path, "--tolerance", "5mm") == 0
+    assert "if these are centimetres, give --tolerance 0.5" in capsys.readouterr().err
+
+
+def test_without_a_tolerance_a_rig_of_any_size_begins_with_one_that_fits_it(tmp_path):
+    path = rig_file(tmp_path / "shot.blend")
+    bpy.data.objects["Rig"].scale = (200.0,) * 3
+    save(path)
+    assert run(path) == 0
+    open_again(reduced_name(path))
+    assert sum(count_keys(bone) for bone in bpy.data.objects["Rig"].pose.bones) < 3 * len(FRAMES) / 2
+
+
+# What is left alone, and how it ends
+
+
+def test_a_dry_run_says_all_and_writes_nothing(tmp_path, capsys):
+    shot, hand, body = object_file(tmp_path / "shot.blend"), tmp_path / "hand.csv", hand_made(tmp_path)
+    write_csv(hand)
+    before = sorted(os.listdir(tmp_path))
+    capsys.readouterr()
+    assert run(shot, hand, body, "--blend", "--dry-run") == 0
+    assert sorted(os.listdir(tmp_path)) == before
+    said = capsys.readouterr()
+    assert said.out == ""
+    for path in ("shot-reduced.blend", "hand-keys.csv", "hand-keys.blend", "body-keys.blend"):
+        assert f"would be written to {tmp_path / path}" in said.err
+    assert said.err.count("would be reduced, ") == 3
+
+
+def test_nothing_is_written_over_unless_asked(tmp_path, capsys):
+    shot, hand = object_file(tmp_path / "shot.blend"), tmp_path / "hand.csv"
+    write_csv(hand)
+    there = [reduced_name(shot), tmp_path / "hand-keys.csv"]
+    for path in there:
+        path.write_text("mine")
+    assert run(shot, hand) == 1
+    assert [path.read_text() for path in there] == ["mine", "mine"]
+    assert capsys.readouterr().err.count("is there already: add --overwrite") == 2
+    assert run(shot, hand, "--overwrite") == 0
+    assert all(path.read_bytes() != b"mine" for path in there)
+
+
+def test_in_place_keeps_the_file_from_before(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    before = path.read_bytes()
+    assert run(path, "--in-place") == 0
+    assert sorted(os.listdir(tmp_path)) == ["shot.blend", "shot.blend1"]
+    assert (tmp_path / "shot.blend1").read_bytes() == before
+    open_again(path)
+    assert count_keys(bpy.data.objects["Tool"]) < len(FRAMES)
+
+
+def test_what_cannot_be_read_is_named_and_the_others_are_done(tmp_path, capsys):
+    good = tmp_path / "hand.csv"
+    write_csv(good)
+    damaged = tmp_path / "damaged.blend"
+    damaged.write_bytes(b"BLENDER, but no more")
+    body = hand_made(tmp_path)
+    assert run(tmp_path / "gone.csv", damaged, f"{body}:Nose", good) == 1
+    said = capsys.readouterr().err
+    assert f"{tmp_path / 'gone.csv'}: no such file" in said
+    assert f"{damaged}: Blender cannot read this file" in said
+    assert f"{body}: no body named 'Nose'; it holds Hips, LeftHand, Head" in said
+    assert (tmp_path / "hand-keys.csv").is_file()
+    assert run(tmp_path / "gone.csv", damaged, f"{body}:Nose") == 2
+
+
+def test_two_recordings_that_would_be_one_file_are_not(tmp_path, capsys):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        write_csv(tmp_path / name / "hand.csv")
+    assert run(tmp_path / "a" / "hand.csv", tmp_path / "b" / "hand.csv", "--output", tmp_path, "--overwrite") == 1
+    assert f"{tmp_path / 'a' / 'hand.csv'} was written to {tmp_path / 'hand-keys.csv'} too" in capsys.readouterr().err
+
+
+def test_a_recording_is_not_written_over_one_that_is_to_be_read(tmp_path, capsys):
+    for name in ("hand", "hand-keys"):
+        write_csv(tmp_path / f"{name}.csv")
+    before = (tmp_path / "hand-keys.csv").read_bytes()
+    assert run(tmp_path / "hand.csv", tmp_path / "hand-keys.csv", "--overwrite") == 1
+    assert "which is to be read too" in capsys.readouterr().err
+    assert (tmp_path / "hand-keys.csv").read_bytes() == before
+
+
+@pytest.mark.parametrize("kind", ["blend", "recording"])
+def test_ctrl_c_while_a_file_is_written_leaves_no_trace_of_it(tmp_path, monkeypatch, kind):
+    path = object_file(tmp_path / "shot.blend") if kind == "blend" else hand_made(tmp_path)
+    before, real = path.read_bytes(), blend_files.refuse_cut_off
+
+    def press_and_check(written: Path) -> None:
+        assert written.is_file()
+        signal.raise_signal(signal.SIGINT)
+        real(written)
+
+    monkeypatch.setattr(blend_files, "refuse_cut_off", press_and_check)
+    assert run(path) == 130
+    assert os.listdir(tmp_path) == [path.name]
+    assert path.read_bytes() == before
+
+
+def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, capsys, monkeypatch):
+    paths = [object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
+    real = animation.reduce_keys_of
+
+    def fail_in_a(targets: object, *wishes: object, **options: object) -> object:
+        if bpy.data.filepath == str(paths[0]):
+            raise ZeroDivisionError("nobody knows why")
+        return real(targets, *wishes, **options)
+
+    monkeypatch.setattr(animation, "reduce_keys_of", fail_in_a)
+    assert run(*paths) == 1
+    assert f"{paths[0]}: not written, for this program failed (ZeroDivisionError" in capsys.readouterr().err
+    assert sorted(os.listdir(tmp_path)) == ["a.blend", "b-reduced.blend", "b.blend"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ([], "INPUT"),
+        (["a.blend", "--tolerance", "5 apples"], "is no tolerance; give a length such as 5mm"),
+        (["a.blend", "--tolerance", "0mm"], "is no tolerance"),
+        (["a.blend", "--radius", "0"], "is not a number of metres above 0"),
+        (["a.blend", "--mode", "BLENDER"], "invalid choice"),
+        (["a.csv", "--fps", "29.97"], "is not a whole number from 1 to 240"),
+        (["a.csv", "--degrees"], "--degrees is for Euler angles"),
+        (["a.csv", "--in-place"], "--in-place is for .blend files, and a.csv is a recording"),
+        (["a.csv", "--objects", "Hand"], "name one body with FILE:BODY"),
+        (["a.blend", "--in-place", "--output", "x"], "give one of them"),
+        (["shot.blend", "shot-reduced.blend"], "would be written over shot-reduced.blend"),
+    ],
+)
+def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):
+    assert exit_code(*arguments) == 2
+    assert complaint in capsys.readouterr().err
+
+
+def test_every_mode_of_the_menu_can_be_asked_for():
+    assert [reduce.parse(["a.csv", "--mode", mode]).mode for mode in MODE_IDS[1:]] == list(MODE_IDS[1:])
+
+
+def test_the_help_shows_examples_as_the_program_was_called(capsys):
+    assert exit_code("--help") == 0
+    said = capsys.readouterr().out
+    assert "python scripts/reduce.py shot.blend\n" in said
+    for code in (0, 1, 2, 130):
+        assert f"\n  {code} " in said
+
+
+def test_as_a_program_it_ends_by_itself_and_prints_the_path_alone(tmp_path):
+    object_file(tmp_path / "shot.blend")
+    done = subprocess.run(
+        [sys.executable, ROOT / "scripts" / "reduce.py", "shot.blend"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=tmp_path,
+    )
+    assert (done.returncode, done.stdout) == (0, "shot-reduced.blend\n"), done.stderr

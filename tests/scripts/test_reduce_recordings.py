@@ -1,0 +1,149 @@
+"""reduce.py on recordings: how near tables, objects and rigs are to what was recorded."""
+
+from __future__ import annotations
+
+import os
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import key_frames, modes_of
+from rigid_motion.motion import interpolate
+from tests.animation.farm import played_on_a_farm
+from tests.animation.oracle import curves_of
+from tests.scripts.baking import extension, open_again
+from tests.scripts.bvh_bodies import write_body
+from tests.scripts.reducing import (
+    FRAMES,
+    ROUNDING,
+    WALK,
+    count_keys,
+    displacement,
+    hand_made,
+    heads_of,
+    object_file,
+    read_table,
+    run,
+    worlds_of,
+    write_csv,
+)
+
+
+@pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])
+def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, capsys, mode):
+    path = tmp_path / "hand.csv"
+    times, poses = write_csv(path)
+    before = path.read_bytes()
+    assert run(path, "--tolerance", "5mm", "--mode", mode) == 0
+    assert path.read_bytes() == before
+    key_times, keys = read_table(tmp_path / "hand-keys.csv")
+    assert 2 < len(key_times) < len(times) / 5
+    assert set(key_times) <= set(times)
+    filled = interpolate(key_times, keys, times, mode)
+    assert 0.0 < displacement(worlds_of(filled), worlds_of(poses)) <= 5e-3
+    said = capsys.readouterr()
+    assert f"{path}: reduced, {len(times)} -> {len(key_times)} keys, " in said.err
+    assert said.out == f"{tmp_path / 'hand-keys.csv'}\n"
+
+
+@pytest.mark.parametrize("fps", [None, 30])
+def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fps):
+    path = tmp_path / "hand.csv"
+    times, poses = write_csv(path)
+    assert run(path, "--tolerance", "5mm", "--blend", *(("--fps", fps) if fps else ())) == 0
+    blend, step = tmp_path / "hand-keys.blend", 1 if fps is None else 90 // fps
+    frames = np.arange(1.0, len(times[::step]) + 1.0)
+    worlds = played_on_a_farm(blend, ["hand"], frames)[1][0]
+    assert displacement(worlds, worlds_of(poses)[::step]) <= 5e-3 + ROUNDING
+    with extension():
+        open_again(blend)
+        scene, obj = bpy.context.scene, bpy.data.objects["hand"]
+        assert (scene.render.fps, scene.frame_start, scene.frame_end) == (fps or 90, 1, len(frames))
+        assert count_keys(obj) == len(read_table(tmp_path / "hand-keys.csv")[0])
+        assert set(modes_of(obj, key_frames(obj)[:-1])) == {"motor_spline"}
+
+
+def test_frames_are_the_samples_of_a_recording_whose_rate_is_no_whole_number(tmp_path):
+    path = tmp_path / "hand.csv"
+    write_csv(path, rate=29.97)
+    assert run(path, "--blend") == 0
+    open_again(tmp_path / "hand-keys.blend")
+    render, keys = bpy.context.scene.render, curves_of(bpy.data.objects["hand"])["location", 0].keyframe_points
+    assert render.fps / render.fps_base == pytest.approx(29.97, rel=1e-6)
+    assert all(key.co.x == round(key.co.x) for key in keys)
+
+
+@pytest.mark.parametrize("options", [(), ("--shared",)])
+@pytest.mark.parametrize(
+    "recording",
+    [
+        hand_made,
+        pytest.param(lambda _: WALK, marks=pytest.mark.recordings, id="walk"),
+    ],
+)
+def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, recording, options):
+    source = recording(tmp_path)
+    assert run(source, "--tolerance", "5mm", "--output", tmp_path / "keyed", *options) == 0
+    made = tmp_path / "keyed" / f"{source.stem}-keys.blend"
+    assert os.listdir(made.parent) == [made.name]
+    shown, imported = heads_of(made, source, tmp_path)
+    assert shown.shape == imported.shape
+    assert 0.0 < np.linalg.norm(shown - imported, axis=-1).max() <= 5e-3 + ROUNDING
+    with extension():
+        open_again(made)
+        (rig,) = bpy.data.objects
+        keyed = [bone for bone in rig.pose.bones if len(key_frames(bone))]
+        assert sum(len(key_frames(bone)) for bone in keyed) < len(keyed) * len(shown)
+        moving = [bone for bone in keyed if len(key_frames(bone)) > 1]
+        assert moving
+        assert {mode for bone in moving for mode in modes_of(bone, key_frames(bone)[:-1])} == {"motor_spline"}
+        assert len(bpy.data.actions) == 1, "the recording has the dense keys, and this file need not"
+
+
+def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):
+    write_body(tmp_path / "body.bvh", moves=False)
+    assert run(tmp_path / "body.bvh") == 0
+    assert "nothing of this body moves; left alone" in capsys.readouterr().err
+    assert os.listdir(tmp_path) == ["body.bvh"]
+
+
+def test_a_body_that_grows_has_its_size_in_the_table_and_in_the_file(tmp_path):
+    path = tmp_path / "balloon.csv"
+    times, poses = write_csv(path)
+    sizes = 1.0 + 0.3 * np.sin(times)
+    header, *lines = path.read_text().splitlines()
+    rows = [f"{line},{size!r}" for line, size in zip(lines, sizes.tolist(), strict=True)]
+    path.write_text("\n".join([f"{header},scale", *rows]))
+    assert run(path, "--tolerance", "5mm", "--blend") == 0
+    assert (tmp_path / "balloon-keys.csv").read_text().startswith("t,x,y,z,qw,qx,qy,qz,s\n")
+    worlds = worlds_of(poses)
+    worlds[:, :3, :3] *= sizes[:, None, None]
+    frames = np.arange(1.0, len(times) + 1.0)
+    shown = played_on_a_farm(tmp_path / "balloon-keys.blend", ["balloon"], frames)[1][0]
+    assert displacement(shown, worlds) <= 5e-3 + ROUNDING
+
+
+def test_one_body_of_a_file_and_all_of_them_are_files_of_their_own(tmp_path):
+    source = hand_made(tmp_path)
+    assert run(f"{source}:LeftHand", "--tolerance", "1cm") == 0
+    assert (tmp_path / "body-LeftHand-keys.csv").is_file()
+    assert run(f"{source}:*", "--tolerance", "1cm", "--output", tmp_path / "all") == 0
+    assert sorted(os.listdir(tmp_path / "all")) == [f"body-{name}-keys.csv" for name in ("Head", "Hips", "LeftHand")]
+
+
+def test_an_object_of_a_blend_file_is_a_recording_where_it_is_named(tmp_path):
+    path = object_file(tmp_path / "shot.blend")
+    assert run(f"{path}:Tool") == 0
+    assert len(read_table(tmp_path / "shot-Tool-keys.csv")[0]) < len(FRAMES) / 3
+
+
+def test_what_is_far_away_is_refused_where_blender_could_not_hold_it(tmp_path, capsys):
+    path = tmp_path / "hand.csv"
+    write_csv(path)
+    header, *lines = path.read_text().splitlines()
+    cells = [line.split(",") for line in lines]
+    path.write_text("\n".join([header, *(",".join([t, f"{float(x) + 1e6!r}", *rest]) for t, x, *rest in cells)]))
+    assert run(path) == 0
+    assert run(path, "--blend", "--overwrite") == 1
+    assert f"{path}: this is up to 1e+06 m from its origin" in capsys.readouterr().err
