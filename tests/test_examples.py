@@ -162,6 +162,12 @@ def test_a_dancer_keeps_within_the_tolerance_with_a_quarter_of_the_keys(make: Ca
     seen = play(tmp_path / "examples" / "dancer" / "dancer.blend", joints)
     off = np.linalg.norm(seen[:, 0] - seen[:, 1], axis=2)
     assert SINGLE < off.max() <= dancer.TOLERANCE
+
+    def grey(depsgraph: bpy.types.Depsgraph) -> list[Vector]:
+        return [bone.head.copy() for bone in bpy.data.objects["Recorded"].evaluated_get(depsgraph).pose.bones]
+
+    reduced = play(tmp_path / "renders" / "dancer" / "dancer-reduced.blend", grey)
+    assert SINGLE < np.linalg.norm(reduced - seen[:, 0], axis=2).max() <= dancer.TOLERANCE
     before, after = (int(number) for number in re.findall(r"(\d+) keys", printed))
     assert 4 * after < before
 
@@ -183,6 +189,7 @@ def test_a_camera_keeps_within_the_tolerance_of_its_solution_with_few_keys(make:
     rows = {row["mode"]: row["keys"] for row in measured(tmp_path / "renders" / "camera" / "metrics.csv")}
     assert rows == dict(table("camera")[1:])
     assert keys_of("Smooth") == int(rows["motor_spline"])
+    assert len(measured(tmp_path / "renders" / "camera-keys" / "solve-keys.csv")) == int(rows["motor_spline"])
     assert keys_of("Solved") == len(clip.times)
 
 

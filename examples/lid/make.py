@@ -31,6 +31,9 @@ HINGE = Vector((0.0, DEPTH / 2.0, HEIGHT))
 IN_LID = Vector((0.0, DEPTH / 2.0, -THICKNESS / 2.0))
 """The hinge, in the space of the lid, which has its origin in its middle."""
 
+ACROSS = 1.9
+"""Metres from left to right of the picture."""
+
 STILL = 12
 
 
@@ -38,7 +41,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Make the scene, and say how far each lid leaves its hinge."""
     options = staging.parse(HERE, __doc__, arguments)
     staging.begin(frames=KEYS[-1][0] + 15)
-    camera = staging.look((0.0, 0.0, 0.36), (75.0, 0.0, 68.0), 1.9)
+    camera = staging.look((0.0, 0.0, 0.36), (75.0, 0.0, 68.0), ACROSS)
     across = camera.matrix_basis.to_3x3() @ Vector((1.0, 0.0, 0.0))
     lids = []
     for name, colour, mode, place in LANES:
@@ -49,7 +52,7 @@ def main(arguments: list[str] | None = None) -> None:
     for lid, (name, colour, _, place) in zip(lids, LANES, strict=True):
         points = hinge_points(lid)
         off = staging.length(staging.farthest(points, np.array(lid.parent.matrix_world @ HINGE)))
-        staging.title(camera, place / 2.0 - 0.2, name, f"hinge off by up to {off}", colour)
+        staging.title(camera, place / ACROSS - 0.19, name, f"hinge off by up to {off}", colour)
         fine = np.arange(KEYS[0][0], KEYS[1][0] + 0.1, 0.25)
         staging.path(f"{name} path", corner_points(lid, fine), colour, 0.004)
         print(f"{name}: hinge off by up to {off}")
