@@ -12,6 +12,7 @@
     python scripts/bootstrap.py dask scheduler              use many machines, with Dask's own commands
     python scripts/bootstrap.py bundle hand.csv             write a comparison as a job for render farms
     python scripts/bootstrap.py openjd run template.json    run such a job on this machine
+    python scripts/bootstrap.py examples lid                make small complete cases to begin with: examples/README.md
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
@@ -47,6 +48,7 @@ COMMANDS = {
     "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),
+    "examples": ([ROOT / "examples" / "make_examples.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
 }

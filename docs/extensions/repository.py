@@ -13,10 +13,14 @@ from sphinx.application import Sphinx
 HOME = {"README.md": "index"}
 """A file that has a page in its place."""
 
+EXAMPLES = "lid", "sword", "hand", "dancer", "camera", "farm"
+
 SHOWN = {
     "CONTRIBUTING.md": "contributing",
     "CHANGELOG.md": "changelog",
     "assets/README.md": "assets",
+    "examples/README.md": "examples",
+    **{f"examples/{name}/README.md": f"examples/{name}" for name in EXAMPLES},
     "examples/modes_in_python/README.md": "notebook",
 }
 """Files to the pages of the site that show them; what these have in docs/ is for people who read it there."""
@@ -39,22 +43,35 @@ def read_elsewhere(app: Sphinx, page: str, source: list[str]) -> None:
         if shown_as == page:
             file = Path(app.srcdir).parent / name
             app.env.note_dependency(str(file), docname=page)
-            source[0] = as_in_docs(file.read_text(encoding="utf-8"), posixpath.dirname(name))
+            source[0] = as_in_docs(file.read_text(encoding="utf-8"), posixpath.dirname(name), page)
 
 
-def as_in_docs(text: str, folder: str) -> str:
-    """The text of a file in this folder of the checkout, as it would be in docs/."""
-    return LINK.sub(lambda link: posixpath.relpath(posixpath.join(folder, link[1]), "docs"), text)
+def as_in_docs(text: str, folder: str, page: str) -> str:
+    """The text of a file in this folder of the checkout, as it would be where the page is in docs/."""
+    place = posixpath.join("docs", posixpath.dirname(page))
+    return LINK.sub(lambda link: posixpath.relpath(posixpath.join(folder, link[1]), place), text)
 
 
 def lead_to_pages(app: Sphinx, doctree: nodes.document) -> None:
     """Turn links to files that are pages of the site into links to these pages."""
     root = Path(app.srcdir).parent
-    for link in list(doctree.findall(addnodes.download_reference)):
-        target, _, anchor = link["reftarget"].partition("#")
-        _, path = app.env.relfn2path(target, app.env.docname)
+    for link in [*doctree.findall(addnodes.download_reference), *doctree.findall(leads_outside)]:
+        if isinstance(link, addnodes.pending_xref):
+            path, anchor = f"{link['reftarget']}.md", link["reftargetid"]
+        else:
+            target, _, anchor = link["reftarget"].partition("#")
+            _, path = app.env.relfn2path(target, app.env.docname)
         file = Path(path).resolve()
         name = str(PurePosixPath(*file.relative_to(root).parts)) if file.is_relative_to(root) else ""
         if name in PAGES:
             uri = app.builder.get_relative_uri(app.env.docname, PAGES[name]) + (f"#{anchor}" if anchor else "")
             link.replace_self(nodes.reference("", "", *link.children, refuri=uri, internal=True))
+
+
+def leads_outside(node: nodes.Node) -> bool:
+    """Whether something is a link to a Markdown file outside of docs/, which has a path for MyST, and no page."""
+    return (
+        isinstance(node, addnodes.pending_xref)
+        and node.get("refdomain") == "doc"
+        and PurePosixPath(node["reftarget"]).is_absolute()
+    )

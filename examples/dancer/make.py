@@ -1,0 +1,95 @@
+"""A dancer with a key on every bone and frame, and beside her the same dance from its key poses alone."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
+
+from examples import staging
+from rigid_motion import animation
+from rigid_motion_batch.comparison import palette
+from rigid_motion_batch.comparison.stage.materials import surface
+from tests.rigs import dancer, figure
+
+MODE = "motor_spline"
+TOLERANCE, RADIUS = 0.01, 0.03
+"""Metres: how far off a joint may be, and how far around it that holds."""
+
+LANES = ("Recorded", staging.SKIN, -1.1), ("Key poses", palette.MODE_COLOURS[MODE], 1.1)
+"""Title, colour, and where the dancer stands."""
+
+WIDTH = 4.6
+"""Metres from left to right of the picture."""
+
+STILL, GHOSTS = 98, 3
+"""The frame of the picture, and how many key poses before it are in the air."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Make both dancers, and say how many keys are left and how far off that is."""
+    options = staging.parse(HERE, __doc__, arguments)
+    count = len(dancer.FRAMES)
+    staging.begin(count, dancer.FPS)
+    camera = staging.look((0.0, 0.0, 1.08), (82.0, 0.0, 0.0), WIDTH)
+    rigs = []
+    for name, colour, place in LANES:
+        rig = dancer.dancer()
+        rig.name, rig.location.x, rig.show_in_front = name, place, True
+        figure.clothe(rig, surface(f"{name} skin", colour)).hide_select = True
+        rigs.append(rig)
+    recorded, reduced = rigs
+    bones = list(reduced.pose.bones)
+    animation.reduce_keys_of(bones, MODE, TOLERANCE, RADIUS, shared=True)
+    done = animation.total_reduction(bones)
+    poses = np.unique([frame for bone in bones for frame in animation.key_frames(bone)])
+    off = measure(recorded, reduced)
+
+    says = (
+        f"{count} poses, {done.before} keys",
+        f"{len(poses)} poses, {done.after} keys, joints off by up to {off:.1f} mm",
+    )
+    for (name, colour, place), text in zip(LANES, says, strict=True):
+        staging.title(camera, place / WIDTH - 0.22, name, text, colour)
+        print(f"{name}: {text}")
+    staging.foot(camera, "No joint is off by more than 10 mm on any frame")
+
+    def dress() -> None:
+        staging.write(camera, "Behind: the key poses before this frame", 0.019, -0.262, 0.02, palette.DARK.faint)
+        for frame in poses[poses < STILL][-GHOSTS:]:
+            ghost(reduced.children[0], int(frame))
+
+    staging.finish(options, "dancer", reduced, STILL, bone="DEF-hand.R", dress=dress)
+
+
+def measure(recorded: bpy.types.Object, reduced: bpy.types.Object) -> float:
+    """How far any joint is off on any frame, in millimetres."""
+
+    def off() -> tuple[float]:
+        joints = [[bone.head for bone in staging.evaluated(rig).pose.bones] for rig in (recorded, reduced)]
+        return (np.linalg.norm(np.subtract(*np.array(joints)), axis=-1).max(),)
+
+    return 1e3 * float(staging.on_frames(staging.all_frames(), off).max())
+
+
+def ghost(body: bpy.types.Object, frame: int) -> None:
+    """The pose of a frame, behind the dancer, for the picture alone."""
+    bpy.context.scene.frame_set(frame)
+    seen = staging.evaluated(body)
+    mesh = bpy.data.meshes.new_from_object(seen)
+    mesh.materials.clear()
+    mesh.materials.append(surface("Ghost", LANES[1][1], alpha=0.18))
+    obj = bpy.data.objects.new(f"Key pose {frame}", mesh)
+    obj.matrix_world = seen.matrix_world.copy()
+    obj.location.y += 0.6
+    bpy.context.scene.collection.objects.link(obj)
+
+
+if __name__ == "__main__":
+    staging.run(main)

@@ -1,0 +1,108 @@
+"""Three takes of a tool, to be compared as a job of many small tasks, as a render farm runs them."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
+
+from examples import staging
+from rigid_motion_batch import job_bundle
+from rigid_motion_batch.comparison import palette
+from rigid_motion_batch.comparison.stage import captions
+from rigid_motion_batch.comparison.stage.film import render_still
+from rigid_motion_batch.comparison.stage.materials import ink, surface
+from rigid_motion_batch.making.motions import MOTIONS
+from rigid_motion_batch.making.tracking import tick, track
+
+TAKES = {"drill": "screw", "probe": "pivot", "toss": "throw"}
+"""Name of a take to the motion that it is of."""
+
+SEED, SECONDS = 5, 2.0
+
+RATES = "5,10"
+"""Of the picture's job, in keys a second."""
+
+PICTURE = 960, 300
+
+WIDTH, STEP, CARD, SQUARE = 10.0, 1.17, (1.07, 1.3), 0.2
+"""Of the picture; from card to card; of a card, and of a task on it."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Write the takes."""
+    options = staging.parse(HERE, __doc__, arguments)
+    folder = options.output / "takes"
+    folder.mkdir(exist_ok=True)
+    for number, (name, motion) in enumerate(TAKES.items()):
+        rng = np.random.default_rng((SEED, number))
+        times = tick(rng, SECONDS)
+        poses = track(rng, MOTIONS[motion].poses, times)
+        rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
+        lines = [",".join(f"{value:.6f}" for value in row) for row in rows]
+        text = "\n".join(["t,x,y,z,qx,qy,qz,qw", *lines, ""])
+        (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+        print(f"written: takes/{name}.csv")
+    if options.picture:
+        picture(folder, options.output)
+
+
+def picture(takes: Path, output: Path) -> None:
+    """Draw the steps of the job, a card for each, with a square for each of its tasks."""
+    counts = tasks_of_steps(takes)
+    scene = staging.begin(1)
+    scene.render.resolution_x, scene.render.resolution_y = PICTURE
+    camera = staging.look((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), WIDTH)
+    card, square = surface("Card", palette.DARK.card), ink("Task", staging.RIGID)
+    left = -STEP * (len(counts) - 1) / 2.0
+    for number, (step, count) in enumerate(counts.items()):
+        x = left + STEP * number
+        lay(captions.card(step, *CARD, card, 0.06), x, 0.0, 0.0)
+        staging.write(camera, step, (x - 0.44) / WIDTH, 0.036, 0.022, palette.DARK.ink)
+        for task in range(count):
+            row, column = divmod(task, 3)
+            mesh = captions.card("Task", SQUARE, SQUARE, square, 0.04)
+            lay(mesh, x - 0.34 + 0.3 * column, 0.05 - 0.3 * row, 0.1)
+    heading = f"{len(TAKES)} takes, {sum(counts.values())} tasks"
+    staging.write(camera, heading, (left - CARD[0] / 2.0) / WIDTH, 0.1, 0.03, palette.DARK.ink)
+    says = "A card is a step, which waits for what it builds on. A square is a task, which any machine may take."
+    staging.write(camera, says, (left - CARD[0] / 2.0) / WIDTH, -0.11, 0.02, palette.DARK.faint)
+    render_still(scene, output / "farm.png")
+
+
+def lay(mesh: bpy.types.Mesh, x: float, y: float, height: float) -> None:
+    """Put a flat mesh somewhere."""
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    obj.location = (x, y, height)
+    bpy.context.scene.collection.objects.link(obj)
+
+
+def tasks_of_steps(takes: Path) -> dict[str, int]:
+    """The steps of the job, in their order, and how many tasks each has."""
+    with tempfile.TemporaryDirectory() as scratch:
+        job = Path(scratch) / "job"
+        recordings = [str(path) for path in sorted(takes.glob("*.csv"))]
+        with redirect_stdout(StringIO()):  # It names the command that runs a job which is gone in a moment.
+            job_bundle.main([*recordings, "--rates", RATES, "--output", f"{scratch}/out", "--bundle", str(job)])
+        template = json.loads((job / "template.json").read_text(encoding="utf-8"))
+    return {step["name"]: count_of(step) for step in template["steps"]}
+
+
+def count_of(step: dict) -> int:
+    """The tasks of a step of a job template: its parameters have a value for each."""
+    parameters = step.get("parameterSpace", {}).get("taskParameterDefinitions", [])
+    return len(parameters[0]["range"]) if parameters else 1
+
+
+if __name__ == "__main__":
+    staging.run(main)

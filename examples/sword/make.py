@@ -1,0 +1,132 @@
+"""A sword in a fist that swings by its control bone: Blender's own in-betweens fold the arm, the screw does not."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
+
+from examples import staging
+from rigid_motion import animation
+from rigid_motion_batch.comparison.stage.materials import surface
+from tests.rigs import figure
+
+KEYS = (1, 75.0), (19, -45.0), (31, -45.0), (55, 75.0)
+"""Frames, and how far the arm is raised on them, in degrees."""
+
+LANES = ("Blender", staging.BLENDER, "BLENDER", -1.4), ("Screw", staging.RIGID, "dq_sclerp", 1.4)
+"""Title, colour, mode, and where the fighter stands."""
+
+SHOULDER, ELBOW, WRIST = Vector((0.0, 0.0, 1.36)), Vector((0.0, 0.29, 1.32)), Vector((0.0, 0.58, 1.36))
+BONES = {
+    "DEF-spine.001": (None, (0.0, 0.0, 0.95), (0.0, 0.0, 1.12)),
+    "DEF-spine.003": ("DEF-spine.001", (0.0, 0.0, 1.12), (0.0, 0.0, 1.38)),
+    "DEF-spine.006": ("DEF-spine.003", (0.0, 0.02, 1.52), (0.0, 0.04, 1.70)),
+    "DEF-upper_arm": ("DEF-spine.003", SHOULDER, ELBOW),
+    "DEF-forearm": ("DEF-upper_arm", ELBOW, WRIST),
+    "DEF-thigh": (None, (0.0, 0.0, 0.9), (0.0, 0.03, 0.48)),
+    "DEF-shin": ("DEF-thigh", (0.0, 0.03, 0.48), (0.0, 0.0, 0.08)),
+    "DEF-foot": ("DEF-shin", (0.0, 0.0, 0.06), (0.0, 0.14, 0.04)),
+    "hand": (None, WRIST, (0.0, 0.66, 1.36)),
+}
+"""Parent, head and tail. The forearm follows the control `hand` by IK."""
+
+TIP = Vector((0.0, 0.0, 0.85))
+"""In the sword's space, which has its origin in the grip."""
+
+WIDTH = 5.6
+"""Metres from left to right of the picture."""
+
+STILL = 10
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Make the scene, and say what becomes of grip and arm."""
+    options = staging.parse(HERE, __doc__, arguments)
+    staging.begin(frames=KEYS[-1][0] + 10)
+    camera = staging.look((0.0, 0.2, 1.35), (90.0, 0.0, 90.0), WIDTH)
+    rigs = []
+    for name, colour, mode, place in LANES:
+        rig = fighter(name, colour, place)
+        animation.set_mode(rig.pose.bones["hand"], mode)
+        rigs.append((rig, sword(name, rig)))
+    animation.refresh()
+    for (rig, blade), (name, colour, _, place) in zip(rigs, LANES, strict=True):
+        slipped, shorter = measure(rig, blade)
+        head = f"wrist off its circle by up to {staging.length(shorter)}"
+        staging.title(camera, place / WIDTH - 0.21, name, head, colour)
+        down = np.arange(KEYS[0][0], KEYS[1][0] + 0.1, 0.25)
+        tips = staging.on_frames(down, lambda blade=blade: staging.evaluated(blade).matrix_world @ TIP)
+        staging.path(f"{name} path", tips, colour, 0.012)
+        print(f"{name}: grip off the hand by up to {staging.length(slipped)}, {head}")
+    staging.foot(camera, "The same keys on the hand control of both.   Line: the tip of the sword on its way down")
+    staging.finish(options, "sword", rigs[1][0], STILL, bone="hand")
+
+
+def fighter(name: str, colour: str, place: float) -> bpy.types.Object:
+    """A rig of trunk, legs and an arm that follows its hand control, with keys on that."""
+    rig = bpy.data.objects.new(f"{name} rig", bpy.data.armatures.new("Fighter"))
+    bpy.context.scene.collection.objects.link(rig)
+    rig.location.y = place
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone, (parent, head, tail) in BONES.items():
+        new = rig.data.edit_bones.new(bone)
+        new.head, new.tail = head, tail
+        if parent:
+            new.parent = rig.data.edit_bones[parent]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.data.bones["hand"].use_deform = False
+    follow = rig.pose.bones["DEF-forearm"].constraints.new("IK")
+    follow.target, follow.subtarget, follow.chain_count = rig, "hand", 2
+    figure.clothe(rig, surface(f"{name} skin", colour)).hide_select = True
+    rig.show_in_front = True
+
+    hand = rig.pose.bones["hand"]
+    rest = hand.bone.matrix_local
+    for frame, angle in KEYS:
+        turned = Matrix.Rotation(np.radians(angle), 4, "X")
+        about = Matrix.Translation(SHOULDER) @ turned @ Matrix.Translation(-SHOULDER)
+        staging.key(hand, frame, rest.inverted() @ about @ rest)
+    return rig
+
+
+def sword(name: str, rig: bpy.types.Object) -> bpy.types.Object:
+    """A sword that a constraint keeps in the hand, upright where the arm is level."""
+    steel, gold = surface("Steel", staging.STEEL), surface("Gold", staging.WOOD)
+    blade = figure.boxes(f"{name} sword", steel, ((0.0, 0.0, 0.47), (0.012, 0.05, 0.76)))
+    hilt = figure.boxes(f"{name} hilt", gold, ((0, 0, 0), (0.03, 0.03, 0.18)), ((0, 0, 0.09), (0.02, 0.2, 0.025)))
+    hilt.parent = blade
+    hold = blade.constraints.new("CHILD_OF")
+    hold.target, hold.subtarget = rig, "hand"
+    rest = rig.matrix_basis @ rig.data.bones["hand"].matrix_local
+    hold.inverse_matrix = rest.inverted()
+    blade.matrix_basis = Matrix.Translation(rest.translation)
+    blade.hide_select = hilt.hide_select = True
+    return blade
+
+
+def measure(rig: bpy.types.Object, blade: bpy.types.Object) -> tuple[float, float]:
+    """How far the grip is from the hand on any frame, and the wrist from its circle about the shoulder, in metres."""
+
+    def look() -> tuple[float, float]:
+        bones = staging.evaluated(rig).pose.bones
+        grip = staging.evaluated(blade).matrix_world.translation
+        wrist = rig.matrix_world @ bones["DEF-forearm"].tail
+        hand = rig.matrix_world @ bones["hand"].head
+        circle = (WRIST - SHOULDER).length
+        return (grip - hand).length, abs((wrist - rig.matrix_world @ SHOULDER).length - circle)
+
+    slipped, off = staging.on_frames(staging.all_frames(), look).max(axis=0)
+    return float(slipped), float(off)
+
+
+if __name__ == "__main__":
+    staging.run(main)
