@@ -10,7 +10,7 @@ import argparse
 import math
 from pathlib import Path
 
-from rigid_motion_batch.command_line import as_called, program_of
+from rigid_motion_batch.command_line import parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "bake.py"
@@ -68,12 +68,7 @@ exit code:
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        description=__doc__,
-        epilog=as_called(EPILOG, SCRIPT),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE.blend", help="files to bake")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     add_target_options(parser, "modes")

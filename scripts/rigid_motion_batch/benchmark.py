@@ -14,7 +14,6 @@ pypose (its SE(3) B-spline) is measured where it is installed.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -41,6 +40,7 @@ except ImportError:
 from rigid_motion.motion import MODES, Poses, interpolate, reduce_keys, shell_error, twists
 from rigid_motion.motion.quaternions import align_signs, multiply
 from rigid_motion.motion.trigonometry import VECTOR_TANGENT
+from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.publishing import opening, publish
 from rigid_motion_batch.summaries import of_speed
 
@@ -319,7 +319,7 @@ def reductions(counts: tuple[int, ...], tolerance: float = 0.005) -> Iterator[st
 
 def main(arguments: list[str] | None = None) -> int:
     """Run all cases; print, and write where asked."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of("benchmark.py", __doc__)
     parser.add_argument("--count", type=int, default=100_000, help="in-betweens in a case (%(default)s)")
     parser.add_argument("--rounds", type=int, default=50, help="rounds of all against all (%(default)s)")
     parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")

@@ -15,7 +15,6 @@ over the length of one clip. Compare the ratios; the times depend on the machine
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -28,6 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.places import ASSETS, PACKAGE
 from rigid_motion_batch.publishing import more_or_less, opening, publish
 from rigid_motion_batch.summaries import of_batch
@@ -200,7 +200,7 @@ def say(text: str) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run everything; print, and write where asked."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of("benchmark_batch.py", __doc__)
     parser.add_argument("--clips", type=int, default=200, help="without video (%(default)s)")
     parser.add_argument("--films", type=int, default=12, help="clips with video (%(default)s)")
     parser.add_argument("--minutes", default="6,30,60", metavar="N,...", help="lengths of the long clip (%(default)s)")

@@ -13,7 +13,6 @@ goal, the table says whether it was met or missed.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from functools import partial
 from pathlib import Path
@@ -21,6 +20,7 @@ from pathlib import Path
 import bpy
 
 from rigid_motion import animation
+from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.live_benchmark.baking import long_bakes
 from rigid_motion_batch.live_benchmark.everyday import everyday
 from rigid_motion_batch.live_benchmark.rigs import RigSize, rigs
@@ -44,7 +44,7 @@ LONG = (Size(1, 200, 50_000), Size(1, 200, 100_000))
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print, and write where asked."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of("benchmark_live.py", __doc__)
     parser.add_argument("--objects", type=int, default=100, help="live objects in the everyday scene (%(default)s)")
     parser.add_argument("--keys", type=int, default=10, help="keys of each, on all channels (%(default)s)")
     parser.add_argument("--frames", type=int, default=1000, help="frames from first key to last (%(default)s)")

@@ -5,7 +5,6 @@ What goes in is addon/, blender_manifest.toml and LICENSE, and nothing else. Two
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 import sys
@@ -14,7 +13,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-from rigid_motion_batch.command_line import as_called, program_of
+from rigid_motion_batch.command_line import parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "build_extension.py"
@@ -106,12 +105,7 @@ def _repack(built: Path, package: Path) -> None:
 
 def main(arguments: list[str]) -> int:
     """Build, and return the exit code."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        description=__doc__,
-        epilog=as_called(EPILOG, SCRIPT),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument(
         "--output", type=Path, default=(CHECKOUT or Path()) / "dist", metavar="DIR", help="folder to write to (dist)"
     )

@@ -6,7 +6,6 @@ the pictures and the text of the page, and a zip that Blender takes. It is for a
 
 from __future__ import annotations
 
-import argparse
 import re
 import struct
 import subprocess
@@ -17,7 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from rigid_motion_batch.command_line import program_of
+from rigid_motion_batch.command_line import parser_of, program_of
 from rigid_motion_batch.places import CHECKOUT
 from rigid_motion_batch.system_libraries import require_blender
 
@@ -132,9 +131,7 @@ def _git(checkout: Path, *arguments: str) -> str:
 
 def main(arguments: list[str]) -> int:
     """Look at everything, and return the exit code."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM, description=__doc__, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.parse_args(arguments)
     if CHECKOUT is None:
         print(f"{PROGRAM}: this is no checkout, and releases are made from one", file=sys.stderr)

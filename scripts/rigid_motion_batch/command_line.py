@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 INSTALLED = "rigid-motion"
 """The command that pip installs."""
@@ -38,6 +40,17 @@ def as_called(text: str, script: str) -> str:
         return text
     lines = (line for line in text.splitlines() if f"blender --background --python scripts/{script}" not in line)
     return "\n".join(lines).replace(f"python scripts/{script}", program)
+
+
+def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> argparse.ArgumentParser:
+    """The parser of a command. Its help has these texts as they are written, and examples as they are typed here."""
+    return argparse.ArgumentParser(
+        prog=program_of(script),
+        description=as_called(description, script),
+        epilog=as_called(epilog, script),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        **options,
+    )
 
 
 def as_typed(program: str, arguments: Sequence[str], inputs: Sequence[str]) -> str:

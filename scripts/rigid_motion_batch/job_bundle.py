@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch import compare
-from rigid_motion_batch.command_line import as_typed, program_of
+from rigid_motion_batch.command_line import as_typed, parser_of, program_of
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.planning import comparison_tasks, look_into, plan_of, reading_tasks
 from rigid_motion_batch.comparison.stage.settings import MODELS, SubjectError, place_of_subject
@@ -79,12 +79,11 @@ class Step:
 
 def parse(arguments: list[str]) -> tuple[argparse.Namespace, argparse.Namespace]:
     """The options of the bundle, and those of the comparison, all of whose paths count from one folder: `inputs`."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
+    parser = parser_of(
+        SCRIPT,
+        __doc__,
+        EPILOG,
         usage="%(prog)s [-h] [--bundle FOLDER] [options of compare.py] [INPUT ...]",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument(

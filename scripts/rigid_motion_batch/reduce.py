@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion_batch.command_line import as_called, program_of
+from rigid_motion_batch.command_line import parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -89,12 +89,7 @@ exit code:
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        description=__doc__,
-        epilog=as_called(EPILOG, SCRIPT),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument("inputs", nargs="+", metavar="INPUT", help=".blend files and recordings")
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")

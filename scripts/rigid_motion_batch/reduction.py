@@ -17,7 +17,6 @@ program makes them anew from the keys, so they are not counted.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ import numpy as np
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, repair, shell_error
 from rigid_motion.motion.measures import rms
+from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.graph_decimate import decimate
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.publishing import opening, publish
@@ -200,7 +200,7 @@ def files(folder: Path | None) -> list[Path]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print, and write where asked."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of("reduction.py", __doc__)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings, axes and unit as they are")
     parser.add_argument("--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="BVH, FBX, folders of them")
     parser.add_argument("--tolerance", type=float, default=0.005, help="in metres (%(default)s)")

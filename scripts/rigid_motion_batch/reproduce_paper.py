@@ -12,7 +12,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from rigid_motion_batch.command_line import as_called, program_of
+from rigid_motion_batch.command_line import parser_of, program_of
 from rigid_motion_batch.system_libraries import missing_for_rendering, require_blender, way_out
 
 SCRIPT = "reproduce_paper.py"
@@ -69,12 +69,7 @@ Exit code: 0 done, 1 a part of it failed (the page holds the others), 2 a wrong 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        description=__doc__,
-        epilog=as_called(EPILOG, SCRIPT),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
     parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="more recordings for the table")
     parser.add_argument(
         "--bodies", type=Path, nargs="+", default=[], metavar="PATH", help="whole bodies, or folders of them"

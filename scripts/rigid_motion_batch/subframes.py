@@ -14,7 +14,6 @@ between its keys, where it is worst. Numbers are the largest of all, or the RMS 
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, shell_error
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from rigid_motion.motion.measures import rms
 from rigid_motion.motion.quaternions import align_signs, angle_between, multiply
+from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.publishing import opening, publish
 from rigid_motion_batch.summaries import of_sub_frames
 
@@ -155,7 +155,7 @@ def table(motion: Motion, radius: float) -> Iterator[str]:
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print, and write where asked."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of("subframes.py", __doc__)
     parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
     parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
     options = parser.parse_args(arguments)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.command_line import as_called, number, program_of
+from rigid_motion_batch.command_line import number, parser_of
 from rigid_motion_batch.places import ASSETS, from_here, output_folder
 from rigid_motion_batch.trajectories import files_of
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
@@ -110,12 +110,7 @@ stopped by Ctrl-C; the report then holds what was ready.
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
-    parser = argparse.ArgumentParser(
-        prog=program_of(SCRIPT),
-        description=DESCRIPTION,
-        epilog=as_called(EPILOG, SCRIPT),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of(SCRIPT, DESCRIPTION, EPILOG)
     parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings (those in assets/)")
     parser.add_argument(
         "--rates", type=_amounts(Uniform), metavar="HZ,...", help=f"keys a second that are kept ({RATES})"
