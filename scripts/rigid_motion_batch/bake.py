@@ -18,10 +18,10 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
-from rigid_motion_batch.bake_targets import baking, unbaking
-from rigid_motion_batch.blend_jobs import BlendRun, add_file_options, add_target_options, jobs_of, refuse_odd_places
 from rigid_motion_batch.command_line import number
-from rigid_motion_batch.sessions import Work, do_all
+from rigid_motion_batch.keying.baking import baking, unbaking
+from rigid_motion_batch.keying.jobs import BlendRun, add_file_options, add_target_options, jobs_of, refuse_odd_places
+from rigid_motion_batch.keying.sessions import Work, do_all
 
 SMALLEST_STEP = 0.01
 """Keys closer than that are one key to Blender."""

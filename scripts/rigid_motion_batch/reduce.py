@@ -23,7 +23,10 @@ require_blender(SCRIPT)
 from rigid_motion.animation.baking.sizes import OF_A_RIG
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.blend_jobs import (
+from rigid_motion_batch.command_line import number
+from rigid_motion_batch.comparison.study.choices import Tolerance
+from rigid_motion_batch.comparison.study.radii import RIGID
+from rigid_motion_batch.keying.jobs import (
     BlendRun,
     Job,
     add_file_options,
@@ -31,13 +34,10 @@ from rigid_motion_batch.blend_jobs import (
     jobs_of,
     refuse_odd_places,
 )
-from rigid_motion_batch.command_line import number
-from rigid_motion_batch.comparison.study.choices import Tolerance
-from rigid_motion_batch.comparison.study.radii import RIGID
-from rigid_motion_batch.keyed_files import RATES
-from rigid_motion_batch.reduce_recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing
-from rigid_motion_batch.reduce_targets import Wishes, reducing
-from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked, Work, do_all
+from rigid_motion_batch.keying.keyed_files import RATES
+from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing
+from rigid_motion_batch.keying.reducing import Wishes, reducing
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
 
 MODE = "motor_spline"

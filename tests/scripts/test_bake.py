@@ -15,8 +15,8 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import is_baked, set_mode
-from rigid_motion_batch import blend_jobs
-from rigid_motion_batch.blend_jobs import jobs_of
+from rigid_motion_batch.keying import jobs
+from rigid_motion_batch.keying.jobs import jobs_of
 from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
@@ -288,7 +288,7 @@ def test_a_file_without_modes_is_left_alone(tmp_path, capsys):
 def test_a_file_of_an_older_blender_is_said_to_be_of_this_one_afterwards(tmp_path, capsys, monkeypatch):
     path = one_object_file(tmp_path / "shot.blend", compress=False)
     with_version(path, "405", "0405")
-    monkeypatch.setattr(blend_jobs, "HERE", (9, 0))
+    monkeypatch.setattr(jobs, "HERE", (9, 0))
     assert run(path) == 0
     assert "was saved by Blender 4.5; what is written is of Blender 9.0" in capsys.readouterr().err
 

@@ -19,7 +19,7 @@ import bpy
 import pytest
 
 from rigid_motion import animation
-from rigid_motion_batch import blend_files
+from rigid_motion_batch.keying import blend_files
 from tests.animation.oracle import curves_of
 from tests.scripts.baking import (
     baked_name,

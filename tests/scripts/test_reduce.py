@@ -14,7 +14,8 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import MODE_IDS, key_frames, modes_of
-from rigid_motion_batch import blend_files, reduce
+from rigid_motion_batch import reduce
+from rigid_motion_batch.keying import blend_files
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.scripts.baking import extension, new_file, open_again, save

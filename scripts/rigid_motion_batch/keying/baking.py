@@ -15,7 +15,7 @@ from rigid_motion.animation.actions.sources import Source
 from rigid_motion.animation.inbetweens.mode_keys import segment_modes
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.blend_targets import Action, Result
+from rigid_motion_batch.keying.targets import Action, Result
 
 FEW = 4
 """As many bones are named; of more it is said how many they are."""

@@ -14,12 +14,12 @@ from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.blend_files import FileProblem
-from rigid_motion_batch.blend_targets import Result
 from rigid_motion_batch.comparison.stage.armature import Rest, Rig
 from rigid_motion_batch.comparison.study.clips import Clip
 from rigid_motion_batch.hushing import hushed
-from rigid_motion_batch.reduce_targets import Wishes, reduced
+from rigid_motion_batch.keying.blend_files import FileProblem
+from rigid_motion_batch.keying.reducing import Wishes, reduced
+from rigid_motion_batch.keying.targets import Result
 from rigid_motion_batch.trajectories.rigs import LAST_FRAME
 
 RATES = 1, 240

@@ -12,10 +12,10 @@ from rigid_motion.animation import NeedsItsKeys, Reduction, Refused
 from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit
 from rigid_motion.animation.inbetweens.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
-from rigid_motion_batch.blend_targets import Action, Result
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.figures import unit_of
-from rigid_motion_batch.sessions import counted
+from rigid_motion_batch.keying.sessions import counted
+from rigid_motion_batch.keying.targets import Action, Result
 
 FEWEST = 2
 """So many keys are as few as a motion has."""

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 
 from rigid_motion.animation.transforms import BoneTransform, Transform
-from rigid_motion_batch.blend_files import (
+from rigid_motion_batch.keying.blend_files import (
     HERE,
     FileProblem,
     Missing,
@@ -25,8 +25,8 @@ from rigid_motion_batch.blend_files import (
     refuse_to_replace,
     write_file,
 )
-from rigid_motion_batch.blend_targets import Action, Result, groups_of, matching, matching_missing, title_of
-from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked
+from rigid_motion_batch.keying.targets import Action, Result, groups_of, matching, matching_missing, title_of
 
 
 @dataclass(frozen=True)

@@ -12,17 +12,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rigid_motion_batch.blend_files import FileProblem, refuse_read_only, refuse_to_replace, write_file
-from rigid_motion_batch.blend_jobs import place_of
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.comparison.study.clips import Clip
 from rigid_motion_batch.comparison.study.metrics import write_poses
 from rigid_motion_batch.comparison.study.radii import RIGID
 from rigid_motion_batch.comparison.study.reading import folder_names, read_source
 from rigid_motion_batch.comparison.study.reconstructions import fill_in
-from rigid_motion_batch.keyed_files import key_body, key_object, new_file
-from rigid_motion_batch.reduce_targets import Wishes, fewer, off
-from rigid_motion_batch.sessions import Note, Outcome, StopIfAsked, counted
+from rigid_motion_batch.keying.blend_files import FileProblem, refuse_read_only, refuse_to_replace, write_file
+from rigid_motion_batch.keying.jobs import place_of
+from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
+from rigid_motion_batch.keying.reducing import Wishes, fewer, off
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, counted
 from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
 from rigid_motion_batch.trajectories.reading import split_source
 
