@@ -8,8 +8,8 @@ take turns, round by round, so that a machine that slows down slows all of them.
 round; compare the ratios. "In the algebra" is the mode written out in NumPy as in the paper, computed anew for every
 in-between (this program's own reference); "closed form" is the best formula known to this program without a table of
 segments. Key reduction is timed on made-up recordings of growing length, beside the greedy insertion that one would
-write first; `scripts/reduction.py` times real recordings and whole bodies. It needs the packages of the "benchmark" extra;
-pypose (its SE(3) B-spline) is measured where it is installed.
+write first; `scripts/reduction.py` times real recordings and whole bodies. It needs the packages of the extra
+`benchmark`; pypose (its SE(3) B-spline) is measured where it is installed.
 """
 
 from __future__ import annotations
