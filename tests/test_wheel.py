@@ -132,3 +132,14 @@ def test_a_command_that_there_is_not_is_said(installed: Path) -> None:
     assert "'compair'" in done.stderr
     assert "compare" in done.stderr
     assert run(installed / "rigid-motion", "--version").stdout == f"rigid-motion {manifest()['version']}\n"
+
+
+def test_without_blender_a_command_says_what_brings_it(wheel: Path, tmp_path: Path) -> None:
+    without = "import sys; sys.modules['bpy'] = None; sys.path.insert(0, sys.argv.pop()); sys.argv[0] = 'rigid-motion'"
+    code = f"{without}; from rigid_motion_batch.commands import main; sys.exit(main(['bake', 'shot.blend']))"
+    with zipfile.ZipFile(wheel) as opened:
+        opened.extractall(tmp_path)
+    done = run(sys.executable, "-c", code, tmp_path, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith("rigid-motion bake: ")
+    assert "pip install 'rigid-motion[blender]'" in done.stderr

@@ -25,7 +25,7 @@ from rigid_motion_batch.comparison.report.pages import Settings
 from rigid_motion_batch.comparison.stage.settings import SubjectError
 from rigid_motion_batch.comparison.steps import DECIMATED, FILM, JOINT_METRICS, KEYS_NEEDED, METRICS, REPORT
 from rigid_motion_batch.comparison.version import blender_version, program_version
-from rigid_motion_batch.places import manifest
+from rigid_motion_batch.places import CHECKOUT, manifest
 from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out
 from rigid_motion_batch.workplan import (
@@ -103,7 +103,8 @@ def _executor(options: argparse.Namespace, progress: Progress, version: str) -> 
     try:
         from rigid_motion_batch.workplan.dask_executor import DaskExecutor
     except ImportError as error:
-        raise ExecutorError(f"--scheduler: {error}; `python scripts/bootstrap.py dask` installs it") from None
+        way_out = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
+        raise ExecutorError(f"--scheduler: {error}; `{way_out}` installs it") from None
     return DaskExecutor(
         options.scheduler,
         options.output,

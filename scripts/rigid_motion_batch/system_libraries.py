@@ -72,8 +72,8 @@ def way_out(error: str, script: str = "compare.py") -> str:
         )
     if CHECKOUT is None:
         return (
-            "Blender's Python module bpy is not here. `pip install rigid-motion[blender]` brings it, for Python 3.11 "
-            "and 3.13."
+            "Blender's Python module bpy is not here. For Python 3.11 and 3.13,\n"
+            "`pip install 'rigid-motion[blender]'` brings it."
         )
     return (
         "Blender's Python module bpy is not here. Run this through `python scripts/bootstrap.py`, which installs it,\n"
