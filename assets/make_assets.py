@@ -20,10 +20,9 @@ ASSETS = Path(__file__).resolve().parent
 sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
 from rigid_motion_batch.making.motions import MOTIONS
-from rigid_motion_batch.making.tracking import tick, track
+from rigid_motion_batch.making.tracking import table, tick, track
 
 SEED = 2021
-HEADER = "t,x,y,z,qx,qy,qz,qw"
 MODELS_BLENDER = (4, 5)
 
 
@@ -33,8 +32,7 @@ def clip(name: str) -> str:
     rng = np.random.default_rng((SEED, zlib.crc32(name.encode())))
     times = tick(rng, motion.duration)
     poses = track(rng, motion.poses, times)
-    rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
-    return "\n".join([HEADER, *(",".join(f"{value:.6f}" for value in row) for row in rows), ""])
+    return table(times, poses)
 
 
 def write(path: Path, fill: Callable[[Path], None]) -> None:

@@ -46,6 +46,15 @@ def parse(folder: Path, description: str, arguments: Sequence[str] | None = None
     return options
 
 
+def put(folder: Path, name: str, text: str) -> Path:
+    """Write a file of text below a folder, say so, and return its path."""
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8", newline="\n")
+    print(f"written: {name}")
+    return path
+
+
 def run(main: Callable[[], None]) -> None:
     """Call what a script is for, and leave: Blender's module complains of memory while it is taken down."""
     main()

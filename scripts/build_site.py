@@ -5,7 +5,6 @@ Whatever Sphinx warns of is an error: a link that leads nowhere, a formula that 
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import subprocess
@@ -13,6 +12,8 @@ import sys
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
+
+from rigid_motion_batch.command_line import parser_of
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -91,12 +92,7 @@ def is_site(folder: Path) -> bool:
 
 def main(arguments: list[str]) -> int:
     """Build, and return the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="build_site.py",
-        description=__doc__,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of("build_site.py", __doc__, EPILOG)
     default = ROOT / "dist" / "site"
     parser.add_argument("--output", type=Path, default=default, metavar="DIR", help="folder of the site (dist/site)")
     options = parser.parse_args(arguments)

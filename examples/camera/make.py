@@ -21,7 +21,7 @@ from rigid_motion.motion.quaternions import multiply
 from rigid_motion_batch.comparison import palette
 from rigid_motion_batch.comparison.stage.materials import ink, surface
 from rigid_motion_batch.comparison.study.reading import read_clips
-from rigid_motion_batch.making.tracking import turn
+from rigid_motion_batch.making.tracking import table, turn
 from tests.rigs import figure
 
 SEED, FPS, FRAMES = 11, 24, 240
@@ -49,9 +49,7 @@ GRAPH = 0.38, 0.08
 def main(arguments: list[str] | None = None) -> None:
     """Write the solution, and a scene with both cameras."""
     options = staging.parse(HERE, __doc__, arguments)
-    path = options.output / "solve.csv"
-    path.write_text(solution(), encoding="utf-8", newline="\n")
-    print("written: solve.csv")
+    path = staging.put(options.output, "solve.csv", solution())
 
     (clip,), _ = read_clips([str(path)], "blender")
     kept = reduce_keys(clip.times, clip.poses, MODE, TOLERANCE, RADIUS)
@@ -108,11 +106,9 @@ def solution() -> str:
     truth = path_of(times)
     positions = truth.positions + JITTER * rng.standard_normal((FRAMES, 3))
     quaternions = multiply(truth.quaternions, turn(SHAKE * rng.standard_normal((FRAMES, 3))))
-    rows = np.column_stack((times, positions, np.roll(quaternions, -1, axis=1)))
     frames = np.arange(1, FRAMES + 1)
     lost = np.any([(frames >= first) & (frames < end) for first, end in LOST], axis=0)
-    lines = [",".join(f"{value:.6f}" for value in row) for row in rows[~lost]]
-    return "\n".join(["t,x,y,z,qx,qy,qz,qw", *lines, ""])
+    return table(times[~lost], Poses(positions[~lost], quaternions[~lost]))
 
 
 def camera(name: str, times: np.ndarray, poses: Poses) -> bpy.types.Object:

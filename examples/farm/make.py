@@ -23,7 +23,7 @@ from rigid_motion_batch.comparison.stage import captions
 from rigid_motion_batch.comparison.stage.film import render_still
 from rigid_motion_batch.comparison.stage.materials import ink, surface
 from rigid_motion_batch.making.motions import MOTIONS
-from rigid_motion_batch.making.tracking import tick, track
+from rigid_motion_batch.making.tracking import table, tick, track
 
 TAKES = {"drill": "screw", "probe": "pivot", "toss": "throw"}
 """Name of a take to the motion that it is of."""
@@ -42,19 +42,13 @@ WIDTH, STEP, CARD, SQUARE = 10.0, 1.17, (1.07, 1.3), 0.2
 def main(arguments: list[str] | None = None) -> None:
     """Write the takes."""
     options = staging.parse(HERE, __doc__, arguments)
-    folder = options.output / "takes"
-    folder.mkdir(exist_ok=True)
     for number, (name, motion) in enumerate(TAKES.items()):
         rng = np.random.default_rng((SEED, number))
         times = tick(rng, SECONDS)
         poses = track(rng, MOTIONS[motion].poses, times)
-        rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
-        lines = [",".join(f"{value:.6f}" for value in row) for row in rows]
-        text = "\n".join(["t,x,y,z,qx,qy,qz,qw", *lines, ""])
-        (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
-        print(f"written: takes/{name}.csv")
+        staging.put(options.output, f"takes/{name}.csv", table(times, poses))
     if options.picture:
-        picture(folder, options.output)
+        picture(options.output / "takes", options.output)
 
 
 def picture(takes: Path, output: Path) -> None:

@@ -40,9 +40,7 @@ SIZE = 800, 360
 def main(arguments: list[str] | None = None) -> None:
     """Write the log."""
     options = staging.parse(HERE, __doc__, arguments)
-    path = options.output / "hand.csv"
-    path.write_text(log(), encoding="utf-8", newline="\n")
-    print("written: hand.csv")
+    path = staging.put(options.output, "hand.csv", log())
     if options.picture:
         picture(path, options.output / "hand.png")
 

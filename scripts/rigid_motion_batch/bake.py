@@ -10,7 +10,7 @@ import argparse
 import math
 from pathlib import Path
 
-from rigid_motion_batch.command_line import parser_of, program_of
+from rigid_motion_batch.command_line import number, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "bake.py"
@@ -18,7 +18,6 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
-from rigid_motion_batch.command_line import number
 from rigid_motion_batch.keying.baking import baking, unbaking
 from rigid_motion_batch.keying.jobs import BlendRun, add_file_options, add_target_options, jobs_of, refuse_odd_places
 from rigid_motion_batch.keying.sessions import Work, do_all

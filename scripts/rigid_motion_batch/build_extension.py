@@ -1,6 +1,7 @@
 """Build the zip that animators install, with the builder that comes with Blender, and let Blender validate it.
 
-What goes in is addon/, blender_manifest.toml and LICENSE, and nothing else. Two runs give the same bytes.
+What goes in is the package rigid_motion, blender_manifest.toml and LICENSE, and nothing else. Two runs give the same
+bytes.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion_batch.command_line import parser_of, program_of
+from rigid_motion_batch.command_line import number, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -23,7 +23,6 @@ require_blender(SCRIPT)
 from rigid_motion.animation.baking.sizes import OF_A_RIG
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.command_line import number
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.comparison.study.radii import RIGID
 from rigid_motion_batch.keying.jobs import (

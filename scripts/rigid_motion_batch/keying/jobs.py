@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +24,7 @@ from rigid_motion_batch.keying.blend_files import (
     refuse_to_replace,
     write_file,
 )
-from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, tell_failure
 from rigid_motion_batch.keying.targets import Action, Result, groups_of, matching, matching_missing, title_of
 
 
@@ -139,10 +138,8 @@ class BlendRun:
             outcome = Outcome(failed=True, unreadable=isinstance(problem, Unreadable), matched=outcome.matched)
             self._note(f"{job.source}: {problem}")
         except Exception as error:
-            # What nobody foresaw in one file must not keep the others from being done.
             outcome = Outcome(failed=True, matched=outcome.matched)
-            self._note(f"{job.source}: not written, for this program failed ({type(error).__name__}: {error}):")
-            traceback.print_exc()
+            tell_failure(self._note, job.source, error)
         return outcome
 
     def _do_objects(self, job: Job, outcome: Outcome, missing: Missing) -> None:

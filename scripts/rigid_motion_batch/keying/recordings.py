@@ -7,7 +7,6 @@ body becomes NAME-keys.blend, with a rig.
 from __future__ import annotations
 
 import os
-import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,7 +21,7 @@ from rigid_motion_batch.keying.blend_files import FileProblem, refuse_read_only,
 from rigid_motion_batch.keying.jobs import place_of
 from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
 from rigid_motion_batch.keying.reducing import Wishes, fewer, off
-from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, counted
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, counted, tell_failure
 from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
 from rigid_motion_batch.trajectories.reading import split_source
 
@@ -108,7 +107,7 @@ class RecordingRun:
             self._note(str(error))
             return Outcome(failed=True, unreadable=True)
         except Exception as error:
-            self._tell_failure(job.source, error)
+            tell_failure(self._note, job.source, error)
             return Outcome(failed=True)
         if note:
             self._note(note)
@@ -123,13 +122,8 @@ class RecordingRun:
                 self._note(f"{title}: {problem}")
             except Exception as error:
                 outcome.failed = True
-                self._tell_failure(title, error)
+                tell_failure(self._note, title, error)
         return outcome
-
-    def _tell_failure(self, title: str, error: Exception) -> None:
-        """What nobody foresaw in one recording must not keep the others from being done."""
-        self._note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
-        traceback.print_exception(error)
 
     def _do_clip(self, title: str, clip: Clip, file: Path, name: str, outcome: Outcome) -> None:
         for repair in clip.repairs:

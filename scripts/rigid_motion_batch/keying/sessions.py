@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -150,6 +151,12 @@ def _summary(outcomes: Sequence[Outcome], count: int, work: Work, *, interrupted
 def counted(count: int, what: str) -> str:
     """How many there are of something, "1 bone" or "24 bones"."""
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def tell_failure(note: Note, title: object, error: Exception) -> None:
+    """Say where the program failed: what nobody foresaw in one input must not keep the others from being done."""
+    note(f"{title}: not written, for this program failed ({type(error).__name__}: {error}):")
+    traceback.print_exception(error)
 
 
 @contextmanager

@@ -14,6 +14,8 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import multiply
 
+HEADER = "t,x,y,z,qx,qy,qz,qw"
+
 RATE = 90.0
 SHORTEST_STEP, LONGEST_STEP = 0.007, 0.017
 
@@ -83,3 +85,9 @@ def turn(rotation_vectors: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4) of rotation vectors (..., 3): the axis times the angle in radians."""
     angles = np.linalg.norm(rotation_vectors, axis=-1, keepdims=True)
     return np.concatenate((np.cos(0.5 * angles), 0.5 * np.sinc(angles / (2.0 * np.pi)) * rotation_vectors), axis=-1)
+
+
+def table(times: np.ndarray, poses: Poses) -> str:
+    """A clip as text: seconds (n,), metres, and quaternions with the scalar last."""
+    rows = np.column_stack((times, poses.positions, np.roll(poses.quaternions, -1, axis=1)))
+    return "\n".join([HEADER, *(",".join(f"{value:.6f}" for value in row) for row in rows), ""])

@@ -13,13 +13,12 @@ cannot be begun.
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import tempfile
 from pathlib import Path
 
-from rigid_motion_batch.command_line import program_of
+from rigid_motion_batch.command_line import parser_of
 
 from .lock import FolderInUse
 from .manifest import ManifestError
@@ -32,11 +31,7 @@ from .workspace import Workspace
 
 def main(arguments: list[str]) -> int:
     """Run a command, and return the exit code."""
-    parser = argparse.ArgumentParser(
-        prog=program_of("tasks"),
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of("tasks", __doc__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     listing = commands.add_parser("list", help="the tasks of a plan, and which are done")
     running = commands.add_parser("run", help="do one task")

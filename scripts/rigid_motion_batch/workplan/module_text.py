@@ -49,7 +49,7 @@ def read_module(path: Path, name: str) -> Module:
     return Module(
         imports_in([tree], path, name),
         _taken(at_once, path, name),
-        tuple(_places(tree, path) if "__file__" in text or "ASSETS" in text else ()),
+        tuple(_places(tree, path) if "__file__" in text or places.__name__ in text else ()),
     )
 
 
