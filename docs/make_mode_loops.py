@@ -94,7 +94,7 @@ def build(mode: str) -> bpy.types.Scene:
     native.delta_location.y = 0.6  # Behind the other, and its way behind both.
     moved = hammer(MODES[mode].label, surface(mode, palette.colour_of(mode)))
     poses = by_mode(native, mode)
-    write(moved, poses)
+    animation.bake_poses(moved, FRAMES.astype(float), poses)
     draw_ways(shown, ink("Blender's way", THEME.faint), behind=1.2)
     draw_ways(poses, ink("Way", palette.colour_of(mode)), behind=1.1)
     for (_, (x, z), _, _), head in zip(KEYS[:-1], key_poses().positions, strict=False):
@@ -160,14 +160,6 @@ def by_mode(keyed: bpy.types.Object, mode: str) -> Poses:
     progress = np.sum(gone * way, axis=1) / np.sum(way * way, axis=1)
     times = key_frames[segment] + progress * np.diff(key_frames)[segment]
     return interpolate(key_frames, keys, times, mode)
-
-
-def write(obj: bpy.types.Object, poses: Poses) -> None:
-    """Keys on every frame."""
-    frames = FRAMES.astype(float)
-    animation.write_channel(obj, "location", frames, poses.positions)
-    animation.write_channel(obj, "rotation_quaternion", frames, align_signs(poses.quaternions))
-    animation.write_channel(obj, "scale", frames, np.repeat(poses.scales[:, None], 3, axis=1))
 
 
 def draw_ways(poses: Poses, material: bpy.types.Material, behind: float) -> None:

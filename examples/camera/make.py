@@ -117,9 +117,7 @@ def camera(name: str, times: np.ndarray, poses: Poses) -> bpy.types.Object:
     obj.data.display_size = 0.12
     obj.rotation_mode = "QUATERNION"
     bpy.context.scene.collection.objects.link(obj)
-    frames = 1.0 + FPS * times
-    animation.write_channel(obj, "location", frames, poses.positions)
-    animation.write_channel(obj, "rotation_quaternion", frames, poses.quaternions)
+    animation.bake_poses(obj, 1.0 + FPS * times, poses, key_type="KEYFRAME")
     return obj
 
 

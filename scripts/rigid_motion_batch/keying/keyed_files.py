@@ -12,7 +12,6 @@ import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.motion.quaternions import align_signs
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.comparison.stage.armature import Rest, Rig
 from rigid_motion_batch.comparison.study.clips import Clip
@@ -91,10 +90,7 @@ def key_object(clip: Clip, keys: np.ndarray, frames: np.ndarray, mode: str, name
     obj.rotation_mode = "QUATERNION"
     bpy.context.scene.collection.objects.link(obj)
     poses = to_blender(clip.in_metres(clip.poses[keys]), clip.axes)
-    animation.write_channel(obj, "location", frames[keys], poses.positions)
-    animation.write_channel(obj, "rotation_quaternion", frames[keys], align_signs(poses.quaternions))
-    if poses.scales is not None:
-        animation.write_channel(obj, "scale", frames[keys], np.repeat(poses.scales[:, None], 3, axis=1))
+    animation.bake_poses(obj, frames[keys], poses, key_type="KEYFRAME")
     animation.set_mode(obj, mode)
     return obj
 
