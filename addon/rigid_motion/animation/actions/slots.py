@@ -125,6 +125,13 @@ def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[S
         for record in slot.action.rigid_motion.slots:
             if record.handle == slot.handle:
                 curves.setdefault(record.prefix, {})
+    return transforms_with(slot, channelbag, curves)
+
+
+def transforms_with(
+    slot: Slot, channelbag: bpy.types.ActionChannelbag | None, curves: Mapping[str, Curves]
+) -> list[SlotTransform]:
+    """What a slot moves by these F-curves, transform by transform: all there are of each prefix."""
     places = (SlotTransform(slot, prefix, channelbag, _users_of(slot, prefix), own) for prefix, own in curves.items())
     return [place for place in places if place.users]
 
@@ -148,7 +155,7 @@ def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChanne
 
 
 def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
-    """The slots that move these, and of each slot what is in it of them. One look at all objects of the file."""
+    """The slots that move these, and of each slot what is in it of them."""
     transforms = list(transforms)
     prefixes: dict[bpy.types.Object, set[str]] = {}
     for transform in transforms:
@@ -189,19 +196,31 @@ def slots_of(objects: Iterable[bpy.types.Object]) -> list[Slot]:
     """The slots that move these objects, in Actions of their own and in NLA strips; each once."""
     known = {obj: uses_of(obj) for obj in objects}
     wanted = {key for uses in known.values() for key in uses}
-    return _slots(lambda key: key in wanted, known) if wanted else []
+    actions = {action for uses in known.values() for action, *_ in uses.values()}
+    return _slots(actions, lambda key: key in wanted, known)
 
 
 def slots_in(actions: Iterable[bpy.types.Action]) -> list[Slot]:
     """The slots of these Actions that move an object."""
+    actions = set(actions)
     wanted = {action.as_pointer() for action in actions}
-    return _slots(lambda key: key[0] in wanted, {})
+    return _slots(actions, lambda key: key[0] in wanted, {})
 
 
-def _slots(is_wanted: Callable[[tuple[int, int]], bool], known: Mapping[bpy.types.Object, Uses]) -> list[Slot]:
+def _slots(
+    actions: set[bpy.types.Action],
+    is_wanted: Callable[[tuple[int, int]], bool],
+    known: Mapping[bpy.types.Object, Uses],
+) -> list[Slot]:
+    """Slots of these Actions, by the names of their users, and of one user from the bottom of its NLA to the top: what
+    depends on the order comes out the same whichever was edited."""
+    if not actions:
+        return []
+    # A slot's own list of users may have some that are gone, which crashes Blender 5.2.
+    owners = bpy.data.user_map(subset=actions, key_types={"ACTION"}, value_types={"OBJECT"})
+    places: Uses = {}
     users: dict[tuple[int, int], list[bpy.types.Object]] = {}
-    places = {}
-    for obj in bpy.data.objects:
+    for obj in sorted(set().union(*owners.values()), key=lambda obj: obj.name_full):
         for key, (action, handle, strips) in (known[obj] if obj in known else uses_of(obj)).items():
             if is_wanted(key):
                 users.setdefault(key, []).append(obj)

@@ -7,52 +7,130 @@ that means nothing, of what is selected for example, counts too: whether in-betw
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
-from ..actions.slots import Slot, uses_of
+from ..actions.slots import Curves, Slot, SlotTransform, transforms_in, transforms_with, uses_of
 from ..transforms import WIDTHS, is_ours, split_path
 
-_slots: dict[tuple[int, int], tuple[list[tuple[str, int]], list[object]]] = {}
-"""Of each slot of a rig the channels, and what they were: by the Action's session id, and the slot's handle."""
+_looks: dict[tuple[int, int], _Look] = {}
+"""At the slots of rigs, the last of each: by the Action's session id, and the slot's handle."""
 
-_rigs: dict[int, tuple[object, dict[str, object]]] = {}
+_rigs: dict[int, tuple[object, _States]] = {}
 """Of each rig what moves it, and what its bones were, by its session id."""
 
 
 def forget_all() -> None:
     """Take all for changed at the next look."""
-    _slots.clear()
+    _looks.clear()
     _rigs.clear()
 
 
-def changed_in(slot: Slot) -> set[str] | None:
-    """The prefixes of what has other channels in a slot than at the last look; None where that may be all."""
+def edited_in(slot: Slot) -> list[SlotTransform]:
+    """What of all that a slot moves has other channels than at the last look; everything where there is no telling."""
     if all(user.pose is None for user in slot.users):
-        return None
+        return transforms_in(slot)
     channelbag, key = slot.channelbag, (slot.action.session_uid, slot.handle)
     if channelbag is None:
-        _slots.pop(key, None)
-        return None
-    fcurves = channelbag.fcurves
-    flags = np.empty((3, len(fcurves)), np.int32)
-    for row, name in zip(flags, ("mute", "extrapolation", "array_index"), strict=True):
-        fcurves.foreach_get(name, row)
-    channels = list(zip([fcurve.data_path for fcurve in fcurves], flags[2].tolist(), strict=True))
-    memory = _Memory()
-    keys = [_keys_of(fcurve, memory) for fcurve in fcurves]
-    contents = list(zip(keys, *flags[:2].tolist(), strict=True))
-    before = _slots.get(key)
-    _slots[key] = channels, contents
-    if before is None or before[0] != channels:
-        return None
-    pairs = zip(channels, before[1], contents, strict=True)
-    return {split_path(channel[0])[0] for channel, old, new in pairs if old != new or new[0] is _MODIFIED}
+        _looks.pop(key, None)
+        return transforms_in(slot)
+    look = _looks.get(key)
+    if look is None or not look.is_at(channelbag):
+        _looks[key] = _Look(channelbag)
+        return transforms_in(slot)
+    changed = {look.prefixes[number] for number in look.again()}
+    return transforms_with(slot, channelbag, {prefix: look.curves_under(prefix) for prefix in changed})
 
 
-_MODIFIED = object()
+class _Look:
+    """The F-curves of a slot, and what they had when they were looked at.
+
+    To ask Blender for a property takes longer than to compare what it is, so what leads to the keys of each F-curve is
+    kept with it, for as long as the F-curves are the same ones.
+    """
+
+    def __init__(self, channelbag: bpy.types.ActionChannelbag) -> None:
+        self.channelbag, self.address = channelbag, channelbag.as_pointer()
+        self.fcurves = list(channelbag.fcurves)
+        self.paths = [fcurve.data_path for fcurve in self.fcurves]
+        self.prefixes, properties = zip(*map(split_path, self.paths), strict=True) if self.paths else ((), ())
+        self.keys = [fcurve.keyframe_points for fcurve in self.fcurves]
+        self.modifiers = [
+            fcurve.modifiers if prop in WIDTHS else () for fcurve, prop in zip(self.fcurves, properties, strict=True)
+        ]
+        self.places = [(0, 0)] * len(self.fcurves)
+        """Where the keys of each are in memory, and how many bytes: 0 where that is not known."""
+        self.views = [_NOTHING] * len(self.fcurves)
+        self.flags, self.sizes, self.contents = self._flags(), *self._contents()
+        self.modified = self._modified()
+
+    def is_at(self, channelbag: bpy.types.ActionChannelbag) -> bool:
+        """Whether these are still the F-curves that there are, under the same data paths."""
+        fcurves = list(channelbag.fcurves)
+        return (
+            self.address == channelbag.as_pointer()
+            and self.fcurves == fcurves
+            and self.paths == [fcurve.data_path for fcurve in fcurves]
+        )
+
+    def again(self) -> list[int]:
+        """Look again: the numbers of those that may have something else than before."""
+        flags, sizes, contents, places = self.flags, self.sizes, self.contents, self.places
+        modified, self.modified = self.modified, self._modified()
+        self.flags, self.sizes, self.contents = self._flags(), *self._contents()
+        stay = np.array([now == before for now, before in zip(self.places, places, strict=True)], dtype=bool)
+        # Of keys that lie where they lay the bytes are compared, all in one go.
+        if stay.all():
+            now, before = self.contents, contents
+        else:
+            now, before = (
+                raw[stay.repeat(lengths)] for raw, lengths in ((self.contents, self.sizes), (contents, sizes))
+            )
+        ends = np.cumsum(self.sizes[stay])
+        changed = ~stay | (self.flags != flags).any(axis=0)
+        changed[np.flatnonzero(stay)[ends.searchsorted(np.flatnonzero(now != before), side="right")]] = True
+        changed |= (self.sizes == 0) & [address > 0 for address, _ in self.places]
+        changed[modified + self.modified] = True
+        return np.flatnonzero(changed).tolist()
+
+    def curves_under(self, prefix: str) -> Curves:
+        """The F-curves whose data paths begin so."""
+        indices = self.flags[-1].tolist()
+        return {
+            (self.paths[number], indices[number]): self.fcurves[number]
+            for number, own in enumerate(self.prefixes)
+            if own == prefix
+        }
+
+    def _modified(self) -> list[int]:
+        """The numbers of those that have modifiers, which may have been changed for all that can be seen here."""
+        return [number for number, modifiers in enumerate(self.modifiers) if len(modifiers)]
+
+    def _flags(self) -> np.ndarray:
+        """Whether each F-curve is muted, how it goes on outside of its keys, and its index, shape (3, n)."""
+        flags = np.empty((3, len(self.fcurves)), np.int32)
+        for row, name in zip(flags, ("mute", "extrapolation", "array_index"), strict=True):
+            self.channelbag.fcurves.foreach_get(name, row)
+        return flags
+
+    def _contents(self) -> tuple[np.ndarray, np.ndarray]:
+        """The keys of all F-curves as they are in memory: how many bytes each has, and all of them."""
+        size, counts = _size_of_key(self.keys), map(len, self.keys)
+        places = [
+            (keys[0].as_pointer(), size * count) if count else (0, 0)
+            for count, keys in zip(counts, self.keys, strict=True)
+        ]
+        for number, (place, before) in enumerate(zip(places, self.places, strict=True)):
+            if place != before:
+                self.views[number] = _view(*place) if place[1] else _NOTHING
+        self.places = places
+        sizes = np.array([length for _, length in places], dtype=np.int64)
+        return sizes, np.concatenate((_NOTHING, *self.views))
+
+
+_NOTHING = np.empty(0, np.uint8)
 
 
 class _Memory:
@@ -61,46 +139,62 @@ class _Memory:
     __array_interface__: dict[str, object]
 
 
+def _view(address: int, size: int) -> np.ndarray:
+    memory = _Memory()
+    memory.__array_interface__ = {"data": (address, True), "shape": (size,), "typestr": "|u1", "version": 3}
+    return np.asarray(memory)
+
+
 _key_size = 0
 """How many bytes a key takes, as soon as two were seen one behind the other."""
 
 
-def _keys_of(fcurve: bpy.types.FCurve, memory: _Memory) -> object:
-    """The keys of an F-curve as they are in memory, where they lie one behind the other."""
+def _size_of_key(channels: Sequence[bpy.types.bpy_prop_collection]) -> int:
+    """How many bytes a key takes, 0 where none of these channels tells."""
     global _key_size
-    keys = fcurve.keyframe_points
-    count = len(keys)
-    if count < 2:
-        return _MODIFIED if count else None
-    if fcurve.modifiers and split_path(fcurve.data_path)[1] in WIDTHS:
-        return _MODIFIED
-    first = keys[0].as_pointer()
-    _key_size = _key_size or keys[1].as_pointer() - first
-    shape = (count * _key_size,)
-    memory.__array_interface__ = {"data": (first, True), "shape": shape, "typestr": "|V1", "version": 3}
-    return np.asarray(memory).tobytes()
+    if not _key_size:
+        several = next((keys for keys in channels if len(keys) > 1), None)
+        _key_size = several[1].as_pointer() - several[0].as_pointer() if several is not None else 0
+    return _key_size
+
+
+class _States:
+    """All about the bones of a rig that in-betweens may depend on, but for their channels."""
+
+    def __init__(self, rig: bpy.types.Object) -> None:
+        bones = rig.pose.bones
+        self.names, columns = bones.keys(), []
+        for name, width in WIDTHS.items():
+            values = np.empty(len(bones) * width, np.float32)
+            bones.foreach_get(name, values)
+            columns.append(values.view(np.int32).reshape(len(bones), width))
+        modes = np.empty(len(bones), np.int32)
+        bones.foreach_get("rotation_mode", modes)
+        self.numbers = np.column_stack((*columns, modes))
+        self.settings = [
+            (
+                *((motion := bone.rigid_motion).mode, motion.awaited, motion.mounted),
+                *((one.name, one.mute) for one in bone.constraints if is_ours(one)),
+            )
+            for bone in bones
+        ]
+
+    def changed_from(self, before: _States) -> list[int]:
+        """The numbers of the bones, the same ones, that were otherwise before."""
+        moved = (self.numbers != before.numbers).any(axis=1).tolist()
+        return [
+            number
+            for number, (is_moved, now, then) in enumerate(zip(moved, self.settings, before.settings, strict=True))
+            if is_moved or now != then
+        ]
 
 
 def changed_bones(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:
     """The bones of a rig that are other than at the last look: how they are posed, or what moves them."""
-    now = dict(zip(rig.pose.bones.keys(), _states(rig), strict=True))
+    now, bones = _States(rig), rig.pose.bones
     moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses_of(rig).items()]
     before = _rigs.get(rig.session_uid)
     _rigs[rig.session_uid] = moved_by, now
-    if before is None or before[0] != moved_by or before[1].keys() != now.keys():
-        return list(rig.pose.bones)
-    return [rig.pose.bones[name] for name, state in now.items() if before[1][name] != state]
-
-
-def _states(rig: bpy.types.Object) -> Iterator[object]:
-    """All about each bone that in-betweens may depend on, but for its channels."""
-    bones = rig.pose.bones
-    count, columns = len(bones), []
-    for name, width in WIDTHS.items():
-        values = np.empty(count * width, np.float32)
-        bones.foreach_get(name, values)
-        columns.append(values.reshape(count, width))
-    for row, bone in zip(np.concatenate(columns, axis=1), bones, strict=True):
-        motion = bone.rigid_motion
-        constraints = [(one.name, one.mute) for one in bone.constraints if is_ours(one)]
-        yield row.tobytes(), bone.rotation_mode, motion.mode, motion.awaited, motion.mounted, constraints
+    if before is None or before[0] != moved_by or before[1].names != now.names:
+        return list(bones)
+    return [bones[number] for number in now.changed_from(before[1])]

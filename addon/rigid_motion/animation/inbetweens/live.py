@@ -26,7 +26,6 @@ from ..actions.slots import (
     filled_places_of,
     slot_transforms_of,
     slots_in,
-    transforms_in,
 )
 from ..actions.sources import Source
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
@@ -243,7 +242,7 @@ def _follow(actions: Collection[bpy.types.Action]) -> set[Transform]:
     """Refresh what these Actions, which were edited, move; and say what that is."""
     if not actions:
         return set()
-    places = [place for slot in slots_in(actions) for place in transforms_in(slot, glances.changed_in(slot))]
+    places = [place for slot in slots_in(actions) for place in glances.edited_in(slot)]
     with _turn() as ours:
         if ours:
             _refresh(places)
