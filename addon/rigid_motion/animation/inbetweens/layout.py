@@ -58,12 +58,12 @@ class Layout:
         cycles = source.cyclic.cycles if source.repeats else None
         return cls(first, last, _ends(source), cycles, shift=max(0, -first), is_apart=True)
 
-    @property
+    @cached_property
     def count(self) -> int:
         """How many samples there are in the F-curve."""
         return self.last - self.first + (2 if self.is_ring else 1)
 
-    @property
+    @cached_property
     def outermost(self) -> tuple[float, float]:
         """The frames that the first and the last sample lie on."""
         return (0.0, float(self.count - 1)) if self.is_ring else tuple(end + self.shift for end in self.ends)
@@ -88,10 +88,9 @@ class Layout:
 
     def fits(self, fcurve: bpy.types.FCurve) -> bool:
         """Whether an F-curve has its samples so, and repeats them so."""
-        points = fcurve.sampled_points
         return (
-            len(points) == self.count
-            and (points[0].co[0], points[self.count - 1].co[0]) == self.outermost
+            len(fcurve.sampled_points) == self.count
+            and tuple(fcurve.range()) == self.outermost
             and self._has_modifiers(fcurve)
         )
 
