@@ -12,6 +12,7 @@ keyframe selection for motion capture", 2019.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,9 @@ EFFORT = 100
 
 WITHIN = 1.0 + 1e-12
 """Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
+
+TOGETHER = 4
+"""Lengths of segments that are looked at in one go, though that of some would be enough, where a pose costs little."""
 
 MANY = 2**40
 """Keys, more than there are."""
@@ -58,25 +62,31 @@ def linked_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
         if (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum() <= EFFORT * count:
             links = _links(pairs, len(candidates))
             samples = np.where(links >= 0, candidates[np.maximum(links, 0)], -1)
-            _, peak = search.evaluate(samples, slice(1, 2))
-            return candidates[_shortest_of_four(links[peak[:, 0] <= WITHIN])]
+            _, peak = search.costs.of(samples)
+            return candidates[_shortest_of_four(links[peak <= WITHIN])]
     return fewest
 
 
 def _pairs(search: Search, candidates: np.ndarray, found: list[np.ndarray]) -> np.ndarray:
     """Candidates that a segment may join, (p, 2), by the first and then the second."""
-    last = len(candidates) - 1
+    last, reach = len(candidates) - 1, search.reach
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in found]
     first, gap = np.arange(last), 1
     while len(first):
+        gaps = gap + np.arange(TOGETHER if search.recording.poses_each == 1.0 else 1)
+        second = first[:, None] + gaps
         # A segment at the end has no neighbour there; all others have one, if not as far away.
-        windows = candidates[np.clip(first[:, None] + gap * np.arange(-search.reach, 2 + search.reach), 0, last)]
-        windows[first == 0, : search.reach] = -1
-        windows[first + gap == last, 2 + search.reach :] = -1
-        _, peak = search.evaluate(windows, slice(search.reach, search.reach + 1))
-        good = first[peak[:, 0] <= (1.0 if search.reach == 0 else ALIVE)]
-        pairs.append(np.stack((good, good + gap), axis=1))
-        first, gap = first[peak[:, 0] <= ALIVE**2], gap + 1
+        numbers = first[:, None, None] + gaps[:, None] * np.arange(-reach, 2 + reach)
+        windows = candidates[np.clip(numbers, 0, last)]
+        windows[first == 0, :, :reach] = -1
+        windows[second >= last, 2 + reach :] = -1
+        _, peak = search.costs.of(windows)
+        peak[second > last] = math.inf
+        alive = np.logical_and.accumulate(peak <= ALIVE**2, axis=1)
+        good = peak <= (1.0 if reach == 0 else ALIVE)
+        good[:, 1:] &= alive[:, :-1]
+        pairs.append(np.stack((np.broadcast_to(first[:, None], good.shape)[good], second[good]), axis=1))
+        first, gap = first[alive[:, -1]], gap + len(gaps)
         first = first[first + gap <= last]
     return np.unique(np.concatenate(pairs), axis=0)
 
