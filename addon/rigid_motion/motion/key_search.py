@@ -43,7 +43,7 @@ GAIN = 1e-4
 LOOSER = (1.6, 1.3, 1.15)
 """How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
 
-MUCH = 2**12
+MUCH = 2**13
 """Poses to look at in one go, that are worth being put off for what may make some of them needless."""
 
 SWEEPS = 8

@@ -152,8 +152,21 @@ class PackedPoses:
 
     def __getitem__(self, samples: np.ndarray) -> Poses:
         """Those at some numbers (m,) or (k, m) of the last axis, shape (..., m) or (..., k, m)."""
-        rows = self._rows.take(samples, axis=-1)
-        return Poses(vectors(rows[:3]), vectors(rows[3:7]), rows[7] if len(rows) > 7 else None)
+        return _of_rows(self._rows.take(samples, axis=-1))
+
+    def of(self, objects: np.ndarray | slice) -> Poses:
+        """Those at some numbers (k,) of the first axis, shape (k, ..., n)."""
+        return _of_rows(self._rows[:, objects])
+
+    def put(self, objects: np.ndarray, poses: Poses) -> None:
+        """Others (k, ..., n) in the place of those."""
+        self._rows[:3, objects], self._rows[3:7, objects] = components(poses.positions), components(poses.quaternions)
+        if poses.scales is not None:
+            self._rows[7, objects] = poses.scales
+
+
+def _of_rows(rows: np.ndarray) -> Poses:
+    return Poses(vectors(rows[:3]), vectors(rows[3:7]), rows[7] if len(rows) > 7 else None)
 
 
 def reshaped(poses: Poses, *shape: int) -> Poses:

@@ -21,7 +21,7 @@ from .key_costs import Recording
 from .key_search import Keys, Search
 from .measures import shell_error
 from .modes import interpolate, mode_named
-from .poses import LIMIT, Poses, reshaped
+from .poses import LIMIT, PackedPoses, Poses, reshaped
 from .quaternions import align_signs, normalise
 from .skeleton_levels import Level
 from .skeletons import Skeleton
@@ -167,10 +167,16 @@ class Body:
         for joint in range(len(skeleton)):
             check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
 
-    def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown."""
+    def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
+        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
         there = self.skeleton.in_root_space(shown)
-        return shell_error(there, self.truth[:, samples], self.radii[:, None]) * self.weights[:, samples]
+        if samples is None:
+            return shell_error(there, self.truth, self.radii[:, None]) * self.weights
+        return shell_error(there, self.packed_truth[samples], self.radii[:, None]) * self.weights[:, samples]
+
+    @cached_property
+    def packed_truth(self) -> PackedPoses:
+        return PackedPoses(self.truth)
 
     def shown(self, joint: int, keys: np.ndarray) -> Poses:
         """What a joint does between keys (k,), shape (n,)."""
@@ -234,10 +240,10 @@ class _WholeBody(Recording):
         moves = _moves(body.poses) & body.free
         moves[0] |= not moves.any()
         super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
-        self.body, self.moving = body, np.flatnonzero(moves)
+        self.body, self.moving, self.everything = body, np.flatnonzero(moves), PackedPoses(body.poses)
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
-        everything = self.body.poses[:, samples]
+        everything = self.everything[samples]
         everything[self.moving] = shown
         return self.in_tolerances(self.body.errors(everything, samples).max(axis=0), samples)
 
