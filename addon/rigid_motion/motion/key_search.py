@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .key_costs import Costs, Found, Recording
-from .key_links import linked_keys
+from .key_links import linked_keys, traded_keys
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
@@ -42,6 +42,9 @@ GAIN = 1e-4
 
 LOOSER = (1.6, 1.3, 1.15)
 """How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
+
+OTHERS = (0.9, 1.1, 1.25)
+"""Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
 
 MUCH = 2**13
 """Poses to look at in one go, that are worth being put off for what may make some of them needless."""
@@ -102,9 +105,9 @@ class Search:
 
     def within(self, tries: int) -> np.ndarray:
         """Few samples that, as keys, keep to the tolerance."""
-        best = self.refined(self.thinned(self.measured(np.arange(len(self.recording.times))), 1.0))
+        best = self._first(1.0)
         if self.power == 2:
-            return best.indices
+            return self._traded(best, tries).indices
         found = [best.indices]
         for looser in LOOSER[:tries]:
             # Keys that are too few find better places, also when some are put back between them.
@@ -117,6 +120,21 @@ class Search:
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
         return best.indices
+
+    def _first(self, tolerance: float) -> Keys:
+        """What is left of keys at all samples."""
+        every = self.measured(np.arange(len(self.recording.times)))
+        return self.refined(self.thinned(every, tolerance), tolerance)
+
+    def _traded(self, best: Keys, tries: int) -> Keys:
+        """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
+        if self.reach > 1 or len(self.recording.starts) > 1 or not tries:
+            return best
+        found = [best.indices]
+        for other in OTHERS[:tries]:
+            found.append(self._first(other).indices)
+        traded = traded_keys(self, found)
+        return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     def within_budget(self, budget: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""
