@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, reduce_keys
-from rigid_motion.motion.key_links import _links, _neighbours, _pairs, _shortest, _shortest_of_four
+from rigid_motion.motion.key_links import _links, _neighbours, _shortest, _with_neighbours, traded_keys
 from rigid_motion.motion.key_search import Recording, Search, _spaced
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
@@ -47,7 +47,8 @@ def test_the_shortest_way_is_that_of_an_exhaustive_programme(mode, seed):
     times, poses = wandering(18, seed, (0.0, 0.01)[seed % 2], 40.0)
     search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[seed]))
     samples = np.arange(len(times))
-    keys = _shortest(_pairs(search, samples, [samples]), len(times))
+    links = _links(search, samples, [samples], 1.0, np.inf)
+    keys = _shortest(links, np.ones(len(links)), samples)
     assert len(keys) == fewest_of_a_programme(times, poses, mode, TOLERANCES[seed])
     assert 2 < len(keys) < len(times)
     assert shell_errors(times, poses, keys, mode).max() <= TOLERANCES[seed] * (1.0 + 1e-9)
@@ -67,6 +68,47 @@ def test_smooth_keys_are_as_few_as_any_that_keep_to_the_tolerance():
     assert as_few >= 5
 
 
+def least_square_of_a_programme(search: Search, keys: int) -> float:
+    """The least sum of squares that so many keys leave, where a segment costs what it costs by itself."""
+    count = len(search.recording.times)
+    pairs = np.array(list(itertools.combinations(range(count), 2)))
+    of_pairs = np.full((count, count), np.inf)
+    of_pairs[tuple(pairs.T)] = search.costs.of(pairs)[0]
+    least = np.where(np.arange(count) == 0, 0.0, np.inf)
+    for _ in range(keys - 1):
+        least = (least[:, None] + of_pairs).min(axis=0)
+    return float(least[-1])
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp"])
+def test_keys_with_a_price_are_the_best_of_their_number(mode, seed):
+    """A price leaves the least error of all sets of as many keys; there is not one for every number of them."""
+    times, poses = wandering(40, seed, 0.01, 40.0)
+    search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[1]), rms=True)
+    samples = np.arange(len(times))
+    best = search.within(0)
+    keys = traded_keys(search, [best, samples, np.array((0, len(times) - 1))])
+    assert search.measured(keys).cost.sum() <= len(times)
+    assert 2 < len(keys) <= len(best)
+    if len(keys) < len(best):
+        fewest = least_square_of_a_programme(search, len(keys))
+        assert search.measured(keys).cost.sum() == pytest.approx(fewest)
+    assert least_square_of_a_programme(search, len(keys) - 2) > len(times)
+
+
+@pytest.mark.parametrize("mode", ["lerp_slerp", "motor_spline"])
+def test_more_searches_leave_fewer_keys_of_the_same_mean_square_error(mode):
+    fewer = 0
+    for seed in range(4):
+        times, poses = wandering(150, seed, 0.01, 40.0)
+        few, many = (reduce_keys(times, poses, mode, 0.02, RADIUS, rms=True, tries=tries) for tries in (3, 0))
+        assert np.sqrt(np.mean(shell_errors(times, poses, few, mode) ** 2)) <= 0.02 * (1.0 + 1e-9)
+        assert len(few) <= len(many)
+        fewer += len(few) < len(many)
+    assert fewer >= 2
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_links_are_all_pairs_with_all_their_neighbours(seed):
     random = np.random.default_rng(seed)
@@ -83,7 +125,7 @@ def test_links_are_all_pairs_with_all_their_neighbours(seed):
         if ((before, first) in joined or (before < 0 and first == 0))
         and ((second, after) in joined or (after < 0 and second == count - 1))
     }
-    links = [tuple(link) for link in _links(pairs, count).tolist()]
+    links = [tuple(link) for link in _with_neighbours(pairs, count).tolist()]
     assert len(links) == len(set(links))
     assert set(links) == expected
     assert np.prod(_neighbours(pairs, count), axis=0).sum() == len(expected)
@@ -95,7 +137,7 @@ def test_the_shortest_way_by_links_is_the_shortest_of_all_ways(seed):
     count = 9
     chain = list(range(count))
     every = np.array(list(itertools.combinations(chain, 2)))
-    links = _links(every, count)
+    links = _with_neighbours(every, count)
     of_chain = {(a, b, c, d) for a, b, c, d in zip([-1, *chain], chain, chain[1:], [*chain[2:], -1], strict=False)}
     links = links[[random.random() < 0.3 or tuple(link) in of_chain for link in links.tolist()]]
     allowed = {tuple(link) for link in links.tolist()}
@@ -105,9 +147,19 @@ def test_the_shortest_way_by_links_is_the_shortest_of_all_ways(seed):
         return all(ended[place : place + 4] in allowed for place in range(len(way) - 1))
 
     ways = [(0, *inner, count - 1) for size in range(count - 1) for inner in itertools.combinations(chain[1:-1], size)]
-    found = tuple(_shortest_of_four(links).tolist())
+    found = tuple(_shortest(links, np.ones(len(links)), np.arange(count)).tolist())
     assert leads(found)
     assert len(found) == min(len(way) for way in ways if leads(way))
+
+    lengths = random.random(len(links))
+    of_link = {tuple(link): length for link, length in zip(links.tolist(), lengths.tolist(), strict=True)}
+
+    def length_of(way: tuple[int, ...]) -> float:
+        ended = (-1, *way, -1)
+        return sum(of_link[ended[place : place + 4]] for place in range(len(way) - 1))
+
+    found = tuple(_shortest(links, lengths, np.arange(count)).tolist())
+    assert length_of(found) == pytest.approx(min(length_of(way) for way in ways if leads(way)))
 
 
 @pytest.mark.parametrize("seed", range(30))

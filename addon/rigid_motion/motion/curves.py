@@ -84,7 +84,8 @@ def motor_spline(segments: Segments) -> Curves:
     def at_keys(twists, before, after, rests):
         share = _shares(before, after)
         inner = share * twists[..., :-1] + (1.0 - share) * twists[..., 1:]
-        inner[:, rests[:, :-1] | rests[:, 1:]] = 0.0
+        if rests.any():
+            inner[:, rests[..., :-1] | rests[..., 1:]] = 0.0
         return np.concatenate((twists[..., :1], inner, twists[..., -1:]), axis=-1)
 
     return _bent(segments, at_keys)
@@ -102,12 +103,14 @@ def motor_spline_causal(segments: Segments) -> Curves:
     def at_keys(twists, before, after, rests):
         share = np.minimum(after / (before + after), before / after)
         inner = twists[..., 1:] + 0.5 * share * (twists[..., 1:] - twists[..., :-1])
-        inner[:, rests[:, 1:]] = 0.0
+        if rests.any():
+            inner[:, rests[..., 1:]] = 0.0
         return np.concatenate((twists[..., :1], twists[..., :1], inner), axis=-1)
 
-    duration = (2.0 / segments.rate).reshape(-1, segments.keys.shape[-1] - 1)
-    before = np.concatenate((duration[:, :1], duration[:, :-1]), axis=1)
-    fades = np.minimum(LATE * before / duration, 1.0).ravel()
+    duration = segments.durations
+    before = np.concatenate((duration[..., :1], duration[..., :-1]), axis=-1)
+    fades = np.minimum(LATE * before / duration, 1.0)
+    fades = np.broadcast_to(fades, segments.keys[..., 1:].shape)[..., segments.wanted].ravel()
     return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
 
 
@@ -136,16 +139,15 @@ def _bent(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
     Each factor is a function of twists in the body's own axes, so that neither the axes of the world nor those of the
     body matter. Where twists at keys do not tell before from after, it is the same motion backwards.
 
-    `at_keys` makes the twists at the n + 1 keys (7, objects, n + 1) from those of the screws of n segments, from how
-    long the segments but the last and those but the first take, and from where the body rests (objects, n).
+    `at_keys` makes the twists at the n + 1 keys (7, ..., n + 1) from those of the screws of n segments, from how long
+    the segments but the last and those but the first take, and from where the body rests (..., n).
     """
-    count = segments.keys.shape[-1] - 1
-    screws = segments.screws.reshape(7, -1, count)
-    duration = (2.0 / segments.rate).reshape(-1, count)
-    rests = segments.is_still.reshape(-1, count)
-    twists = at_keys(screws / duration, duration[:, :-1], duration[:, 1:], rests)
-    ends = np.stack((twists[..., :-1], twists[..., 1:]), axis=1) * duration - screws[:, None]
-    ends[..., rests] = 0.0
+    screws, duration, rests, wanted = segments.screws, segments.durations, segments.are_still, segments.wanted
+    twists = at_keys(screws / duration, duration[..., :-1], duration[..., 1:], rests)
+    ends = np.stack([twists[..., keys][..., wanted] for keys in (slice(None, -1), slice(1, None))], axis=1)
+    ends = ends * duration[..., wanted] - screws[:, None, ..., wanted]
+    if rests.any():
+        ends[..., rests[..., wanted]] = 0.0
     return replace(screw(segments), bends=ends.reshape(7, 2, -1))
 
 

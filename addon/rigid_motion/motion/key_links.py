@@ -6,12 +6,17 @@ first sample to the last are found by dynamic programming. Where a segment depen
 for these candidates. Where it depends on one key more on either side, a link is made of four keys; segments that are
 far from the tolerance with neighbours as far away as they are long are left out.
 
+Where the mean square of the errors counts, no link is good enough or too bad by itself. There a key has a price, and
+the way is the cheapest, errors and keys together: the highest price at which the errors keep to the tolerance leaves
+the fewest keys (Lagrange's multiplier).
+
 Source: dynamic programming over the samples of a recording as in Roberts, Lewis and Anjyo, "Optimal and interactive
 keyframe selection for motion capture", 2019.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,8 +36,17 @@ EFFORT = 100
 WITHIN = 1.0 + 1e-12
 """Tolerances that a link may be off by: those of the keys that were found are among them, whatever the rounding."""
 
-MANY = 2**40
-"""Keys, more than there are."""
+TOGETHER = 4
+"""Lengths of segments that are looked at in one go, though that of some would be enough, where a pose costs little."""
+
+DEAR = 3.0
+"""Prices of a key that a segment may cost: beyond that one more key is worth it."""
+
+PRICES = 8.0
+"""How many times as high, or as low, the price may be as it is first thought to be."""
+
+PRICE_STEPS = 10
+"""Of bisection for the price."""
 
 
 def linked_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
@@ -45,38 +59,97 @@ def linked_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
     found : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
     """
-    fewest = min(found, key=len)
-    count = len(search.recording.times)
     for width in WIDTHS[search.reach]:
-        beside = np.concatenate(found)[:, None] + np.arange(-width, width + 1)
-        candidates = np.unique(np.clip(beside, 0, count - 1))
-        pairs = _pairs(search, candidates, found)
-        if search.reach == 0:
-            return candidates[_shortest(pairs, len(candidates))]
-        before, after = _neighbours(pairs, len(candidates))
-        # Links are many times the pairs: they are counted before any is made.
-        if (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum() <= EFFORT * count:
-            links = _links(pairs, len(candidates))
-            samples = np.where(links >= 0, candidates[np.maximum(links, 0)], -1)
-            _, peak = search.evaluate(samples, slice(1, 2))
-            return candidates[_shortest_of_four(links[peak[:, 0] <= WITHIN])]
-    return fewest
+        candidates = _beside(search, found, width)
+        links = _links(search, candidates, found, 1.0 if search.reach == 0 else ALIVE, ALIVE**2)
+        if links is not None:
+            _, peak = search.costs.of(links)
+            links = links[peak <= WITHIN]
+            return _shortest(links, np.ones(len(links)), candidates)
+    return min(found, key=len)
 
 
-def _pairs(search: Search, candidates: np.ndarray, found: list[np.ndarray]) -> np.ndarray:
+def traded_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
+    """The fewest keys that prices allow, or the first that were found; at all costs that are too high.
+
+    Parameters
+    ----------
+    search : Search
+        Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
+    found : list of array of int
+        Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
+    """
+    counts, costs = [len(keys) for keys in found], [search.measured(keys).cost.sum() for keys in found]
+    best, least, allowed = found[0], costs[0], float(len(search.recording.times))
+    if max(counts) == min(counts) or max(costs) == min(costs):
+        return best
+    price = (max(costs) - min(costs)) / (max(counts) - min(counts))
+    candidates = _beside(search, found, 0)
+    links = _links(search, candidates, found, DEAR * price, DEAR**2 * price)
+    if links is None:
+        return best
+    cost, _ = search.costs.of(links)
+    low, high = -math.log(PRICES), math.log(PRICES)
+    for _ in range(PRICE_STEPS):
+        middle = 0.5 * (low + high)
+        keys = _shortest(links, cost + price * math.exp(middle), candidates)
+        total = search.measured(keys).cost.sum()
+        if total > allowed:
+            high = middle
+            continue
+        low = middle
+        if (len(keys), total) < (len(best), least):
+            best, least = keys, total
+    return best
+
+
+def _beside(search: Search, found: list[np.ndarray], width: int) -> np.ndarray:
+    """The samples that are keys in what was found, and so many on either side of each."""
+    beside = np.concatenate(found)[:, None] + np.arange(-width, width + 1)
+    return np.unique(np.clip(beside, 0, len(search.recording.times) - 1))
+
+
+def _links(
+    search: Search, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float
+) -> np.ndarray | None:
+    """The links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None where there are many.
+
+    Segments whose peak, or for the mean square whose cost, is above `good` are left out, and those above `alive` are
+    made no longer; with neighbours as far away as they are long.
+    """
+    pairs = _pairs(search, candidates, found, good, alive)
+    if search.reach == 0:
+        return candidates[pairs]
+    before, after = _neighbours(pairs, len(candidates))
+    # Links are many times the pairs: they are counted before any is made.
+    poses = (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum()
+    if poses > EFFORT * len(search.recording.times):
+        return None
+    numbers = _with_neighbours(pairs, len(candidates))
+    return np.where(numbers >= 0, candidates[np.maximum(numbers, 0)], -1)
+
+
+def _pairs(search: Search, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float) -> np.ndarray:
     """Candidates that a segment may join, (p, 2), by the first and then the second."""
-    last = len(candidates) - 1
+    last, reach = len(candidates) - 1, search.reach
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in found]
     first, gap = np.arange(last), 1
     while len(first):
+        gaps = gap + np.arange(TOGETHER if search.recording.poses_each == 1.0 else 1)
+        second = first[:, None] + gaps
         # A segment at the end has no neighbour there; all others have one, if not as far away.
-        windows = candidates[np.clip(first[:, None] + gap * np.arange(-search.reach, 2 + search.reach), 0, last)]
-        windows[first == 0, : search.reach] = -1
-        windows[first + gap == last, 2 + search.reach :] = -1
-        _, peak = search.evaluate(windows, slice(search.reach, search.reach + 1))
-        good = first[peak[:, 0] <= (1.0 if search.reach == 0 else ALIVE)]
-        pairs.append(np.stack((good, good + gap), axis=1))
-        first, gap = first[peak[:, 0] <= ALIVE**2], gap + 1
+        numbers = first[:, None, None] + gaps[:, None] * np.arange(-reach, 2 + reach)
+        windows = candidates[np.clip(numbers, 0, last)]
+        windows[first == 0, :, :reach] = -1
+        windows[second >= last, 2 + reach :] = -1
+        cost, peak = search.costs.of(windows)
+        worth = cost if search.power == 2 else peak
+        worth[second > last] = math.inf
+        lives = np.logical_and.accumulate(worth <= alive, axis=1)
+        is_good = worth <= good
+        is_good[:, 1:] &= lives[:, :-1]
+        pairs.append(np.stack((np.broadcast_to(first[:, None], is_good.shape)[is_good], second[is_good]), axis=1))
+        first, gap = first[lives[:, -1]], gap + len(gaps)
         first = first[first + gap <= last]
     return np.unique(np.concatenate(pairs), axis=0)
 
@@ -87,7 +160,7 @@ def _neighbours(pairs: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.maximum(ended[pairs[:, 0]], pairs[:, 0] == 0), np.maximum(begun[pairs[:, 1]], pairs[:, 1] == count - 1)
 
 
-def _links(pairs: np.ndarray, count: int) -> np.ndarray:
+def _with_neighbours(pairs: np.ndarray, count: int) -> np.ndarray:
     """Every pair with all pairs that end where it begins and begin where it ends: (l, 4), -1 beyond the ends."""
     by_end = pairs[np.argsort(pairs[:, 1], kind="stable")]
     begins, ends = (np.searchsorted(column, np.arange(count + 1)) for column in (pairs[:, 0], by_end[:, 1]))
@@ -108,33 +181,26 @@ def _links(pairs: np.ndarray, count: int) -> np.ndarray:
     )
 
 
-def _shortest(pairs: np.ndarray, count: int) -> np.ndarray:
-    """The fewest of the candidates that lead from the first to the last, pair by pair."""
-    keys, back = [1] + [MANY] * (count - 1), [0] * count
-    for first, second in pairs.tolist():
-        if keys[first] + 1 < keys[second]:
-            keys[second], back[second] = keys[first] + 1, first
-    way = [count - 1]
-    while way[-1]:
-        way.append(back[way[-1]])
-    return np.array(way[::-1])
+def _shortest(links: np.ndarray, lengths: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """The way from the first candidate to the last that is shortest, by the length of each link; all samples on it.
 
-
-def _shortest_of_four(links: np.ndarray) -> np.ndarray:
-    """The same by links of four, of which successive ones have three keys in common."""
-    keys: dict[tuple[int, int, int], int] = {}
-    back: dict[tuple[int, int, int], tuple[int, int, int]] = {}
-    fewest, last = MANY, (-1, 0, 0)
-    for before, first, second, after in links[np.argsort(links[:, 1], kind="stable")].tolist():
-        here = (before, first, second)
-        count = 2 if before < 0 else keys.get(here, MANY)
-        if after < 0:
-            if count < fewest:
-                fewest, last = count, here
-        elif count + 1 < keys.get((first, second, after), MANY):
-            keys[first, second, after], back[first, second, after] = count + 1, here
-    way = [last[2], last[1]]
-    while last[0] >= 0:
-        way.append(last[0])
-        last = back[last]
-    return np.array(way[::-1])
+    Successive links have all keys in common but one.
+    """
+    start, end = candidates[[0, -1]].tolist()
+    second = links.shape[1] // 2
+    reached: dict[tuple[int, ...], float] = {}
+    back: dict[tuple[int, ...], tuple[int, ...]] = {}
+    shortest, last = math.inf, ()
+    order = np.argsort(links[:, second - 1], kind="stable")
+    for link, length in zip(map(tuple, links[order].tolist()), lengths[order].tolist(), strict=True):
+        way = length + (0.0 if link[second - 1] == start else reached.get(link[:-1], math.inf))
+        if link[second] == end:
+            if way < shortest:
+                shortest, last = way, link
+        elif way < reached.get(link[1:], math.inf):
+            reached[link[1:]], back[link[1:]] = way, link
+    samples = [end, last[second - 1]]
+    while samples[-1] != start:
+        last = back[last[:-1]]
+        samples.append(last[second - 1])
+    return np.array(samples[::-1])

@@ -12,18 +12,15 @@ and surfaces", 1987.
 
 from __future__ import annotations
 
-import itertools
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from .key_links import linked_keys
-from .measures import shell_error
-from .modes import MODES
-from .poses import PackedPoses, Poses, beyond
-from .segments import prepare_within
+from .key_costs import Costs, Found, Recording
+from .key_links import linked_keys, traded_keys
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
@@ -46,51 +43,14 @@ GAIN = 1e-4
 LOOSER = (1.6, 1.3, 1.15)
 """How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
 
-WORST = 1e30
-"""Errors are clipped to this, so that their powers stay finite."""
+OTHERS = (0.9, 1.1, 1.25)
+"""Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
+
+MUCH = 2**13
+"""Poses to look at in one go, that are worth being put off for what may make some of them needless."""
 
 SWEEPS = 8
 """Of all keys, for those to be changed at once."""
-
-BATCH = 2**14
-"""Poses looked at in one go: few enough for the processor's caches."""
-
-
-class Recording:
-    """What keys are searched for: tracks of samples, one behind the other, each of which gets keys of its own.
-
-    Parameters
-    ----------
-    times : array, shape (n,)
-        Rising within each track.
-    poses : Poses, shape (..., n)
-        At these times; what has leading axes moves together and has the same keys.
-    mode : str
-        What fills in between keys.
-    radius, tolerance : float or array, shape (n,)
-        Of the shell error. Errors are counted in tolerances.
-    starts : array of int, optional
-        The first sample of each track; one track, otherwise.
-    """
-
-    def __init__(
-        self,
-        times: np.ndarray,
-        poses: Poses,
-        mode: str,
-        radius: float | np.ndarray,
-        tolerance: float | np.ndarray = 1.0,
-        starts: np.ndarray | None = None,
-    ) -> None:
-        self.times, self.poses, self.mode = times, poses, mode
-        self.radius, self.tolerance = (np.broadcast_to(number, times.shape) for number in (radius, tolerance))
-        self.starts = np.zeros(1, dtype=np.int64) if starts is None else starts
-        self.ends = np.append(self.starts[1:], len(times)) - 1
-        self.truth = PackedPoses(poses)
-
-    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
-        """How far what is shown (..., m) is off at some samples (m,), in tolerances, shape (m,)."""
-        return shell_error(shown, self.truth[samples], self.radius[samples]) / self.tolerance[samples]
 
 
 @dataclass(eq=False)
@@ -138,17 +98,16 @@ class Search:
 
     def __init__(self, recording: Recording, *, rms: bool = False) -> None:
         self.recording, self.power = recording, 2 if rms else PEAK
-        mode = MODES[recording.mode]
-        self.reach = max(mode.behind, mode.ahead)
-        """How many segments beyond the two next to it a key influences, on either side."""
+        self.costs = Costs(recording, self.power)
+        self.reach = self.costs.reach
         self.spacing = 2 + 2 * self.reach
         """Keys this far from one another, or further, can be tried without regard to each other."""
 
     def within(self, tries: int) -> np.ndarray:
         """Few samples that, as keys, keep to the tolerance."""
-        best = self.refined(self.thinned(self.measured(np.arange(len(self.recording.times))), 1.0))
+        best = self._first(1.0)
         if self.power == 2:
-            return best.indices
+            return self._traded(best, tries).indices
         found = [best.indices]
         for looser in LOOSER[:tries]:
             # Keys that are too few find better places, also when some are put back between them.
@@ -161,6 +120,21 @@ class Search:
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
         return best.indices
+
+    def _first(self, tolerance: float) -> Keys:
+        """What is left of keys at all samples."""
+        every = self.measured(np.arange(len(self.recording.times)))
+        return self.refined(self.thinned(every, tolerance), tolerance)
+
+    def _traded(self, best: Keys, tries: int) -> Keys:
+        """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
+        if self.reach > 1 or len(self.recording.starts) > 1 or not tries:
+            return best
+        found = [best.indices]
+        for other in OTHERS[:tries]:
+            found.append(self._first(other).indices)
+        traded = traded_keys(self, found)
+        return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     def within_budget(self, budget: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""
@@ -180,19 +154,9 @@ class Search:
         keys = Keys(
             indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
         )
-        numbers, windows = self._segments(keys)
-        cost, peak = self.evaluate(windows, slice(self.reach, self.reach + 1))
-        keys.cost[numbers], keys.peak[numbers] = cost[:, 0], peak[:, 0]
+        numbers, segments = self._segments(keys)
+        keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
         return keys
-
-    def errors(self, keys: Keys) -> np.ndarray:
-        """The error at every sample, in tolerances, shape (n,)."""
-        _, windows = self._segments(keys)
-        errors = np.zeros(len(self.recording.times))
-        for batch, counts in self._batches(windows, slice(self.reach, self.reach + 1)):
-            samples, found, _ = self._errors(batch, self.reach, counts)
-            errors[samples] = found
-        return errors
 
     def _segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
         """The numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
@@ -202,7 +166,7 @@ class Search:
     def densified(self, keys: Keys) -> Keys:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
         while keys.peak.max() > 1.0:
-            errors = self.errors(keys)
+            errors = self.costs.errors(self._segments(keys)[1])
             of_segments = np.maximum.reduceat(errors, keys.indices)
             counts = np.diff(keys.indices, append=len(errors))
             worst = (errors == of_segments.repeat(counts)) & (errors > 1.0)
@@ -237,12 +201,15 @@ class Search:
         columns = np.concatenate((np.arange(-1 - 2 * reach, 0), np.arange(1, 2 + 2 * reach)))
         seen = np.zeros(len(keys.indices), dtype=bool)
         cost, peak = np.zeros((2, len(keys.indices), 1 + 2 * reach))
+
+        def promising(_: np.ndarray, peak: np.ndarray) -> np.ndarray:
+            return (self.power == 2) | (peak.max(axis=1) <= tolerance)
+
         while len(keys.indices) > fewest:
             inner = keys.inner
             unseen = inner[~seen[inner]]
             if len(unseen):
-                found = self.evaluate(keys.windows(unseen, columns), slice(reach, 1 + 3 * reach))
-                cost[unseen], peak[unseen] = found
+                cost[unseen], peak[unseen] = self.evaluate(keys.windows(unseen, columns), promising)
                 seen[unseen] = True
             rise = cost[inner].sum(axis=1) - self._cost_around(keys, inner)
             most = len(keys.indices) - fewest
@@ -300,14 +267,14 @@ class Search:
                 break
             windows = keys.windows(inner[rows], columns)
             windows[:, 1 + 2 * reach] += steps[ways]
-            cost, peak = self.evaluate(windows, slice(reach, 2 + 3 * reach))
-            rise = cost.sum(axis=1) - self._cost_around(keys, inner[rows])
-            if self.power != 2:
-                rise[peak.max(axis=1) > tolerance] = math.inf
+            around, enough = self._cost_around(keys, inner[rows]), -GAIN * keys.cost.sum() / len(keys.cost)
+            rises = functools.partial(self._rises, around=around, tolerance=tolerance)
+            cost, peak = self.evaluate(windows, lambda *found, rises=rises, enough=enough: rises(*found) < enough)
+            rise = rises(cost, peak)
             order = np.lexsort((rise, rows))
             best = order[np.flatnonzero(np.diff(rows[order], prepend=-1))]
             keys.stale[inner] = False
-            best = best[rise[best] < -GAIN * keys.cost.sum() / len(keys.cost)]
+            best = best[rise[best] < enough]
             if not len(best):
                 break
             best = best[np.argsort(rise[best], kind="stable")]
@@ -323,67 +290,32 @@ class Search:
             keys.stale[near[inside]] = True
         return keys
 
+    def _rises(self, cost: np.ndarray, peak: np.ndarray, around: np.ndarray, tolerance: float) -> np.ndarray:
+        """By how much the cost around keys rises from what it was (c,) to these of segments (c, s), where they may."""
+        refused = (self.power != 2) & (peak.max(axis=1) > tolerance)
+        return np.where(refused, math.inf, cost.sum(axis=1) - around)
+
     def _cost_around(self, keys: Keys, numbers: np.ndarray) -> np.ndarray:
         """The sum over the segments that each key influences."""
         segments, inside = keys.around(numbers, np.arange(-1 - self.reach, 1 + self.reach))
         return np.where(inside, keys.cost[segments], 0.0).sum(axis=1)
 
-    def evaluate(self, windows: np.ndarray, segments: slice) -> tuple[np.ndarray, np.ndarray]:
-        """Costs and peaks, each (c, s), of some of the segments between the keys of windows (c, m)."""
-        cost, peak = np.zeros((2, len(windows) * (segments.stop - segments.start)))
-        done = 0
-        for batch, counts in self._batches(windows, segments):
-            _, errors, filled = self._errors(batch, segments.start, counts)
-            if len(filled):
-                begins = (np.cumsum(counts.ravel()) - counts.ravel())[filled]
-                cost[done + filled] = np.add.reduceat(self._power(errors), begins)
-                peak[done + filled] = np.maximum.reduceat(errors, begins)
-            done += counts.size
-        return cost.reshape(len(windows), -1), peak.reshape(len(windows), -1)
+    def evaluate(self, windows: np.ndarray, promising: Callable[..., np.ndarray] | None = None) -> Found:
+        """Costs and peaks, each (c, s), of all segments between keys of windows (c, m) that have all their neighbours.
 
-    def _power(self, errors: np.ndarray) -> np.ndarray:
-        """By squaring, which is quicker than a power."""
-        for _ in range(self.power.bit_length() - 1):
-            errors = errors * errors
-        return errors
-
-    def _batches(self, windows: np.ndarray, segments: slice) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Windows, a batch at a time, and how many samples there are in these of their segments, (c, s)."""
-        wanted = windows[:, segments], windows[:, segments.start + 1 : segments.stop + 1]
-        counts = np.where((wanted[0] >= 0) & (wanted[1] >= 0), wanted[1] - wanted[0] - 1, 0)
-        together = math.prod(self.recording.poses.shape[:-1])
-        ends = np.cumsum(together * counts.sum(axis=1))
-        cuts = np.unique(np.append(np.searchsorted(ends, np.arange(0, ends[-1], BATCH)), len(windows)))
-        for first, last in itertools.pairwise(cuts.tolist()):
-            yield windows[first:last], counts[first:last]
-
-    def _errors(self, windows: np.ndarray, start: int, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Samples (n,), their errors (n,), and which of the segments (c, s) have any, of windows (c, m)."""
-        filled = np.flatnonzero(counts)
-        nonempty = np.unique(filled // counts.shape[1])
-        all_counts = np.zeros((len(nonempty), windows.shape[1] - 1), dtype=np.int64)
-        all_counts[:, start : start + counts.shape[1]] = counts[nonempty]
-        flat_counts = all_counts.ravel()
-        segment = np.repeat(np.arange(flat_counts.size), flat_counts)
-        if not len(segment):
-            return segment, np.empty(0), filled
-        recording = self.recording
-        first = np.cumsum(flat_counts) - flat_counts
-        samples = (windows[nonempty, :-1].ravel() + 1 - first)[segment] + np.arange(len(segment))
-        key_times, keys = _with_ends(recording.times, recording.poses, windows[nonempty], self.reach)
-        starts, rates = key_times[:, :-1].ravel(), 1.0 / np.diff(key_times).ravel()
-        progress = (recording.times[samples] - starts[segment]) * rates[segment]
-        together = math.prod(keys.shape[:-2])
-        within = prepare_within(MODES[recording.mode].curves, key_times, keys)
-        shown = within(np.tile(flat_counts, together), np.tile(progress, together), slice(None))
-        if len(keys.shape) > 2:
-            shown = Poses(
-                *(
-                    None if rows is None else rows.reshape(*keys.shape[:-2], -1, *rows.shape[1:])
-                    for rows in (shown.positions, shown.quaternions, shown.scales)
-                )
-            )
-        return samples, np.minimum(recording.errors(samples, shown), WORST), filled
+        Where there is much to do, the segments half-way through windows come first. The others are left at zero where
+        `promising` tells, from what these are, that a window will not be taken.
+        """
+        rows = np.lib.stride_tricks.sliding_window_view(windows, self.costs.keys, axis=1)
+        last = rows.shape[1] - 1
+        outer = np.abs(2 * np.arange(last + 1) - last) > 1
+        if promising is None or self.costs.effort(rows[:, outer]) < MUCH:
+            return self.costs.of(rows)
+        cost, peak = np.zeros((2, *rows.shape[:2]))
+        cost[:, ~outer], peak[:, ~outer] = self.costs.of(rows[:, ~outer])
+        left = np.ix_(promising(cost, peak), outer)
+        cost[left], peak[left] = self.costs.of(rows[left])
+        return cost, peak
 
 
 def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
@@ -393,9 +325,8 @@ def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     picked: list[np.ndarray] = []
     # All at once that are the best in their neighbourhood, and again with what is left.
     for _ in range(SWEEPS):
-        windows = np.lib.stride_tricks.sliding_window_view(rank, 2 * distance - 1)
-        best = windows.min(axis=1)
-        centre = rank[distance - 1 : distance - 1 + len(best)]
+        centre = rank[distance - 1 : len(rank) - distance + 1]
+        best = functools.reduce(np.minimum, (rank[begin : begin + len(centre)] for begin in range(2 * distance - 1)))
         chosen = np.flatnonzero((centre == best) & (centre < len(order)))
         if not len(chosen):
             break
@@ -411,31 +342,3 @@ def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:
     ranks = np.empty(count, dtype=np.int64)
     ranks[order] = np.arange(len(order))
     return found[np.argsort(ranks[found])]
-
-
-def _with_ends(times: np.ndarray, poses: Poses, windows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
-    """Times (c, m) and poses (..., c, m) of samples; where there are none, the motion of the outermost segment goes on.
-
-    It does for as many keys as have a say, and rests beyond.
-    """
-    rows = np.flatnonzero((windows < 0).any(axis=1))
-    if not len(rows):
-        return times[windows], poses[..., windows]
-    inside, columns = windows[rows] >= 0, np.arange(windows.shape[1])
-    first = np.argmax(inside, axis=1)
-    last = windows.shape[1] - 1 - np.argmax(inside[:, ::-1], axis=1)
-    nearest = np.clip(columns, first[:, None], last[:, None])
-    windows = windows.copy()
-    windows[rows] = np.take_along_axis(windows[rows], nearest, axis=1)
-    key_times, keys = times[windows], poses[..., windows]
-    for end, inwards in ((first, 1), (last, -1)):
-        beside = key_times[rows, end + inwards]
-        way = (columns - end[:, None]) * inwards
-        moments = key_times[rows, end, None] + way * (beside - key_times[rows, end])[:, None]
-        key_times[rows] = np.where(way < 0, moments, key_times[rows])
-        for step in range(1, 1 + reach):
-            column = end - step * inwards
-            some = (column >= 0) & (column < windows.shape[1])
-            here, column = rows[some], column[some]
-            keys[..., here, column] = beyond(keys[..., here, column + inwards], keys[..., here, column + 2 * inwards])
-    return key_times, keys

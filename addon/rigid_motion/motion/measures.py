@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .checks import check_poses, check_radii
 from .poses import Poses
-from .quaternions import angle_between, cross
+from .quaternions import angle_between, components, cross
 
 TINY = 1e-150
 """Stands for zero, where only ratios count; its square is still above the smallest float."""
@@ -177,20 +177,33 @@ def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarr
     """
     _check_pair(poses, truth)
     radius = np.asarray(radius, dtype=np.float64)
-    (w, *xyz), (true_w, *true_xyz) = (np.moveaxis(some.quaternions, -1, 0) for some in (poses, truth))
-    d, v = np.moveaxis(poses.positions - truth.positions, -1, 0), cross(true_xyz, xyz)
+    (w, *xyz), (true_w, *true_xyz) = (components(some.quaternions) for some in (poses, truth))
+    d, v = components(poses.positions - truth.positions), cross(true_xyz, xyz)
     for axis in range(3):
         v[axis] += true_w * xyz[axis]
         v[axis] -= w * true_xyz[axis]
     if poses.scales is None and truth.scales is None:
-        v *= 2.0 * radius
-        squared = _dot(d, d)
-        squared += _dot(v, v)
-        squared += 2.0 * _length(cross(d, v))
-        return np.sqrt(squared, out=squared)
+        return largest_displacement(d, v, radius)
     one = np.ones(poses.shape)
     scales = [one if scales is None else scales for scales in (poses.scales, truth.scales)]
-    return _displacement_of_growing(d, v, *(radius * scale for scale in scales))
+    return largest_displacement(d, v, *(radius * scale for scale in scales))
+
+
+def largest_displacement(
+    d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray | None = None
+) -> np.ndarray:
+    """The shell error (..., n) of balls that are off by d (3, ..., n) and turned by v, which it may overwrite.
+
+    v (3, ..., n) is the vector part of the unit quaternion of the turn. Balls that should be of a size of their own
+    have a `true_radius`.
+    """
+    if true_radius is not None:
+        return _displacement_of_growing(d, v, radius, true_radius)
+    v *= 2.0 * radius
+    squared = _dot(d, d)
+    squared += _dot(v, v)
+    squared += 2.0 * _length(cross(d, v))
+    return np.sqrt(squared, out=squared)
 
 
 def _displacement_of_growing(d: np.ndarray, v: np.ndarray, radius: np.ndarray, true_radius: np.ndarray) -> np.ndarray:

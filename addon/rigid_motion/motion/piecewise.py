@@ -26,6 +26,9 @@ def blocks(bounds: np.ndarray, size: int = BLOCK) -> Iterator[tuple[slice, slice
 
     `bounds` (S + 1,) is where the samples of each piece begin, and the end.
     """
+    if bounds[-1] <= size:
+        yield slice(0, len(bounds) - 1), slice(0, int(bounds[-1]))
+        return
     cuts = np.unique(np.append(np.searchsorted(bounds, np.arange(0, bounds[-1], size)), len(bounds) - 1))
     for first, last in itertools.pairwise(cuts.tolist()):
         yield slice(first, last), slice(int(bounds[first]), int(bounds[last]))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from .quaternions import conjugate, multiply, rotate
+from .quaternions import components, conjugate, multiply, rotate, vectors
 
 LIMIT = 1e40
 """A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
@@ -145,15 +145,37 @@ class PackedPoses:
     """Poses (..., n) whose components are apart in memory, as what is picked from them is: quicker to work on."""
 
     def __init__(self, poses: Poses) -> None:
-        rows = [np.moveaxis(poses.positions, -1, 0), np.moveaxis(poses.quaternions, -1, 0)]
+        rows = [components(poses.positions), components(poses.quaternions)]
         if poses.scales is not None:
             rows.append(poses.scales[None])
         self._rows = np.concatenate(rows)
 
     def __getitem__(self, samples: np.ndarray) -> Poses:
-        """Those at some numbers (m,) of the last axis, shape (..., m)."""
-        rows = self._rows.take(samples, axis=-1)
-        return Poses(np.moveaxis(rows[:3], 0, -1), np.moveaxis(rows[3:7], 0, -1), rows[7] if len(rows) > 7 else None)
+        """Those at some numbers (m,) or (k, m) of the last axis, shape (..., m) or (..., k, m)."""
+        return _of_rows(self._rows.take(samples, axis=-1))
+
+    def of(self, objects: np.ndarray | slice) -> Poses:
+        """Those at some numbers (k,) of the first axis, shape (k, ..., n)."""
+        return _of_rows(self._rows[:, objects])
+
+    def put(self, objects: np.ndarray, poses: Poses) -> None:
+        """Others (k, ..., n) in the place of those."""
+        self._rows[:3, objects], self._rows[3:7, objects] = components(poses.positions), components(poses.quaternions)
+        if poses.scales is not None:
+            self._rows[7, objects] = poses.scales
+
+
+def _of_rows(rows: np.ndarray) -> Poses:
+    return Poses(vectors(rows[:3]), vectors(rows[3:7]), rows[7] if len(rows) > 7 else None)
+
+
+def reshaped(poses: Poses, *shape: int) -> Poses:
+    """The same in arrays of these leading axes."""
+    return Poses(
+        poses.positions.reshape(*shape, 3),
+        poses.quaternions.reshape(*shape, 4),
+        None if poses.scales is None else poses.scales.reshape(shape),
+    )
 
 
 def placed(above: Poses, poses: Poses) -> Poses:

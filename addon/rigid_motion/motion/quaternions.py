@@ -7,6 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 
+def components(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., k) as their components (k, ...). A view."""
+    return vectors.transpose(-1, *range(vectors.ndim - 1))
+
+
+def vectors(components: np.ndarray) -> np.ndarray:
+    """Vectors (..., k) of components (k, ...). A view."""
+    return components.transpose(*range(1, components.ndim), 0)
+
+
 def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     """Hamilton's product a b, shapes (..., 4): the rotation b first, then a. A view, components apart in memory.
 
@@ -15,8 +25,7 @@ def multiply(a: np.ndarray, b: np.ndarray, out: np.ndarray | None = None) -> np.
     aw, ax, ay, az = (a[..., row] for row in range(4))
     bw, bx, by, bz = (b[..., row] for row in range(4))
     if out is None:
-        components = np.empty((4, *np.broadcast_shapes(aw.shape, bw.shape)))
-        out = components.transpose(*range(1, components.ndim), 0)
+        out = vectors(np.empty((4, *np.broadcast(aw, bw).shape)))
     w, x, y, z = (out[..., row] for row in range(4))
     np.subtract(aw * bw, ax * bx, out=w)
     w -= ay * by
@@ -49,12 +58,21 @@ def rotate(q: np.ndarray, points: np.ndarray) -> np.ndarray:
     turned += across
     for axis in range(3):
         turned[axis] += points[axis]
-    return turned.transpose(*range(1, turned.ndim), 0)
+    return vectors(turned)
+
+
+def matrices(q: np.ndarray) -> np.ndarray:
+    """The rotation matrices (3, 3, ...) of unit quaternions (..., 4), components first."""
+    w, x, y, z = components(q)
+    xx, yy, zz, xy, yz, xz = x * x, y * y, z * z, x * y, y * z, x * z
+    wx, wy, wz = w * x, w * y, w * z
+    halves = ((0.5 - yy - zz, xy - wz, xz + wy), (xy + wz, 0.5 - xx - zz, yz - wx), (xz - wy, yz + wx, 0.5 - xx - yy))
+    return 2.0 * np.array(halves)
 
 
 def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
     """The vector product of vectors (3, ...), components first."""
-    product = np.empty((3, *np.broadcast_shapes(np.shape(a[0]), np.shape(b[0]))))
+    product = np.empty((3, *np.broadcast(a[0], b[0]).shape))
     for axis in range(3):
         after, last = (axis + 1) % 3, (axis + 2) % 3
         np.subtract(a[after] * b[last], a[last] * b[after], out=product[axis, ...])

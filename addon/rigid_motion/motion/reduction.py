@@ -46,9 +46,9 @@ def reduce_keys(
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
-        How many times more keys are taken out than the tolerance allows, and put back where the motion is off: up to
-        three, each of which takes about half as long as the first search. Under `rms` it gains a hundredth at most, so
-        it is off.
+        How many more searches there are, up to three: what they have found is put together. Each begins with fewer keys
+        than the tolerance allows, and puts some back where the motion is off, which takes about half as long as the
+        first search; under `rms` it keeps to another tolerance, and takes as long.
 
     Returns
     -------

@@ -25,7 +25,7 @@ import numpy as np
 from . import series, twists
 from .piecewise import BLOCK, DENSE, blocks, combine, is_dense, multiply_matrices
 from .poses import Poses
-from .quaternions import align_signs, cross, multiply, rotate
+from .quaternions import align_signs, components, cross, multiply, rotate
 
 STILL = 1e-12
 """Turns in radians, and ways compared with the distance from the world's origin, that are rounding errors."""
@@ -46,9 +46,16 @@ MOST_GROWTH = 50.0
 """The logarithm of what a bend may grow or shrink by: after a sudden growth splines shoot further than floats go."""
 
 
+Ends = tuple[np.ndarray, np.ndarray]
+"""Of the first keys of segments, and of the second ones."""
+
+
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """S segments, one after the other along the last axis of each array."""
+    """S segments, one after the other along the last axis of each array.
+
+    They may be some of those between the keys: then the others are there as their neighbours.
+    """
 
     start: np.ndarray
     """Shape (S,), seconds."""
@@ -77,49 +84,68 @@ class Segments:
     keys: Poses
     """All keys of each object, shape (..., n)."""
 
+    positions: Ends
+    """Of the keys, shapes (3, ..., n - 1)."""
+
+    quaternions: Ends
+    """Of the keys, shapes (4, ..., n - 1)."""
+
+    durations: np.ndarray
+    """From each key to the next in seconds, shape (..., n - 1), or without leading axes that objects share."""
+
+    wanted: slice
+    """Which of the n - 1 of each object the S segments are."""
+
     @classmethod
-    def between(cls, key_times: np.ndarray, keys: Poses) -> Segments:
+    def between(cls, key_times: np.ndarray, keys: Poses, wanted: slice = slice(None)) -> Segments:
         """The n - 1 segments of each object: times of shape (..., n), keys of shape (..., n), signs aligned."""
-        shape = (*keys.shape[:-1], keys.shape[-1] - 1)
-        first, second = _components(keys.quaternions[..., :-1, :]), _components(keys.quaternions[..., 1:, :])
-        begin, end = _components(keys.positions[..., :-1, :]), _components(keys.positions[..., 1:, :])
+        rates, scales = 2.0 / (key_times[..., 1:] - key_times[..., :-1]), keys.scales
+        positions, quaternions = _ends(keys.positions), _ends(keys.quaternions)
+        shape = positions[0][0, ..., wanted].shape
+        (begin, end), (first, second) = ([_flat(rows[..., wanted]) for rows in two] for two in (positions, quaternions))
         total, change = first + second, second - first
         total_length, change_length = _length(total), _length(change)
         middle, difference = total / total_length, change / np.maximum(change_length, SMALLEST_ANGLE)
         return cls(
-            start=np.broadcast_to(key_times[..., :-1], shape).ravel(),
-            rate=np.broadcast_to(2.0 / np.diff(key_times), shape).ravel(),
+            start=np.broadcast_to(key_times[..., :-1][..., wanted], shape).ravel(),
+            rate=np.broadcast_to(rates[..., wanted], shape).ravel(),
             centre=0.5 * (begin + end),
             chord=end - begin,
             middle=middle,
             difference=difference,
             quarter_angle=np.maximum(np.arctan2(change_length, total_length), SMALLEST_ANGLE),
             scales=None
-            if keys.scales is None
-            else np.stack((keys.scales[..., :-1].ravel(), keys.scales[..., 1:].ravel())),
+            if scales is None
+            else np.stack((scales[..., :-1][..., wanted].ravel(), scales[..., 1:][..., wanted].ravel())),
             keys=keys,
+            positions=positions,
+            quaternions=quaternions,
+            durations=2.0 / rates,
+            wanted=wanted,
         )
 
     @property
-    def is_still(self) -> np.ndarray:
-        """Whether nothing moves from one key to the next, but for rounding, shape (S,)."""
-        size = np.abs(self.centre).max(axis=0) + SMALLEST_ANGLE
-        still = (self.quarter_angle < STILL) & (np.abs(self.chord).max(axis=0) < STILL * size)
-        return still if self.scales is None else still & (np.abs(np.log(self.scales[1] / self.scales[0])) < STILL)
+    def are_still(self) -> np.ndarray:
+        """Whether nothing moves between two keys, but for rounding, of all segments of each object, (..., n - 1)."""
+        begin, end = self.positions
+        size = np.abs(0.5 * (begin + end)).max(axis=0) + SMALLEST_ANGLE
+        still = np.abs(end - begin).max(axis=0) < STILL * size
+        if not still.any():
+            return still
+        turn, growth = self.screws[:3], self.screws[6]
+        return still & (_length(turn) < 4.0 * STILL) & (np.abs(growth) < STILL)
 
     @cached_property
     def screws(self) -> np.ndarray:
-        """The twists that lead from one key to the next in one unit of time, and the growth of log scale: (7, S)."""
-        rows = np.zeros((7, self.start.size))
-        first, second = self.keys[..., :-1], self.keys[..., 1:]
-        rows[:6] = twists.between(
-            first.positions.reshape(-1, 3),
-            first.quaternions.reshape(-1, 4),
-            second.positions.reshape(-1, 3),
-            second.quaternions.reshape(-1, 4),
-        )
-        if self.scales is not None:
-            rows[6] = np.log(self.scales[1] / self.scales[0])
+        """The twists that lead from one key to the next in one unit of time, and the growth of log scale.
+
+        Of all segments of each object, shape (7, ..., n - 1).
+        """
+        (begin, end), (first, second) = ([_flat(rows).T for rows in two] for two in (self.positions, self.quaternions))
+        rows = np.zeros((7, *self.positions[0].shape[1:]))
+        rows[:6] = twists.between(begin, first, end, second).reshape(6, *rows.shape[1:])
+        if self.keys.scales is not None:
+            rows[6] = np.log(self.keys.scales[..., 1:] / self.keys.scales[..., :-1])
         return rows
 
     def decompose(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -127,8 +153,8 @@ class Segments:
 
         Where nothing turns there is no axis: n is zero, and the whole chord is across.
         """
-        (mw, *m), (dw, *d) = self.middle, self.difference
-        n = mw * np.stack(d) - dw * np.stack(m) - cross(d, m)
+        m, d = self.middle[1:], self.difference[1:]
+        n = self.middle[0] * d - self.difference[0] * m - cross(d, m)
         along = n * np.einsum("ks,ks->s", n, self.chord)
         return along, self.chord - along, cross(n, self.chord)
 
@@ -238,13 +264,15 @@ Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
 """What makes poses (m,) of some of the segments, (s,) of them: from how many there are in each, and their progress."""
 
 
-def prepare_within(curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses) -> Within:
+def prepare_within(
+    curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses, wanted: slice = slice(None)
+) -> Within:
     """What makes poses between keys where each segment says how many there are in it, and each how far it has come.
 
-    `key_times` and keys are (..., n), at least two a row and with unit quaternions; their segments are counted
-    throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both.
+    `key_times` and keys are (..., n), at least two a row and with unit quaternions; of each row, the `wanted` segments
+    are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both.
     """
-    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales))
+    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales), wanted)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
     def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:
@@ -301,7 +329,7 @@ def _filler(mode: Curves, reach: float) -> Fill:
 
 def _pieces(segments: Segments, bends: np.ndarray) -> int:
     """How many pieces a segment needs to be cut into for power series."""
-    rates = np.concatenate((segments.screws[:, None], bends), axis=1)
+    rates = np.concatenate((segments.screws.reshape(7, 1, -1), bends), axis=1)
     turns = np.sqrt(np.einsum("kbs,kbs->bs", rates[:3], rates[:3])) + np.abs(rates[6])
     return max(1, math.ceil((turns[0] + turns[1:].max(axis=0)).max() / TURN))
 
@@ -377,10 +405,16 @@ def _bend(
         out[7] *= np.exp(np.clip(added[6], -MOST_GROWTH, MOST_GROWTH, out=added[6]))
 
 
-def _components(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., k) one after the other as components (k, S)."""
-    return np.ascontiguousarray(vectors.reshape(-1, vectors.shape[-1]).T)
+def _ends(vectors: np.ndarray) -> Ends:
+    """Vectors (..., n, k) that segments begin at and end at, as components without gaps, (k, ..., n - 1)."""
+    rows = components(vectors)
+    return np.ascontiguousarray(rows[..., :-1]), np.ascontiguousarray(rows[..., 1:])
+
+
+def _flat(rows: np.ndarray) -> np.ndarray:
+    """Components (k, ...) one after the other, (k, S)."""
+    return np.ascontiguousarray(rows).reshape(len(rows), -1)
 
 
 def _length(components: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.einsum("ks,ks->s", components, components))
+    return np.sqrt(np.einsum("k...,k...->...", components, components))

@@ -17,11 +17,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses, check_recording, check_wishes
-from .key_search import Keys, Recording, Search
+from .key_costs import Recording
+from .key_search import Keys, Search
 from .measures import shell_error
 from .modes import interpolate, mode_named
-from .poses import LIMIT, PackedPoses, Poses, inverse, placed
+from .poses import LIMIT, PackedPoses, Poses, reshaped
 from .quaternions import align_signs, normalise
+from .skeleton_levels import Level
 from .skeletons import Skeleton
 
 SOME_TURN = 1e-12
@@ -137,7 +139,7 @@ def reduce_skeleton_keys(
     if len(times) <= 1:
         return (np.arange(len(times)),) * len(skeleton)
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    body = _Body(times, poses, skeleton, mode, radii, weights, free)
+    body = Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
         keys = body.key_poses(tolerance, budget, tries)
         every = np.arange(len(times))
@@ -145,7 +147,7 @@ def reduce_skeleton_keys(
     return body.own_keys(tolerance) if tolerance is not None else body.own_keys_within(budget)
 
 
-class _Body:
+class Body:
     """The recording of a body, and what it is measured by. Errors are weighted."""
 
     def __init__(
@@ -165,10 +167,16 @@ class _Body:
         for joint in range(len(skeleton)):
             check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
 
-    def errors(self, shown: Poses, samples: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown."""
+    def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
+        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
         there = self.skeleton.in_root_space(shown)
-        return shell_error(there, self.truth[:, samples], self.radii[:, None]) * self.weights[:, samples]
+        if samples is None:
+            return shell_error(there, self.truth, self.radii[:, None]) * self.weights
+        return shell_error(there, self.packed_truth[samples], self.radii[:, None]) * self.weights[:, samples]
+
+    @cached_property
+    def packed_truth(self) -> PackedPoses:
+        return PackedPoses(self.truth)
 
     def shown(self, joint: int, keys: np.ndarray) -> Poses:
         """What a joint does between keys (k,), shape (n,)."""
@@ -227,17 +235,17 @@ class _Body:
 class _WholeBody(Recording):
     """All joints at once, with the same keys: the error of a sample is the largest of any joint."""
 
-    def __init__(self, body: _Body, tolerance: float) -> None:
+    def __init__(self, body: Body, tolerance: float) -> None:
         # What stands still in its parent's space is the same between any keys.
         moves = _moves(body.poses) & body.free
         moves[0] |= not moves.any()
         super().__init__(body.times, body.poses[moves], body.mode, 0.0, tolerance)
-        self.body, self.moving = body, np.flatnonzero(moves)
+        self.body, self.moving, self.everything = body, np.flatnonzero(moves), PackedPoses(body.poses)
 
     def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
-        everything = self.body.poses[:, samples]
+        everything = self.everything[samples]
         everything[self.moving] = shown
-        return self.body.errors(everything, samples).max(axis=0) / self.tolerance[samples]
+        return self.in_tolerances(self.body.errors(everything, samples).max(axis=0), samples)
 
 
 class _OwnKeys:
@@ -249,7 +257,7 @@ class _OwnKeys:
     since these do not move one another, with what hangs on them and what they hang on as it is shown by then.
     """
 
-    def __init__(self, body: _Body, tolerance: float) -> None:
+    def __init__(self, body: Body, tolerance: float) -> None:
         self.body, self.tolerance, self.shown = body, tolerance, body.poses.copy()
         every = np.arange(len(body.times))
         self.keys = [body.middles[[joint]] if free else every for joint, free in enumerate(body.free.tolist())]
@@ -272,7 +280,7 @@ class _OwnKeys:
         if len(moving):
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
             size, share = sizes[moving].ravel(), shares[moving].ravel()
-            search = Search(Recording(times, _tracks(body.poses[moving]), body.mode, size, share, starts))
+            search = Search(Recording(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
             self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
 
     def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
@@ -314,14 +322,14 @@ class _OwnKeys:
         joints = np.array(movable, dtype=np.int64)
         if not len(joints):
             return
-        level = _Level(self, joints)
+        level = Level(self.body, joints, self.shown, self.tolerance)
         rests = level.may_rest()
         for joint in joints[rests].tolist():
             self._show(joint, self.body.middles[[joint]])
         joints = joints[~rests]
         if len(joints):
             count = len(self.body.times)
-            search = Search(_Level(self, joints) if rests.any() else level)
+            search = Search(Level(self.body, joints, self.shown, self.tolerance) if rests.any() else level)
             tracks = [count * place + self.keys[joint] for place, joint in enumerate(joints.tolist())]
             self._take(joints, search.refined(search.thinned(search.measured(np.concatenate(tracks)), 1.0)))
 
@@ -358,70 +366,12 @@ class _OwnKeys:
             self._show(joint, np.union1d(self.keys[joint], (*ends, *np.flatnonzero(wanted[joint]))))
 
 
-class _Level(Recording):
-    """Joints that do not hang on one another, as tracks: the error of a sample is the largest of what hangs on one."""
-
-    def __init__(self, keys: _OwnKeys, joints: np.ndarray) -> None:
-        self.body, self.joints = keys.body, joints
-        times, below = self.body.times, self.body.skeleton.below
-        poses = _tracks(self.body.poses[joints])
-        starts = len(times) * np.arange(len(joints))
-        super().__init__(np.tile(times, len(joints)), poses, self.body.mode, 0.0, keys.tolerance, starts)
-        weighs, self.weights = self.body.weights.any(axis=1), self.body.weights.ravel()
-        weighty = [below[joint][weighs[below[joint]]] for joint in joints.tolist()]
-        self.counts = np.array([len(hanging) for hanging in weighty])
-        self.hanging = np.concatenate(weighty)
-        self.first = np.cumsum(self.counts) - self.counts
-        there = self.body.skeleton.in_root_space(keys.shown)
-        above = self.body.skeleton.parents[joints]
-        on_roots = above < 0
-        parents = there[np.where(on_roots, 0, above)]
-        parents.positions[on_roots], parents.quaternions[on_roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
-        if parents.scales is not None:
-            parents.scales[on_roots] = 1.0
-        self.parents, self.back, self.there, self.wanted = (
-            PackedPoses(_tracks(poses)) for poses in (parents, inverse(there[joints]), there, self.body.truth)
-        )
-
-    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
-        count = len(self.body.times)
-        track, moment = np.divmod(samples, count)
-        # What moves a joint from where it is to where it would be moves all that hangs on it.
-        moved_by = PackedPoses(placed(placed(self.parents[samples], shown), self.back[samples]))
-        counts = self.counts[track]
-        first = np.cumsum(counts) - counts
-        pair = np.repeat(np.arange(len(samples)), counts)
-        joint = self.hanging[(self.first[track] - first)[pair] + np.arange(len(pair))]
-        there = count * joint + moment[pair]
-        moved = placed(moved_by[pair], self.there[there])
-        errors = shell_error(moved, self.wanted[there], self.body.radii[joint]) * self.weights[there]
-        found = np.zeros(len(samples))
-        some = counts > 0
-        found[some] = np.maximum.reduceat(errors, first[some]) if len(errors) else 0.0
-        return found / self.tolerance[samples]
-
-    def may_rest(self) -> np.ndarray:
-        """Which of the joints need not move at all, shape (joints,)."""
-        still = _tracks(self.body.at_rest()[self.joints])
-        errors = self.errors(np.arange(len(self.times)), still)
-        return errors.reshape(len(self.joints), -1).max(axis=1) <= 1.0
-
-
 def _spread(one: Poses, over: Poses) -> Poses:
     """Poses (joints, 1) for all moments of others (joints, n)."""
     return Poses(
         np.broadcast_to(one.positions, over.positions.shape),
         np.broadcast_to(one.quaternions, over.quaternions.shape),
         None if one.scales is None else np.broadcast_to(one.scales, over.scales.shape),
-    )
-
-
-def _tracks(poses: Poses) -> Poses:
-    """Poses (joints, n) one joint behind the other, (joints * n,)."""
-    return Poses(
-        poses.positions.reshape(-1, 3),
-        poses.quaternions.reshape(-1, 4),
-        None if poses.scales is None else poses.scales.ravel(),
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses
-from .poses import Poses, placed
+from .poses import PackedPoses, Poses, placed
 
 
 class Skeleton:
@@ -110,7 +110,7 @@ class Skeleton:
         check_poses(poses, "poses")
         if poses.shape[:1] != (len(self),):
             raise ValueError(f"poses of shape {poses.shape} do not fit {len(self)} joints, which come first")
-        there = poses.copy()
+        there = PackedPoses(poses)
         for joints in self.levels[1:]:
-            there[joints] = placed(there[self.parents[joints]], poses[joints])
-        return there
+            there.put(joints, placed(there.of(self.parents[joints]), there.of(joints)))
+        return there.of(slice(None))

@@ -1,0 +1,204 @@
+"""What it costs to leave out the samples between keys: errors of a recording, segment by segment.
+
+The search for keys comes back to the same segments again and again: a segment is worked out once, and remembered by
+the keys that have a say in it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from .measures import shell_error
+from .modes import MODES
+from .piecewise import blocks
+from .poses import PackedPoses, Poses, beyond, reshaped
+from .segments import prepare_within
+
+WORST = 1e30
+"""Errors are clipped to this, so that their powers stay finite."""
+
+BATCH = 2**14
+"""Poses looked at in one go: few enough for the processor's caches."""
+
+LOOKED_UP = 2**16
+"""Segments looked up in one go."""
+
+REMEMBERED = 2**18
+"""Segments, about: then all are forgotten, so that long recordings do not fill the memory."""
+
+Found = tuple[np.ndarray, np.ndarray]
+"""The costs and the peaks of segments."""
+
+
+class Recording:
+    """What keys are searched for: tracks of samples, one behind the other, each of which gets keys of its own.
+
+    Parameters
+    ----------
+    times : array, shape (n,)
+        Rising within each track.
+    poses : Poses, shape (..., n)
+        At these times; what has leading axes moves together and has the same keys.
+    mode : str
+        What fills in between keys.
+    radius, tolerance : float or array, shape (n,)
+        Of the shell error. Errors are counted in tolerances.
+    starts : array of int, optional
+        The first sample of each track; one track, otherwise.
+    """
+
+    def __init__(
+        self,
+        times: np.ndarray,
+        poses: Poses,
+        mode: str,
+        radius: float | np.ndarray,
+        tolerance: float | np.ndarray = 1.0,
+        starts: np.ndarray | None = None,
+    ) -> None:
+        self.times, self.poses, self.mode = times, poses, mode
+        self.radius, self.tolerance = np.asarray(radius), np.asarray(tolerance)
+        self.starts = np.zeros(1, dtype=np.int64) if starts is None else starts
+        self.ends = np.append(self.starts[1:], len(times)) - 1
+        self.truth = PackedPoses(poses)
+        self.poses_each = float(math.prod(poses.shape[:-1]))
+        """How many poses are looked at for the error of a sample, on average."""
+
+    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
+        """How far what is shown (..., m) is off at some samples (m,), in tolerances, shape (m,)."""
+        return self.in_tolerances(shell_error(shown, self.truth[samples], _at(self.radius, samples)), samples)
+
+    def in_tolerances(self, errors: np.ndarray, samples: np.ndarray) -> np.ndarray:
+        """Errors (m,) at some samples (m,) in multiples of the tolerance there."""
+        return errors / _at(self.tolerance, samples)
+
+
+class Costs:
+    """What segments of a recording cost, and their peaks.
+
+    Parameters
+    ----------
+    recording : Recording
+    power : int
+        Of two. The cost is the sum of this power of the errors at the samples between two keys, the peak is the
+        largest of these errors.
+    """
+
+    def __init__(self, recording: Recording, power: int) -> None:
+        self.recording, self.power = recording, power
+        mode = MODES[recording.mode]
+        self.reach = max(mode.behind, mode.ahead)
+        """How many segments beyond the two next to it a key influences, on either side."""
+        self.keys = 2 + 2 * self.reach
+        """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
+        self._numbers: defaultdict[bytes, int] = defaultdict(itertools.count().__next__)
+        self._found = np.empty((REMEMBERED + LOOKED_UP, 2))
+
+    def of(self, segments: np.ndarray) -> Found:
+        """Costs and peaks (...) of segments (..., keys), zero where there is no sample between their keys."""
+        rows = segments.reshape(-1, self.keys)
+        filled = np.flatnonzero(_counts(rows, self.reach) > 0)
+        found = np.zeros((len(rows), 2))
+        for first in range(0, len(filled), LOOKED_UP):
+            some = filled[first : first + LOOKED_UP]
+            found[some] = self._remembered(rows[some])
+        return found[:, 0].reshape(segments.shape[:-1]), found[:, 1].reshape(segments.shape[:-1])
+
+    def effort(self, segments: np.ndarray) -> float:
+        """How many poses are to be looked at, at most, for segments (..., keys)."""
+        return self.recording.poses_each * _counts(segments.reshape(-1, self.keys), self.reach).sum()
+
+    def errors(self, segments: np.ndarray) -> np.ndarray:
+        """The error at every sample between the keys of segments (s, keys), in tolerances, zero elsewhere, (n,)."""
+        errors = np.zeros(len(self.recording.times))
+        for batch, counts in self._batches(segments[_counts(segments, self.reach) > 0]):
+            samples, errors_there = self._errors(batch, counts)
+            errors[samples] = errors_there
+        return errors
+
+    def _remembered(self, rows: np.ndarray) -> np.ndarray:
+        """Costs beside peaks, shape (s, 2), of segments (s, keys) with samples in them."""
+        numbers = self._numbers
+        if len(numbers) > REMEMBERED:
+            self._numbers = numbers = defaultdict(itertools.count().__next__)
+        before = len(numbers)
+        codes = np.ascontiguousarray(rows).view(f"V{rows.itemsize * self.keys}").ravel().tolist()
+        places = np.fromiter(map(numbers.__getitem__, codes), np.int64, len(codes))
+        if len(numbers) > before:
+            new = np.flatnonzero(places >= before)
+            firsts = np.empty(len(numbers) - before, dtype=np.int64)
+            firsts[places[new] - before] = new
+            self._work_out(rows[firsts], self._found[before : len(numbers)])
+        return self._found[places]
+
+    def _work_out(self, rows: np.ndarray, out: np.ndarray) -> None:
+        """Fill out (s, 2) with the costs and peaks of segments (s, keys)."""
+        done = 0
+        for batch, counts in self._batches(rows):
+            _, errors = self._errors(batch, counts)
+            found, begins = out[done : done + len(batch)], np.cumsum(counts) - counts
+            found[:, 0] = np.add.reduceat(self._powers(errors), begins)
+            found[:, 1] = np.maximum.reduceat(errors, begins)
+            done += len(batch)
+
+    def _powers(self, errors: np.ndarray) -> np.ndarray:
+        """By squaring, which is quicker than a power."""
+        for _ in range(self.power.bit_length() - 1):
+            errors = errors * errors
+        return errors
+
+    def _batches(self, rows: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Segments (s, keys), a batch at a time, and how many samples there are in each, (s,)."""
+        counts = _counts(rows, self.reach)
+        bounds = math.prod(self.recording.poses.shape[:-1]) * np.append(0, np.cumsum(counts))
+        for some, _ in blocks(bounds, BATCH):
+            yield rows[some], counts[some]
+
+    def _errors(self, rows: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Samples (n,) and their errors (n,) in segments (s, keys) with so many of them in each, (s,)."""
+        recording, before = self.recording, self.reach
+        samples = np.repeat(rows[:, before] + 1 - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
+        key_times, keys = _with_ends(recording, rows, self.reach)
+        starts, rates = key_times[:, before], 1.0 / (key_times[:, before + 1] - key_times[:, before])
+        progress = (recording.times[samples] - np.repeat(starts, counts)) * np.repeat(rates, counts)
+        together = keys.shape[:-2]
+        within = prepare_within(MODES[recording.mode].curves, key_times, keys, slice(before, before + 1))
+        of_all = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
+        shown = within(*of_all, slice(None))
+        return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
+
+
+def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    """The number of each of some samples (m,), or the one that all have."""
+    return numbers[samples] if numbers.ndim else numbers
+
+
+def _counts(rows: np.ndarray, reach: int) -> np.ndarray:
+    """How many samples there are between the two keys of segments (s, keys), none where there are no keys, (s,)."""
+    first, second = rows[:, reach], rows[:, reach + 1]
+    return np.where((first >= 0) & (second >= 0), second - first - 1, 0)
+
+
+def _with_ends(recording: Recording, rows: np.ndarray, reach: int) -> tuple[np.ndarray, Poses]:
+    """Times (s, keys) and poses (..., s, keys) of samples; where there are none, the motion of the ends goes on."""
+    key_times, keys = recording.times[rows], recording.truth[rows]
+    if rows.min() >= 0:
+        return key_times, keys
+    missing = [np.count_nonzero(columns < 0, axis=1) for columns in (rows[:, :reach], rows[:, reach + 2 :])]
+    where = [np.flatnonzero(count) for count in missing]
+    inwards = np.repeat((1, -1), [len(some) for some in where])
+    (before, after), row = (count[some] for count, some in zip(missing, where, strict=True)), np.concatenate(where)
+    missing, outermost = np.concatenate((before, after)), np.concatenate((before, rows.shape[1] - 1 - after))
+    duration = key_times[row, outermost + inwards] - key_times[row, outermost]
+    for step in range(1, 1 + missing.max()):
+        some = missing >= step
+        here, inward = row[some], inwards[some]
+        column = outermost[some] - step * inward
+        key_times[here, column] = key_times[here, outermost[some]] - step * duration[some]
+        keys[..., here, column] = beyond(keys[..., here, column + inward], keys[..., here, column + 2 * inward])
+    return key_times, keys

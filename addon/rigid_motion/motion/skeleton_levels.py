@@ -1,0 +1,117 @@
+"""Joints of a body that do not hang on one another, as tracks of one recording: what is on them counts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .key_costs import Recording
+from .measures import largest_displacement
+from .piecewise import blocks
+from .poses import PackedPoses, Poses, inverse, placed, reshaped
+from .quaternions import components, conjugate, cross, matrices, multiply
+
+if TYPE_CHECKING:
+    from .skeleton_reduction import Body
+
+AT_ONCE = 2**13
+"""Joints that are looked at in one go, for the processor's caches."""
+
+
+class Level(Recording):
+    """The error of a sample is the largest of what hangs on its joint.
+
+    Parameters
+    ----------
+    body : Body
+    joints : array of int, shape (j,)
+        No two of them hang on one another.
+    shown : Poses, shape (joints, n)
+        How all joints of the body are shown by now, in their parents' space.
+    tolerance : float
+        Of the shell error.
+    """
+
+    def __init__(self, body: Body, joints: np.ndarray, shown: Poses, tolerance: float) -> None:
+        self.body, self.joints = body, joints
+        count, below = len(body.times), body.skeleton.below
+        starts = count * np.arange(len(joints))
+        poses = reshaped(body.poses[joints], -1)
+        super().__init__(np.tile(body.times, len(joints)), poses, body.mode, 0.0, tolerance, starts)
+        weighs = body.weights.any(axis=1)
+        weighty = [below[joint][weighs[below[joint]]] for joint in joints.tolist()]
+        self.counts = np.array([len(hanging) for hanging in weighty])
+        self.poses_each = self.counts.mean()
+        self.first = np.cumsum(self.counts) - self.counts
+        there = body.skeleton.in_root_space(shown)
+        above = body.skeleton.parents[joints]
+        on_roots = above < 0
+        parents = there[np.where(on_roots, 0, above)]
+        parents.positions[on_roots], parents.quaternions[on_roots] = 0.0, (1.0, 0.0, 0.0, 0.0)
+        if parents.scales is not None:
+            parents.scales[on_roots] = 1.0
+        self.parents, self.back = (PackedPoses(reshaped(poses, -1)) for poses in (parents, inverse(there[joints])))
+        hanging = np.concatenate(weighty)
+        self.carried = _Carried(there[hanging], body.truth[hanging], body.radii[hanging], body.weights[hanging])
+
+    def errors(self, samples: np.ndarray, shown: Poses) -> np.ndarray:
+        track, moment = np.divmod(samples, len(self.body.times))
+        # What moves a joint from where it is to where it would be moves all that hangs on it.
+        by = placed(placed(self.parents[samples], shown), self.back[samples])
+        largest = self.carried.largest_errors(moment, self.first[track], self.counts[track], by)
+        return self.in_tolerances(largest, samples)
+
+    def may_rest(self) -> np.ndarray:
+        """Which of the joints need not move at all, shape (joints,)."""
+        matter, count = self.counts > 0, len(self.body.times)
+        still = reshaped(self.body.at_rest()[self.joints[matter]], -1)
+        errors = self.errors(np.flatnonzero(np.repeat(matter, count)), still)
+        rest = ~matter
+        rest[matter] = errors.reshape(-1, count).max(axis=1) <= 1.0
+        return rest
+
+
+class _Carried:
+    """Balls on joints (j,) that are carried along: where they are and where they should be, poses (j, n)."""
+
+    def __init__(self, there: Poses, wanted: Poses, radii: np.ndarray, weights: np.ndarray) -> None:
+        self.radii, self.joints = radii, len(radii)
+        turned = multiply(there.quaternions, conjugate(wanted.quaternions))
+        rows = [weights, *components(there.positions), *components(wanted.positions), *components(turned)]
+        if there.scales is not None:
+            rows += [there.scales, wanted.scales]
+        # Moment by moment, so that what is looked at together is next to one another in memory.
+        self.rows = np.stack([row.T.ravel() for row in rows])
+
+    def largest_errors(self, moments: np.ndarray, first: np.ndarray, counts: np.ndarray, by: Poses) -> np.ndarray:
+        """The largest error of so many joints from `first` on that poses move at moments, all of them of shape (m,)."""
+        motions = [*matrices(by.quaternions).reshape(9, -1), *components(by.positions), *components(by.quaternions)]
+        motions = np.stack(motions if by.scales is None else [*motions, by.scales])
+        found = np.empty(len(moments))
+        for some, pairs in blocks(np.append(0, np.cumsum(counts)), AT_ONCE):
+            begins = np.cumsum(counts[some]) - counts[some]
+            joints = np.repeat(first[some] - begins, counts[some]) + np.arange(pairs.stop - pairs.start)
+            rows = self.rows.take(np.repeat(self.joints * moments[some], counts[some]) + joints, axis=1)
+            errors = rows[0] * _errors(np.repeat(motions[:, some], counts[some], axis=1), rows[1:], self.radii[joints])
+            found[some] = np.maximum.reduceat(errors, begins)
+        return found
+
+
+def _errors(motions: np.ndarray, rows: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """The shell errors (p,) of balls (.., p) as `_Carried` has them, each moved on by a motion (.., p)."""
+    turn, positions, quaternions = motions[:9], motions[9:12], motions[12:16]
+    there, wanted, turned = rows[:3], rows[3:6], rows[6:10]
+    d = turn[0::3] * there[0]
+    d += turn[1::3] * there[1]
+    d += turn[2::3] * there[2]
+    if len(motions) > 16:
+        d *= motions[16]
+    d += positions
+    d -= wanted
+    v = cross(quaternions[1:], turned[1:])
+    v += quaternions[0] * turned[1:]
+    v += turned[0] * quaternions[1:]
+    if len(motions) == 16:
+        return largest_displacement(d, v, radius)
+    return largest_displacement(d, v, radius * motions[16] * rows[10], radius * rows[11])
