@@ -134,9 +134,9 @@ def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
     _limit_ranges(actions, set())
 
 
-def hold(place: SlotTransform) -> None:
-    """Have a slot hold what the NLA needs of it beside others that are filled in."""
-    if outlet_of(place).hold(place):
+def hold(place: SlotTransform, beside: Sequence[SlotTransform]) -> None:
+    """Have a slot hold what the NLA needs of it beside others that are filled in, which are among these."""
+    if outlet_of(place).hold(place, beside):
         _tag(place)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import logging
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import ClassVar
@@ -184,21 +185,27 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
     editable = [place for place in places if place.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.
     follow_ranges({place.slot.action for place in editable} - {place.slot.action for place, _ in stale})
-    for place in idle:
-        hold(place)
-    for place in _in_nla_with(editable):
-        hold(place)
+    _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
     for slot in {place.slot: None for place in editable if place.prefix} if len(editable) > 1 else ():
         remove_orphans(slot)
     return len(stale)
 
 
-def _in_nla_with(places: Sequence[SlotTransform]) -> list[SlotTransform]:
-    """All that moves the users of these in the NLA, where they have any; as it is by now."""
-    tracked = {user for place in places for user in place.users if len(user.animated.animation_data.nla_tracks)}
-    found = slot_transforms_of(tracked) if tracked else ()
-    return [place for place in found if place.slot.action.is_editable]
+def _hold(idle: Iterable[SlotTransform], edited: Iterable[SlotTransform]) -> None:
+    """Have slots hold what the NLA needs of them: all that move what was edited, and those that are not filled in."""
+    tracked = {user for place in edited for user in place.users if len(user.animated.animation_data.nla_tracks)}
+    for place in idle:
+        if tracked.isdisjoint(place.users):
+            hold(place, ())
+    in_nla = slot_transforms_of(tracked) if tracked else []
+    beside: defaultdict[Transform, list[SlotTransform]] = defaultdict(list)
+    for place in in_nla:
+        for user in place.users:
+            beside[user].append(place)
+    for place in in_nla:
+        if place.slot.action.is_editable:
+            hold(place, [other for user in place.users for other in beside[user]])
 
 
 def _is_wanted(place: SlotTransform, source: Source | Refused, before: str) -> bool:

@@ -6,14 +6,14 @@ a constraint takes, its evaluation time says, see `times`.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
 from ...actions.records import record_constraint, recorded_digest
-from ...actions.slots import Slot, SlotTransform, slot_transforms_of
+from ...actions.slots import Slot, SlotTransform, slot_transforms_of, uses_of
 from ...actions.sources import Source
 from ...transforms import (
     CONSTRAINT,
@@ -99,12 +99,15 @@ class Constraints(Outlet):
                 difference[row] = fcurve.evaluate(at)
         return _weighted(difference, constraint.influence, user)
 
-    def hold(self, place: SlotTransform) -> bool:
-        held = held_by(place)
+    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+        held = held_by(place, beside)
+        # An influence that has keys is the animator's.
         present = {
             channel: fcurve
             for channel, fcurve in place.curves.items()
-            if channel[0].startswith(constraint_path(place, CONSTRAINT)[:-2]) and fcurve != time_of(place)
+            if channel[0].startswith(constraint_path(place, CONSTRAINT)[:-2])
+            and fcurve != time_of(place)
+            and not fcurve.keyframe_points
         }
         for channel, fcurve in present.items():
             if channel not in held or not is_line(fcurve, held[channel]):
@@ -167,7 +170,10 @@ def _avoid_names(place: SlotTransform) -> None:
     taken = {
         constraint.name for user in place.users for constraint in user.carrier.constraints if not is_ours(constraint)
     }
-    tracked = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
+    # Where it is all that moves them, nothing else can have the name.
+    tracked = [
+        user for user in place.users if len(user.animated.animation_data.nla_tracks) and len(uses_of(user.animated)) > 1
+    ]
     if tracked:
         others = slot_transforms_of(tracked)
         taken |= {name_of(other) for other in others if recorded_digest(other) and not is_same(other, place)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 import bpy
 import numpy as np
@@ -58,12 +58,12 @@ class Deltas(Outlet):
             difference[row] = user.animated.path_resolve(path)[index] if fcurve is None else fcurve.evaluate(frame)
         return difference
 
-    def hold(self, place: SlotTransform) -> bool:
+    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
         """While a strip plays whose Action lacks a channel that another strip's has, Blender puts it to its default:
         a slot without in-betweens holds its users' original differences for them."""
         if recorded_digest(place):
             return False
-        held, before = _held(place), place.filled
+        held, before = _held(place, beside), place.filled
         for user in place.users:
             user.note_original(held)
         is_new = hold_constants(place, GROUP, before, held)
@@ -90,9 +90,9 @@ def _is_overwritten(user: ObjectTransform, filled: dict[Channel, bpy.types.FCurv
     )
 
 
-def _held(place: SlotTransform) -> dict[Channel, float]:
+def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
     """The channels that a slot which is not filled in has to have, and what they hold."""
-    first, *others = (_held_for(user, place) for user in place.users)
+    first, *others = (_held_for(user, place, beside) for user in place.users)
     if any(held != first for held in others):
         return {}
     # What it does not key may be another strip's to move, below it, and then so are the differences of that.
@@ -104,7 +104,7 @@ def _held(place: SlotTransform) -> dict[Channel, float]:
     }
 
 
-def _held_for(user: ObjectTransform, place: SlotTransform) -> dict[Channel, float]:
+def _held_for(user: ObjectTransform, place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
     if not len(user.animated.animation_data.nla_tracks):
         return {}
     originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
@@ -113,10 +113,9 @@ def _held_for(user: ObjectTransform, place: SlotTransform) -> dict[Channel, floa
         for path, values in originals.items()
         if all(map(math.isfinite, values)) and values != default_of(path)
     }
-    # All objects of the file are gone through for the rest: only for the few that have delta transforms of their own.
     if not (originals and is_replacing(user.animated, place.slot)):
         return {}
-    filled = {path for other in slot_transforms_of([user]) if recorded_digest(other) for path, _ in other.filled}
+    filled = {path for other in beside if user in other.users and recorded_digest(other) for path, _ in other.filled}
     return {
         (path, index): value
         for path, values in originals.items()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -47,8 +47,11 @@ class Outlet(ABC):
         """
 
     @abstractmethod
-    def hold(self, place: SlotTransform) -> bool:
-        """Have a slot hold what the NLA needs of it beside others that are filled in. Whether that was new to it."""
+    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+        """Have a slot hold what the NLA needs of it beside others that are filled in. Whether that was new to it.
+
+        `beside` is what moves the same users in the NLA, the place itself among it.
+        """
 
     @abstractmethod
     def release(self, transforms: Iterable[Transform]) -> None:

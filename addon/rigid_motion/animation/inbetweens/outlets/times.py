@@ -11,13 +11,14 @@ blends what is keyed, and so that the times do not, each Action has the time of 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
 from ...actions.channels import add_cycles, replace_keys
 from ...actions.records import recorded
-from ...actions.slots import Slot, SlotTransform, slot_transforms_of, strips_of
+from ...actions.slots import Slot, SlotTransform, strips_of
 from ...curves import Cycles
 from ...transforms import (
     CONSTRAINT,
@@ -71,13 +72,16 @@ def _duration(last: int) -> int:
     return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
 
 
-def held_by(place: SlotTransform) -> dict[Channel, Line]:
-    """What an Action has of constraints in the NLA of a rig: of its own the influence, of the others the time too."""
+def held_by(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, Line]:
+    """What an Action has of constraints in the NLA of a rig: of its own the influence, of the others the time too.
+
+    The others are among what is `beside` it there.
+    """
     user = place.users[0]
     if not (len(user.animated.animation_data.nla_tracks) and _moves_bone(place)):
         return {}
     held: dict[Channel, Line] = {}
-    others = [other for other in slot_transforms_of([user]) if not is_same(other, place) and _moves_bone(other)]
+    others = [other for other in beside if user in other.users and not is_same(other, place) and _moves_bone(other)]
     for other in others:
         if other.filled:
             held[influence_path(other), 0] = (0.0, 0.0)
