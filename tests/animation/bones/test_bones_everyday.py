@@ -8,9 +8,18 @@ import pytest
 
 from rigid_motion.animation import bake, problem_of, set_mode
 from tests.animation.bones.poses import assert_posed
-from tests.animation.bones.rigs import ARM, PLAYED, key_bone, moving_rig, new_rig, with_edit_bones, write_bone
+from tests.animation.bones.rigs import (
+    ARM,
+    PLAYED,
+    key_bone,
+    moving_rig,
+    new_rig,
+    own_constraints,
+    with_edit_bones,
+    write_bone,
+)
 from tests.animation.oracle import curves_of, expected_bases
-from tests.animation.scenes import key, new_object
+from tests.animation.scenes import key, new_object, push_down
 
 
 def keyed_body(frames: tuple[float, ...]) -> bpy.types.PoseBone:
@@ -132,3 +141,38 @@ def test_what_is_baked_in_place_of_a_muted_channel_is_to_be_seen(live_file, carr
     bake(moved)
     bpy.context.view_layer.update()
     assert np.abs(expected_bases(moved, PLAYED) - wanted).max() < 1e-5
+
+
+def pushed_down(bone: bpy.types.PoseBone) -> None:
+    push_down(bone.id_data)
+
+
+def turned_by_axis_and_angle_and_back(bone: bpy.types.PoseBone) -> None:
+    for mode in ("AXIS_ANGLE", "QUATERNION"):
+        bone.rotation_mode = mode
+        bpy.context.view_layer.update()
+
+
+def given_blenders_in_betweens_and_back(bone: bpy.types.PoseBone) -> None:
+    for mode in ("BLENDER", "dq_sclerp"):
+        set_mode(bone, mode)
+        bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize(
+    "deed",
+    [pushed_down, turned_by_axis_and_angle_and_back, given_blenders_in_betweens_and_back],
+    ids=lambda deed: deed.__name__,
+)
+def test_keys_on_the_influence_of_a_constraint_stay_when_its_bone_is(live_file, deed):
+    bone = moving_rig().pose.bones["Lower"]
+    (constraint,) = own_constraints(bone.id_data)["Lower"]
+    for frame, influence in ((1, 0.0), (40, 1.0)):
+        constraint.influence = influence
+        constraint.keyframe_insert("influence", frame=frame)
+    action = bone.id_data.animation_data.action
+    deed(bone)
+    bpy.context.view_layer.update()
+    fcurves = action.layers[0].strips[0].channelbags[0].fcurves
+    (influence,) = [fcurve for fcurve in fcurves if fcurve.data_path.endswith("influence")]
+    assert [tuple(point.co) for point in influence.keyframe_points] == [(1.0, 0.0), (40.0, 1.0)]

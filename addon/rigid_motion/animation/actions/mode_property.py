@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ..transforms import Transform
-from .records import has_in_betweens, has_mode, record_mode, recorded_mode
+from .records import NOTHING_RECORDED, has_in_betweens, has_mode, record_mode, recorded, recorded_mode
 from .slots import SlotTransform
 from .sources import MODE_NAMES, MODE_NUMBERS
 
@@ -27,6 +27,11 @@ def is_keyed(place: SlotTransform) -> bool:
     """Whether a mode channel decides."""
     fcurve = place.curves.get(place.users[0].mode_channel)
     return fcurve is not None and not fcurve.mute and len(fcurve.keyframe_points) > 0
+
+
+def has_to_do_with_modes(place: SlotTransform) -> bool:
+    """Whether a place has a mode, a channel for it, in-betweens, or a record of any of them."""
+    return recorded(place) != NOTHING_RECORDED or is_keyed(place) or bool(place.filled)
 
 
 def show_modes(places: Iterable[SlotTransform]) -> None:

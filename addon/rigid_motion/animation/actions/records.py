@@ -26,13 +26,16 @@ class Recorded(NamedTuple):
     constraint: str = ""
 
 
+NOTHING_RECORDED = Recorded()
+
+
 def recorded(place: SlotTransform) -> Recorded:
     """What is kept about a transform in a slot: looked up once, and again after it was changed by way of here."""
     found = place.__dict__.get("recorded")
     if found is None:
         record = _record_of(place)
         if record is None:
-            found = Recorded()
+            found = NOTHING_RECORDED
         else:
             mode = record.mode if record.is_property_set("mode") else None
             found = Recorded(mode, record.digest, record.rows, record.constraint)

@@ -17,7 +17,7 @@ from typing import ClassVar
 import bpy
 from bpy.app.handlers import persistent
 
-from ..actions.mode_property import adopt_from_properties, show_awaited, show_modes
+from ..actions.mode_property import adopt_from_properties, has_to_do_with_modes, show_awaited, show_modes
 from ..actions.reading import keyed_in, leading
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
@@ -38,6 +38,10 @@ from .outlets import outlet_of, release, remove_orphans
 log = logging.getLogger(__package__)
 
 
+BlockKey = tuple[str, str | None]
+"""What a data-block is found by in the file: its name, and the file that it is linked from."""
+
+
 class _State:
     """What the handlers share."""
 
@@ -56,8 +60,8 @@ class _State:
     frame = 0.0
     """The frame that was last shown."""
 
-    edited = False
-    """Whether an Action was edited before the frame changed. Afterwards all that are played look so."""
+    waiting: ClassVar[list[BlockKey]] = []
+    """The objects that a script has edited before it went on to another frame."""
 
     followed: ClassVar[set[int]] = set()
     """The Actions, by session id, that were followed before Blender evaluated them."""
@@ -148,10 +152,12 @@ def follow_original(transform: ObjectTransform) -> None:
         _refresh(slot_transforms_of([transform]))
 
 
-def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused] | None = None) -> int:
+def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused | None] | None = None) -> int:
     show_modes(places)
     if sources is None:
-        sources = keyed_in(places)
+        concerned = [place for place in places if has_to_do_with_modes(place)]
+        keyed = dict(zip(concerned, keyed_in(concerned), strict=True))
+        sources = [keyed.get(place) for place in places]
     stale, idle = [], []
     for place, source in zip(places, sources, strict=True):
         outlet_of(place).show(place)
@@ -208,12 +214,12 @@ def _hold(idle: Iterable[SlotTransform], edited: Iterable[SlotTransform]) -> Non
             hold(place, [other for user in place.users for other in beside[user]])
 
 
-def _is_wanted(place: SlotTransform, source: Source | Refused, before: str) -> bool:
+def _is_wanted(place: SlotTransform, source: Source | Refused | None, before: str) -> bool:
     """Whether there is more to a source than Blender's own in-betweens, and it can be had.
 
     `before` is the digest of what the slot is filled in from: that needs no second examination.
     """
-    if isinstance(source, Refused):
+    if source is None or isinstance(source, Refused):
         return False
     if source.digest != before:
         try:
@@ -262,8 +268,17 @@ def _edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Act
         return []
     # By name: the original of what was deleted just now is no longer there to be asked for.
     blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
-    found = (bpy.data.actions.get((block.name, block.library and block.library.filepath)) for block in blocks)
+    found = (bpy.data.actions.get(_key_of(block)) for block in blocks)
     return [action for action in found if action is not None]
+
+
+def _actions_to_evaluate(scene: bpy.types.Scene) -> set[bpy.types.Action]:
+    """The Actions that were edited since any of the scene's graphs was evaluated."""
+    return {action for layer in scene.view_layers for action in _edited_actions(layer.depsgraph)}
+
+
+def _key_of(block: bpy.types.ID) -> BlockKey:
+    return block.name, block.library and block.library.filepath
 
 
 def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Transform]) -> None:
@@ -275,7 +290,7 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
             # Only the original has an identity: that of the evaluated scene is 0.
             scene, frames = block.original, (block.frame_start, block.frame_end)
             if _State.ranges.get(scene.session_uid, frames) != frames:
-                edited += _all_under(scene.objects)
+                edited += _all_under(filter(_concerns_us, scene.objects))
             _State.ranges[scene.session_uid] = frames
         if isinstance(block, bpy.types.Object) and _concerns_us(block):
             for transform in _edited_in(block.original):
@@ -301,22 +316,22 @@ def _has_mode(obj: bpy.types.Object) -> bool:
 
 def _has_properties(obj: bpy.types.Object) -> bool:
     motion = obj.rigid_motion
-    return bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
+    return (
+        any(motion.filled) or bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
+    )
 
 
-def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
+def _before_evaluation(scene: bpy.types.Scene, frame: float) -> list[bpy.types.Object]:
     """Look at what was set and is not evaluated yet: what in-betweens will overwrite, and poses set in one go.
 
-    Returns whether there is any such object.
+    Returns the objects of which anything was, as far as they have to do with modes.
     """
-    edited = dict(_unevaluated(scene))
+    edited = {obj: depsgraph for obj, depsgraph in _unevaluated(scene) if _concerns_us(obj)}
     operator = _last_operator()
     name = operator[1] if operator != _State.operator else ""
     _State.operator = operator
     for obj, depsgraph in edited.items():
-        if not (_concerns_us(obj) and obj.is_editable):
-            continue
-        for place in filled_places_of(obj):
+        for place in filled_places_of(obj) if obj.is_editable else ():
             with _turn() as ours:
                 if ours:
                     outlet_of(place).prepare(place)
@@ -324,7 +339,7 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> bool:
                 for transform in place.users:
                     with suppress(Refused):
                         insertion.notice_assignment(transform, depsgraph, frame, operator=name)
-    return bool(edited)
+    return list(edited)
 
 
 def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
@@ -352,10 +367,23 @@ def _last_operator() -> tuple[int, str]:
 
 
 def _look_through(*_: object) -> None:
-    """Refresh all there is in the file."""
+    """Refresh all there is in the file, whatever it is."""
     _State.unseen = False
-    _State.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
+    _keep_ranges()
     refresh()
+
+
+def _look_again() -> None:
+    """Refresh all in the file that has anything to do with modes."""
+    if _State.unseen:
+        _look_through()
+    else:
+        _keep_ranges()
+        refresh(_all_under(filter(_concerns_us, bpy.data.objects)))
+
+
+def _keep_ranges() -> None:
+    _State.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
 
 
 def _careful(handler: Callable) -> Callable:
@@ -378,7 +406,7 @@ def _before_update(scene: bpy.types.Scene, *_: object) -> None:
     _State.frame = scene.frame_current_final
     _before_evaluation(scene, _State.frame)
     # In-betweens that are there by now are evaluated with the edit; later they would cost an evaluation of their own.
-    edited = {action for layer in scene.view_layers for action in _edited_actions(layer.depsgraph)}
+    edited = _actions_to_evaluate(scene)
     _State.followed = {action.session_uid for action in edited}
     _State.moved = _follow(edited)
     insertion.forget_poses(_State.moved)
@@ -400,19 +428,19 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @_careful
 def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
-    graphs = (layer.depsgraph for layer in scene.view_layers)
-    _State.edited = any(graph.id_type_updated("ACTION") for graph in graphs if graph is not None)
-    # A script that edits an object and goes on to another frame leaves no trace of which object it was.
-    _State.unseen |= _before_evaluation(scene, _State.frame)
+    # Edits that nobody has seen yet were made on the frame before this one. Afterwards all that is played looks edited.
+    _State.waiting = [_key_of(obj) for obj in _before_evaluation(scene, _State.frame)]
+    _follow(_actions_to_evaluate(scene))
 
 
 @_careful
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    # Edits that nobody has seen yet were made on the frame before this one.
+    edited = [obj for obj in map(bpy.data.objects.get, _State.waiting) if obj is not None]
     if _State.unseen:
         _look_through()
-    elif _State.edited:
-        _follow(_edited_actions(depsgraph))
+    elif edited:
+        refresh(_all_under(edited))
+    _State.waiting = []
     insertion.forget_poses()
     _State.frame = scene.frame_current_final
 
@@ -420,7 +448,7 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @_careful
 def _on_file(*_: object) -> None:
     _State.frame = bpy.context.scene.frame_current_final if bpy.context.scene else 0.0
-    _look_through()
+    _look_again()
 
 
 @_careful
@@ -437,6 +465,7 @@ def _on_load(*arguments: object) -> None:
     known_sources.forget_all()
     glances.forget_all()
     _State.graphs.clear()
+    _State.unseen = True
     with _turn() as ours:
         if ours:
             transforms = _all_under(bpy.data.objects)
