@@ -97,6 +97,7 @@ def test_a_rig_in_the_nla_is_not_gone_through_for_each_of_its_bones(live_file, m
     rig = moving_rig()
     push_down(rig)
     strip = rig.animation_data.nla_tracks[0].strips[0]
+    bpy.context.scene.frame_set(5)
     looks = []
     transforms_in = slots.transforms_in
     monkeypatch.setattr(slots, "transforms_in", lambda *asked: looks.append(asked) or transforms_in(*asked))
