@@ -13,6 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..curves import LARGEST, Keys
 from ..transforms import GROUP, Refused, Transform
+from .records import recorded_digest, recorded_rows
 from .slots import SlotTransform, is_filled_in
 from .sources import MODE_NAMES, UNKNOWN, Source
 
@@ -85,7 +86,7 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
     # The differences of bones are in a slot of their own.
     for channel in () if place.prefix else differences:
         fcurve = place.curves.get(channel)
-        if fcurve is not None and not is_filled_in(fcurve):
+        if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, place)):
             if fcurve.group is not None and fcurve.group.name == GROUP:
                 raise Refused(
                     rpt_(
@@ -99,6 +100,13 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
                     "{other} (Object > Apply > Animated Transforms to Deltas does the reverse)"
                 ).format(name=user.name, channel=_label(fcurve), other=_label_of(channel[0].rpartition("delta_")[2]))
             )
+
+
+def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, place: SlotTransform) -> bool:
+    """Whether in-betweens are in an F-curve that has been put into another group, or into none."""
+    channels = user.differences
+    written = [channels.get(row) for row in recorded_rows(place)] if recorded_digest(place) else []
+    return (fcurve.data_path, fcurve.array_index) in written and not fcurve.keyframe_points
 
 
 def refuse_linked(user: Transform, place: SlotTransform | None = None) -> None:

@@ -88,17 +88,25 @@ class SlotTransform:
         """What messages call it: the name of its first user."""
         return self.users[0].name
 
+    @property
+    def home(self) -> tuple[bpy.types.ActionChannelbag | None, str]:
+        """Where in-betweens are, or are to be, and the name of their group there."""
+        if self.prefix:
+            return self.slot.bones_channelbag, bone_name(self.prefix)
+        return self.channelbag, GROUP
+
     @cached_property
     def filled(self) -> Curves:
         """The F-curves that in-betweens are in. Who writes them sets it anew."""
-        if self.prefix:
-            channelbag = self.slot.bones_channelbag
-            group = None if channelbag is None else channelbag.groups.get(bone_name(self.prefix))
-        else:
-            group = None if self.channelbag is None else self.channelbag.groups.get(GROUP)
+        channelbag, name = self.home
+        group = None if channelbag is None else channelbag.groups.get(name)
         if group is None:
             return {}
-        return {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels if _is_sampled(fcurve)}
+        return {
+            (fcurve.data_path, fcurve.array_index): fcurve
+            for fcurve in group.channels
+            if not fcurve.keyframe_points and (self.prefix or is_difference(fcurve.data_path))
+        }
 
     def has_filled(self, curves: Curves) -> None:
         """Take note of the F-curves that in-betweens are in by now."""
@@ -281,16 +289,17 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
 
 
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve is one that in-betweens are in: sampled, and in the group of them."""
+    """Whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
     group = fcurve.group
-    return group is not None and group.name == GROUP and _is_sampled(fcurve)
+    is_ours = group is not None and group.name == GROUP
+    return is_ours and not fcurve.keyframe_points and is_difference(fcurve.data_path)
+
+
+def is_difference(path: str) -> bool:
+    """Whether a data path is that of a delta transform."""
+    return path.startswith("delta_")
 
 
 def is_time(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve says at what time a constraint of ours is."""
     return split_path(fcurve.data_path)[1].startswith(_TIMES)
-
-
-def _is_sampled(fcurve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve of the group of in-betweens is one of these, and no mode channel without keys."""
-    return not fcurve.keyframe_points and not fcurve.data_path.endswith(MODE_PROPERTY)

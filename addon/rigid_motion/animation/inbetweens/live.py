@@ -33,7 +33,7 @@ from ..transforms import ObjectTransform, Refused, Transform, let_override_be_re
 from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
-from .outlets import outlet_of, release, remove_orphans
+from .outlets import outlet_of, regroup, release, remove_orphans
 
 log = logging.getLogger(__package__)
 
@@ -164,6 +164,7 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         # What is linked has the in-betweens that its own file was saved with.
         if not place.slot.action.is_editable:
             continue
+        regroup(place)
         before = recorded_digest(place)
         if not _is_wanted(place, source, before):
             if before:

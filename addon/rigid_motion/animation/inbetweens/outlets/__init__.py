@@ -15,8 +15,9 @@ from ...transforms import BoneTransform, Transform
 from .constraints import Constraints, remove_orphans
 from .deltas import Deltas
 from .outlet import Outlet
+from .sampled import regroup
 
-__all__ = ["Outlet", "outlet_of", "release", "remove_orphans"]
+__all__ = ["Outlet", "outlet_of", "regroup", "release", "remove_orphans"]
 
 _DELTAS, _CONSTRAINTS = Deltas(), Constraints()
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
+from ...actions.records import recorded_rows
 from ...actions.slots import Curves, SlotTransform
 from ...transforms import Channel
 from ..layout import Layout
@@ -85,6 +86,20 @@ def put_away(channelbag: bpy.types.ActionChannelbag, group: str, fcurve: bpy.typ
     fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
     fcurve.lock = fcurve.hide = True
     fcurve.select = False
+
+
+def regroup(place: SlotTransform) -> None:
+    """Take F-curves with in-betweens back that have been put into another group, or into none."""
+    rows, (channelbag, group) = recorded_rows(place), place.home
+    if channelbag is None or len(place.filled) >= len(rows):
+        return
+    rotations = ("rotation_quaternion", "rotation_euler")
+    channels = [place.users[0].differences_for(rotation) for rotation in rotations]
+    for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
+        fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
+        if fcurve is not None and channel not in place.filled and not fcurve.keyframe_points:
+            put_away(channelbag, group, fcurve)
+            place.has_filled({**place.filled, channel: fcurve})
 
 
 def remove_if_empty(channelbag: bpy.types.ActionChannelbag, group: str) -> None:
