@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import modes_of, problem_of, refresh, set_mode
+from rigid_motion.animation import key_frames, modes_of, problem_of, read_poses, refresh, set_mode
 from tests.animation.oracle import Own, assert_shown, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, own_deltas
 
@@ -366,3 +366,24 @@ def test_what_is_deleted_with_an_edit_of_it_still_to_be_seen_is_asked_for_nothin
         else:
             bpy.context.view_layer.update()
     assert not live_file.scene.objects
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "pga_lerp", "motor_spline"])
+def test_two_keys_on_one_frame_leave_a_mode_to_the_object(live_file, mode):
+    """As Shift D does it, until they are moved apart."""
+    obj = key(new_object("Tool", "QUATERNION"), interpolation="LINEAR")
+    set_mode(obj, mode)
+    before = read_poses(obj, np.arange(1.0, 41.0))
+    for fcurve in curves_of(obj).values():
+        if fcurve.keyframe_points:
+            keys = fcurve.keyframe_points
+            keys.add(1)
+            keys[-1].co, keys[-1].interpolation = keys[1].co, "LINEAR"
+            keys.sort()
+            fcurve.update()
+    bpy.context.view_layer.update()
+    assert problem_of(obj) == ""
+    assert key_frames(obj).tolist() == [1.0, 11.0, 24.0, 40.0]
+    after = read_poses(obj, np.arange(1.0, 41.0))
+    np.testing.assert_allclose(after.positions, before.positions, atol=1e-5)
+    np.testing.assert_allclose(after.quaternions, before.quaternions, atol=1e-5)
