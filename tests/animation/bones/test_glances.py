@@ -140,24 +140,44 @@ def test_a_channel_that_was_made_anew_is_found_wherever_it_is_in_memory(rig):
 
 
 def test_bones_are_noticed_that_are_posed_or_turn_otherwise(rig):
-    assert glances.changed_bones(rig) == list(rig.pose.bones)
-    assert glances.changed_bones(rig) == []
+    assert glances.changed_bones(rig, 1.0) == list(rig.pose.bones)
+    assert glances.changed_bones(rig, 1.0) == []
     rig.pose.bones["Body"].location.x += 1e-3
     rig.pose.bones["Hand"].rotation_mode = "ZYX"
-    assert [bone.name for bone in glances.changed_bones(rig)] == ["Body", "Hand"]
-    assert glances.changed_bones(rig) == []
+    assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Body", "Hand"]
+    assert glances.changed_bones(rig, 1.0) == []
+
+
+def test_bones_that_another_frame_has_moved_are_not_taken_for_posed(rig):
+    bpy.context.scene.frame_set(5)
+    glances.changed_bones(rig, 5.0)
+    bpy.context.scene.frame_set(17)
+    rig.pose.bones["Body"].location.x += 1e-3
+    rig.pose.bones["Lower"].scale.x = 1.5
+    rig.pose.bones["Hand"].rotation_mode = "ZYX"
+    assert [bone.name for bone in glances.changed_bones(rig, 17.0)] == ["Body", "Lower", "Hand"]
+    assert glances.changed_bones(rig, 17.0) == []
+
+
+def test_where_a_channel_is_muted_what_another_frame_shows_is_a_pose(rig):
+    location(rig, "Upper").mute = True
+    bpy.context.scene.frame_set(5)
+    glances.changed_bones(rig, 5.0)
+    rig.pose.bones["Upper"].location.y = location(rig, "Upper").evaluate(17.0)
+    bpy.context.scene.frame_set(17)
+    assert [bone.name for bone in glances.changed_bones(rig, 17.0)] == ["Upper"]
 
 
 def test_a_constraint_that_is_switched_off_is_noticed(rig):
     constraint = rig.pose.bones["Upper"].constraints.new("ACTION")
     constraint.name, constraint.use_eval_time = "Rigid Motion", True
-    glances.changed_bones(rig)
+    glances.changed_bones(rig, 1.0)
     constraint.mute = True
-    assert [bone.name for bone in glances.changed_bones(rig)] == ["Upper"]
+    assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Upper"]
 
 
 def test_all_bones_count_as_other_after_one_was_made(rig):
-    glances.changed_bones(rig)
+    glances.changed_bones(rig, 1.0)
     with_edit_bones(rig, lambda bones: setattr(bones.new("Finger"), "tail", (0.0, 0.0, 1.0)))
     key_bone(rig.pose.bones["Finger"])
-    assert glances.changed_bones(rig) == list(rig.pose.bones)
+    assert glances.changed_bones(rig, 1.0) == list(rig.pose.bones)

@@ -7,19 +7,20 @@ that means nothing, of what is selected for example, counts too: whether in-betw
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import bpy
 import numpy as np
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..actions.slots import Curves, Slot, SlotTransform, transforms_in, transforms_with, uses_of
-from ..transforms import WIDTHS, is_ours, split_path
+from ..transforms import WIDTHS, Channel, is_ours, prefix_of, split_path
 
 _looks: dict[tuple[int, int], _Look] = {}
 """At the slots of rigs, the last of each: by the Action's session id, and the slot's handle."""
 
-_rigs: dict[int, tuple[object, _States]] = {}
-"""Of each rig what moves it, and what its bones were, by its session id."""
+_rigs: dict[int, tuple[object, _States, float]] = {}
+"""Of each rig what moves it, what its bones were, and on which frame, by its session id."""
 
 
 def forget_all() -> None:
@@ -158,6 +159,13 @@ def _size_of_key(channels: Sequence[bpy.types.bpy_prop_collection]) -> int:
     return _key_size
 
 
+_COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
+"""What the columns of `_States.numbers` are, but for the last one: the rotation mode."""
+
+SAME_VALUE = 1e-6
+"""How far a property may be from its channel, relative to its value or absolute below 1: single precision."""
+
+
 class _States:
     """All about the bones of a rig that in-betweens may depend on, but for their channels."""
 
@@ -188,13 +196,50 @@ class _States:
             if is_moved or now != then
         ]
 
+    def posed_since(
+        self, before: _States, numbers: list[int], fcurves: Iterable[bpy.types.FCurve], frame: float
+    ) -> list[int]:
+        """Those of some bones that are not merely where their channels have them on another frame."""
+        posed = {number for number in numbers if self.settings[number] != before.settings[number]}
+        moved: dict[Channel, tuple[int, float]] = {}
+        for number, column in np.argwhere(self.numbers != before.numbers).tolist():
+            if column == len(_COLUMNS):
+                posed.add(number)
+            else:
+                prop, index = _COLUMNS[column]
+                value = float(self.numbers[number, column : column + 1].view(np.float32)[0])
+                moved[prefix_of(self.names[number]) + prop, index] = number, value
+        for fcurve in fcurves if moved else ():
+            channel = fcurve.data_path, fcurve.array_index
+            if channel in moved and not fcurve.mute:
+                _, value = moved[channel]
+                if abs(fcurve.evaluate(frame) - value) <= SAME_VALUE * max(1.0, abs(value)):
+                    del moved[channel]
+        posed |= {number for number, _ in moved.values()}
+        return [number for number in numbers if number in posed]
 
-def changed_bones(rig: bpy.types.Object) -> list[bpy.types.PoseBone]:
-    """The bones of a rig that are other than at the last look: how they are posed, or what moves them."""
+
+def changed_bones(rig: bpy.types.Object, frame: float) -> list[bpy.types.PoseBone]:
+    """The bones of a rig that are other than at the last look: how they are posed, or what moves them.
+
+    Where another frame is shown than then, those do not count that are where the rig's Action has them.
+    """
     now, bones = _States(rig), rig.pose.bones
     moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses_of(rig).items()]
     before = _rigs.get(rig.session_uid)
-    _rigs[rig.session_uid] = moved_by, now
+    _rigs[rig.session_uid] = moved_by, now, frame
     if before is None or before[0] != moved_by or before[1].names != now.names:
         return list(bones)
-    return [bones[number] for number in now.changed_from(before[1])]
+    changed = now.changed_from(before[1])
+    if changed and before[2] != frame:
+        changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
+    return [bones[number] for number in changed]
+
+
+def _played_fcurves(rig: bpy.types.Object) -> Iterable[bpy.types.FCurve]:
+    """The F-curves of the Action that a rig plays by itself."""
+    data = rig.animation_data
+    if data is None or data.action is None or data.action_slot is None:
+        return ()
+    channelbag = action_get_channelbag_for_slot(data.action, data.action_slot)
+    return () if channelbag is None else channelbag.fcurves

@@ -119,11 +119,11 @@ def _all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
     return list(found)
 
 
-def _edited_in(obj: bpy.types.Object) -> list[Transform]:
-    """An object that was edited, and of a rig the bones that were."""
+def _edited_in(obj: bpy.types.Object, frame: float) -> list[Transform]:
+    """An object that was edited on the frame that is shown, and of a rig the bones that were."""
     if obj.pose is None or not _has_bones(obj):
         return [transform_of(obj)]
-    changed, posed = glances.changed_bones(obj), insertion.posed_of(obj)
+    changed, posed = glances.changed_bones(obj, frame), insertion.posed_of(obj)
     also = [bone for bone in obj.pose.bones if prefix_of(bone.name) in posed] if posed else []
     itself = (obj,) if _has_mode(obj) else ()
     return list(dict.fromkeys(map(transform_of, (*itself, *changed, *also))))
@@ -294,7 +294,7 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
                 edited += _all_under(filter(_concerns_us, scene.objects))
             _State.ranges[scene.session_uid] = frames
         if isinstance(block, bpy.types.Object) and _concerns_us(block):
-            for transform in _edited_in(block.original):
+            for transform in _edited_in(block.original, frame):
                 if transform not in seen:
                     insertion.notice_pose(transform, frame)
                     edited.append(transform)
