@@ -170,7 +170,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         regroup(place)
         before = recorded_digest(place)
         if not _is_wanted(place, source, before):
-            if before:
+            # Of bones, Blender can bring differences that no record speaks of: it flips Actions, F-curve by F-curve.
+            if before or (place.prefix and place.filled):
                 clear(place)
             idle.append(place)
             release(place.users)
