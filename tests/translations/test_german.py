@@ -47,6 +47,7 @@ UNSEEN = {
     "How far it slides there with fewer keys",
     "The mode that was chosen before there was an Action to keep it",
     "The constraints that the bone was given. Who takes one off does so on purpose",
+    "The name that Actions have records of the bone under. Where it has another, it was renamed",
     "Which components of them, as bits",
     "Whether bones have modes, or constraints for them",
     # For the log, and for those who call the program from Python

@@ -130,6 +130,11 @@ class _Motion:
 
 
 class BoneMotion(_Motion, bpy.types.PropertyGroup):
+    recorded_as: StringProperty(
+        description="The name that Actions have records of the bone under. Where it has another, it was renamed",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     mounted: StringProperty(
         description="The constraints that the bone was given. Who takes one off does so on purpose",
         options={"HIDDEN"},

@@ -24,6 +24,7 @@ from tests.animation.bones.rigs import (
     with_edit_bones,
 )
 from tests.animation.oracle import curves_of
+from tests.animation.scenes import push_down
 
 Edit = Callable[[bpy.types.Object], None]
 
@@ -55,6 +56,12 @@ def swap_two(rig: bpy.types.Object) -> None:
     rig.data.bones["Spare"].name = "Upper"
 
 
+def pass_names_on(rig: bpy.types.Object) -> None:
+    rig.data.bones["Hand"].name = "Finger"
+    rig.data.bones["Lower"].name = "Hand"
+    rig.data.bones["Upper"].name = "Lower"
+
+
 def into_odd_signs(rig: bpy.types.Object) -> None:
     rig.data.bones["Lower"].name = 'Lower "left" \\ 2'
 
@@ -63,14 +70,24 @@ RENAMINGS = {
     "in Pose Mode": make_lower_fore,
     "in Edit Mode": make_lower_fore_in_edit_mode,
     "of two, swapped": swap_two,
+    "one after the other": pass_names_on,
     "with odd signs": into_odd_signs,
 }
+
+
+def whole_mode(pose_bone: bpy.types.PoseBone) -> str:
+    """The mode that a bone has from its first key on, which its property shows."""
+    (mode,) = modes_of(pose_bone, np.array(FRAMES[:1]))
+    assert pose_bone.rigid_motion.mode == mode
+    return mode
 
 
 @pytest.mark.parametrize("rename", RENAMINGS.values(), ids=RENAMINGS)
 def test_a_bone_that_is_renamed_keeps_its_mode(live_file, rename: Edit):
     rig = moving_rig("dq_sclerp")
     set_mode(rig.pose.bones["Lower"], "pga_lerp", [FRAMES[0]])
+    set_mode(rig.pose.bones["Upper"], "cga_slerp")
+    set_mode(rig.pose.bones["Hand"], "BLENDER")
     before, order = shown_poses([rig], PLAYED)[0], names_of(rig)
     rename(rig)
     bpy.context.view_layer.update()
@@ -78,10 +95,13 @@ def test_a_bone_that_is_renamed_keeps_its_mode(live_file, rename: Edit):
     wanted = {renamed[name]: matrices for name, matrices in before.items()}
     assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], wanted)
     assert_posed(rig, PLAYED)
-    assert {len(held) for held in own_constraints(rig).values()} == {1}
+    held = own_constraints(rig)
+    assert {name: len(held[renamed[name]]) for name in order} == {"Body": 1, "Upper": 1, "Lower": 1, "Hand": 0}
     assert_nothing_stale()
     bone = rig.pose.bones[renamed["Lower"]]
     assert modes_of(bone, np.array(FRAMES[:2])) == ["pga_lerp", "dq_sclerp"]
+    assert whole_mode(rig.pose.bones[renamed["Upper"]]) == "cga_slerp"
+    assert whole_mode(rig.pose.bones[renamed["Hand"]]) == "BLENDER"
     curves_of(bone)["location", 0].keyframe_points[1].co_ui.y += 1.0
     bpy.context.view_layer.update()
     assert_posed(rig, PLAYED)
@@ -101,6 +121,174 @@ def test_a_bone_that_is_renamed_while_nothing_is_followed_is_caught_up_with(live
     refresh()
     assert_posed(rig, PLAYED)
     assert_nothing_stale()
+
+
+def rig_of_two_modes(**settings: object) -> bpy.types.Object:
+    """The arm, with a mode on Upper, another on Lower, and none on the others."""
+    rig = key_all(new_rig(), **settings)
+    set_mode(rig.pose.bones["Upper"], "dq_sclerp")
+    set_mode(rig.pose.bones["Lower"], "pga_lerp")
+    bpy.context.view_layer.update()
+    return rig
+
+
+def modes_in(rig: bpy.types.Object) -> dict[str, str]:
+    """The bones of a rig that have a mode other than Blender's."""
+    modes = {pose_bone.name: whole_mode(pose_bone) for pose_bone in rig.pose.bones}
+    return {name: mode for name, mode in modes.items() if mode != "BLENDER"}
+
+
+def test_bones_that_have_a_mode_and_nothing_to_fill_in_swap_it_with_their_names(live_file):
+    rig = rig_of_two_modes(frames=FRAMES[:1])
+    swap_two(rig)
+    bpy.context.view_layer.update()
+    assert modes_in(rig) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
+    key_all(rig)
+    bpy.context.view_layer.update()
+    assert_posed(rig, PLAYED)
+
+
+def test_a_mode_that_is_set_right_after_names_were_swapped_leaves_the_other_bone_its_own(live_file):
+    for choose in (
+        lambda bone: set_mode(bone, "cga_slerp"),
+        lambda bone: setattr(bone.rigid_motion, "mode", "cga_slerp"),
+    ):
+        rig = rig_of_two_modes()
+        swap_two(rig)
+        choose(rig.pose.bones["Upper"])
+        bpy.context.view_layer.update()
+        assert modes_in(rig) == {"Lower": "dq_sclerp", "Upper": "cga_slerp"}
+        assert_posed(rig, PLAYED)
+
+
+def test_names_that_are_swapped_and_swapped_back_by_undo_have_their_modes_each_time(live_file):
+    rig = rig_of_two_modes()
+    name, before = rig.name, shown_poses([rig], PLAYED)[0]
+    bpy.ops.ed.undo_push(message="Modes")
+    swap_two(rig)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="Swap")
+    for turn, modes in (
+        (bpy.ops.ed.undo, {"Upper": "dq_sclerp", "Lower": "pga_lerp"}),
+        (bpy.ops.ed.redo, {"Lower": "dq_sclerp", "Upper": "pga_lerp"}),
+        (bpy.ops.ed.undo, {"Upper": "dq_sclerp", "Lower": "pga_lerp"}),
+    ):
+        assert turn() == {"FINISHED"}
+        rig = bpy.data.objects[name]
+        assert modes_in(rig) == modes
+        assert_posed(rig, PLAYED)
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], before)
+
+
+def test_names_swapped_in_a_rig_that_is_duplicated_linked_are_swapped_in_both(live_file):
+    rig = rig_of_two_modes()
+    copy = rig.copy()
+    live_file.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    swap_two(rig)
+    bpy.context.view_layer.update()
+    for one in (rig, copy):
+        assert modes_in(one) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
+        assert_posed(one, PLAYED)
+    assert_nothing_stale()
+
+
+@pytest.mark.parametrize("renamed", ["One", "Two"])
+def test_an_action_shared_with_another_rig_follows_whose_bone_is_renamed_as_its_keys_do(live_file, renamed):
+    rig = rig_of_two_modes()
+    rig.name = "One"
+    other = new_rig("Two")
+    other.animation_data_create().action = rig.animation_data.action
+    other.animation_data.action_slot = rig.animation_data.action_slot
+    bpy.context.view_layer.update()
+    make_lower_fore(bpy.data.objects[renamed])
+    bpy.context.view_layer.update()
+    modes = {"One": modes_in(rig), "Two": modes_in(other)}
+    assert modes.pop(renamed) == {"Upper": "dq_sclerp", "Fore": "pga_lerp"}
+    # Blender gives keys of a shared Action to the bone that was renamed, and leaves the other without.
+    assert list(modes.values()) == [{"Upper": "dq_sclerp"}]
+    assert_posed(rig, PLAYED)
+    assert_posed(other, PLAYED)
+
+
+def test_names_swapped_are_swapped_in_strips_and_not_in_actions_that_the_rig_does_not_use(live_file):
+    rig = rig_of_two_modes()
+    stashed, unused = rig.animation_data.action, rig.animation_data.action.copy()
+    unused.use_fake_user = True
+    push_down(rig)
+    rig.animation_data.nla_tracks[0].mute = True
+    key_all(rig, seed=3)
+    bpy.context.view_layer.update()
+    swap_two(rig)
+    bpy.context.view_layer.update()
+    for track in list(rig.animation_data.nla_tracks):
+        rig.animation_data.nla_tracks.remove(track)
+    for action, modes in (
+        (stashed, {"Lower": "dq_sclerp", "Upper": "pga_lerp"}),
+        (unused, {"Upper": "dq_sclerp", "Lower": "pga_lerp"}),
+    ):
+        rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
+        bpy.context.view_layer.update()
+        assert modes_in(rig) == modes
+        assert_posed(rig, PLAYED)
+
+
+def test_names_swapped_while_an_action_is_not_used_leave_its_modes_with_its_keys(live_file):
+    rig = rig_of_two_modes()
+    action = rig.animation_data.action
+    action.use_fake_user = True
+    rig.animation_data.action = None
+    bpy.context.view_layer.update()
+    swap_two(rig)
+    bpy.context.view_layer.update()
+    rig.animation_data.action, rig.animation_data.action_slot = action, action.slots[0]
+    bpy.context.view_layer.update()
+    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower": "pga_lerp"}
+    assert_posed(rig, PLAYED)
+
+
+@pytest.mark.parametrize("original", ["stays", "is renamed"])
+def test_a_copy_of_a_bone_has_no_mode_and_leaves_the_original_its_own(live_file, original):
+    rig = rig_of_two_modes()
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in rig.data.edit_bones:
+        bone.select = bone.select_head = bone.select_tail = bone.name == "Lower"
+    bpy.ops.armature.duplicate()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert "Lower.001" in rig.pose.bones
+    if original == "is renamed":
+        make_lower_fore(rig)
+    bpy.context.view_layer.update()
+    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower" if original == "stays" else "Fore": "pga_lerp"}
+    assert_posed(rig, PLAYED)
+    rig.data.bones["Lower.001"].name = "Copy"
+    bpy.context.view_layer.update()
+    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower" if original == "stays" else "Fore": "pga_lerp"}
+
+
+def test_a_bone_that_takes_the_name_of_one_deleted_just_now_keeps_its_mode(live_file):
+    rig = rig_of_two_modes(location=False)
+
+    def put_upper_in_its_place(edit_bones: bpy.types.ArmatureEditBones) -> None:
+        edit_bones.remove(edit_bones["Lower"])
+        edit_bones["Upper"].name = "Lower"
+
+    with_edit_bones(rig, put_upper_in_its_place)
+    bpy.context.view_layer.update()
+    assert modes_in(rig) == {"Lower": "dq_sclerp"}
+
+
+def test_rigs_of_a_version_that_kept_no_names_of_bones_have_the_modes_they_had(live_file):
+    rig = rig_of_two_modes()
+    for pose_bone in rig.pose.bones:
+        pose_bone.rigid_motion.property_unset("recorded_as")
+    assert refresh() == 0
+    assert modes_in(rig) == {"Upper": "dq_sclerp", "Lower": "pga_lerp"}
+    swap_two(rig)
+    bpy.context.view_layer.update()
+    assert modes_in(rig) == {"Lower": "dq_sclerp", "Upper": "pga_lerp"}
+    assert_posed(rig, PLAYED)
 
 
 @pytest.mark.parametrize("deleted", ["Hand", "Lower", "Body"])

@@ -6,12 +6,12 @@ mode channel where there is one with keys, and in its record otherwise; nowhere 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import bpy
 
-from .slots import SlotTransform
+from .slots import Slot, SlotTransform
 from .sources import MODE_NAMES, MODE_NUMBERS, UNKNOWN
 
 
@@ -102,8 +102,30 @@ def record_constraint(place: SlotTransform, name: str) -> None:
     place.__dict__.pop("recorded", None)
 
 
+def keep_name(place: SlotTransform) -> None:
+    """Have a bone keep the name that its record is under, see `renaming`."""
+    for user in place.users if place.prefix else ():
+        if user.motion.recorded_as != user.carrier.name and user.animated.is_editable:
+            user.motion.recorded_as = user.carrier.name
+
+
+def rename_records(slot: Slot, prefixes: Mapping[str, str]) -> None:
+    """Give the records of a slot other prefixes, all at once, in place of what bones left that are gone."""
+    records = slot.action.rigid_motion.slots
+    present = {record.prefix for record in records if record.handle == slot.handle}
+    moved = {old: new for old, new in prefixes.items() if old in present}
+    replaced = set(moved.values()) - set(moved)
+    for number, record in reversed(list(enumerate(records))):
+        if record.handle == slot.handle and record.prefix in replaced:
+            records.remove(number)
+    for record in records:
+        if record.handle == slot.handle and record.prefix in moved:
+            record.prefix = moved[record.prefix]
+            record.name = _key(slot, record.prefix)
+
+
 def _record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
-    records, key = place.slot.action.rigid_motion.slots, _key_of(place)
+    records, key = place.slot.action.rigid_motion.slots, _key(place.slot, place.prefix)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
         number = records.find(key)
@@ -120,9 +142,9 @@ _numbers: dict[str, int] = {}
 """Where records were found last, by their names: a rig has many, and Blender goes through all of them for a name."""
 
 
-def _key_of(place: SlotTransform) -> str:
+def _key(slot: Slot, prefix: str) -> str:
     """The name that a record is found by."""
-    return f"{place.slot.handle} {place.prefix}"
+    return f"{slot.handle} {prefix}"
 
 
 def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
@@ -131,7 +153,8 @@ def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
     if record is not None:
         return record
     record = place.slot.action.rigid_motion.slots.add()
-    record.name, record.handle, record.prefix = _key_of(place), place.slot.handle, place.prefix
+    record.name, record.handle, record.prefix = _key(place.slot, place.prefix), place.slot.handle, place.prefix
+    keep_name(place)
     return record
 
 

@@ -12,6 +12,7 @@ import bpy
 
 from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
+from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
 from ..actions.sources import Source
 from ..transforms import Refused, Transform, transform_of
@@ -68,6 +69,7 @@ def act_on(
     transforms = transforms_of(targets)
     readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
     places = slot_transforms_of(transforms)
+    follow_renamed(places)
     of_users = sources_of_users(places)
     for place, sources in zip(places, of_users, strict=True):
         for user, source in zip(place.users, sources, strict=True):

@@ -21,6 +21,7 @@ from ..actions.mode_property import adopt_from_properties, has_to_do_with_modes,
 from ..actions.reading import keyed_in, leading
 from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
+from ..actions.renaming import follow_renamed, forget_names
 from ..actions.slots import (
     SlotTransform,
     actions_of,
@@ -106,6 +107,7 @@ def refresh(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
         unmoved = [transform for transform in transforms if transform not in moved]
         release(unmoved)
         show_awaited(unmoved)
+        forget_names(unmoved)
         return _refresh(places)
 
 
@@ -153,6 +155,7 @@ def follow_original(transform: ObjectTransform) -> None:
 
 
 def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused | None] | None = None) -> int:
+    follow_renamed(places)
     show_modes(places)
     if sources is None:
         concerned = [place for place in places if has_to_do_with_modes(place)]
@@ -167,7 +170,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         regroup(place)
         before = recorded_digest(place)
         if not _is_wanted(place, source, before):
-            if before:
+            # Of bones, Blender can bring differences that no record speaks of: it flips Actions, F-curve by F-curve.
+            if before or (place.prefix and place.filled):
                 clear(place)
             idle.append(place)
             release(place.users)

@@ -21,6 +21,7 @@ from ..actions.mode_property import await_mode, is_keyed
 from ..actions.reading import keyed_in, read
 from ..actions.records import record_mode, recorded_mode
 from ..actions.refusals import refuse_linked, refuse_numbers
+from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, places_of, slot_transforms_of
 from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, UNKNOWN, Source, distinct
 from ..transforms import WIDTHS, Channel, Refused, Transform, transform_of
@@ -187,6 +188,7 @@ def on_property(transform: Transform) -> None:
     places = [place for place in slot_transforms_of([transform]) if place.slot.action.is_editable]
     if not places:
         await_mode(transform, mode)
+    follow_renamed(places)
     for place in places:
         if not is_keyed(place):
             record_mode(place, MODE_NUMBERS[mode])

@@ -1,0 +1,45 @@
+"""Slots that were duplicated in their Action: Blender duplicates their F-curves, and no records of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ..transforms import CONSTRAINT
+from .records import has_mode, recorded_digest
+from .slots import SlotTransform
+
+_TIMES = f'constraints["{CONSTRAINT}'
+
+
+def original_of(place: SlotTransform) -> SlotTransform | None:
+    """The same transform in the slot with a mode that this is a duplicate of, None where it is none.
+
+    It has what only in-betweens have, none of which are recorded, and its F-curves are those of the other slot.
+    """
+    if recorded_digest(place) or not (place.filled or any(_TIMES in path for path, _ in place.curves)):
+        return None
+    differences = {pair.differences for pair in place.slot.action.rigid_motion.bone_slots}
+    handles = {slot.handle for slot in place.slot.action.slots} - differences - {place.slot.handle}
+    others = (replace(place, slot=replace(place.slot, handle=handle)) for handle in sorted(handles))
+    # To look at F-curves takes longer, and those that Actions hold for one another in the NLA look like in-betweens.
+    with_modes = (other.read_again() for other in others if has_mode(other))
+    return next((other for other in with_modes if _have_same_curves(place, other)), None)
+
+
+def _have_same_curves(one: SlotTransform, other: SlotTransform) -> bool:
+    return one.curves.keys() == other.curves.keys() and all(
+        np.array_equal(_numbers_of(fcurve), _numbers_of(other.curves[channel]))
+        for channel, fcurve in one.curves.items()
+    )
+
+
+def _numbers_of(fcurve: bpy.types.FCurve) -> np.ndarray:
+    """The keys or samples of an F-curve, or the line that it is."""
+    points = fcurve.keyframe_points if len(fcurve.keyframe_points) else fcurve.sampled_points
+    found = np.empty(2 * len(points), np.float32)
+    points.foreach_get("co", found)
+    lines = (modifier.coefficients for modifier in fcurve.modifiers if modifier.type == "GENERATOR")
+    return np.concatenate((found, *lines))

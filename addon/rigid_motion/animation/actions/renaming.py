@@ -1,0 +1,67 @@
+"""Bones that were renamed: Blender renames the F-curves of their Actions, and the records of these have to follow.
+
+A bone keeps the name that records have it under. Where it has another one by now, it was renamed. Several are followed
+at once, so that two can swap their names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import bpy
+
+from ..transforms import Transform, prefix_of, split_path, transform_of
+from .records import NOTHING_RECORDED, keep_name, recorded, rename_records
+from .slots import Slot, SlotTransform, slots_of
+
+
+def follow_renamed(places: Iterable[SlotTransform]) -> None:
+    """Have records follow the bones of these that were renamed; where there are several, all bones of their rigs."""
+    bones = [place for place in places if place.prefix]
+    users = {user for place in bones for user in place.users}
+    rigs = {user.animated for user in users}
+    looked_at = (bone for rig in rigs for bone in _bones_of(rig)) if len(bones) > 1 else users
+    renamed = {bone.animated for bone in looked_at if _is_renamed(bone)}
+    for slot in slots_of(renamed) if renamed else ():
+        if slot.action.is_editable:
+            rename_records(slot, _renamed_in(slot))
+    for rig in renamed:
+        for bone in filter(_is_renamed, _bones_of(rig)):
+            bone.motion.recorded_as = bone.carrier.name
+    for place in bones:
+        if recorded(place) != NOTHING_RECORDED:
+            keep_name(place)
+
+
+def forget_names(transforms: Iterable[Transform]) -> None:
+    """What no slot moves any more has no F-curves that Blender would rename with it."""
+    for bone in transforms:
+        if bone.prefix and bone.motion.recorded_as and bone.animated.is_editable:
+            bone.motion.recorded_as = ""
+
+
+def _bones_of(rig: bpy.types.Object) -> Iterator[Transform]:
+    return map(transform_of, rig.pose.bones) if rig.is_editable else iter(())
+
+
+def _is_renamed(bone: Transform) -> bool:
+    """Whether records have a bone under another name. So have they a copy of it, which they do not speak of."""
+    return bone.motion.recorded_as not in ("", bone.carrier.name)
+
+
+def _renamed_in(slot: Slot) -> dict[str, str]:
+    """The prefixes that bones of a slot's users have by now, by those that records have them under.
+
+    Of several, a bone and its copy or bones of two rigs, it is the one that Blender has given the F-curves.
+    """
+    channelbag = slot.channelbag
+    keyed = {split_path(fcurve.data_path)[0] for fcurve in channelbag.fcurves} if channelbag is not None else set()
+    names: dict[str, list[str]] = {}
+    for bone in (bone for user in slot.users if user.pose is not None for bone in user.pose.bones):
+        if known := bone.rigid_motion.recorded_as:
+            names.setdefault(known, []).append(bone.name)
+    now = {
+        known: max(found, key=lambda name, known=known: (prefix_of(name) in keyed, name == known))
+        for known, found in names.items()
+    }
+    return {prefix_of(known): prefix_of(name) for known, name in now.items() if name != known}
