@@ -50,6 +50,7 @@ UNSEEN = {
     "The name that Actions have records of the bone under. Where it has another, it was renamed",
     "Which components of them, as bits",
     "Whether bones have modes, or constraints for them",
+    "Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
     # For the log, and for those who call the program from Python
     "In-betweens could not be brought up to date",
     "The paths could not be drawn",

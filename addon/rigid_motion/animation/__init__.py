@@ -23,7 +23,7 @@ from .baking.reducing import (
     total_reduction,
 )
 from .baking.sizes import radius_of
-from .inbetweens import live
+from .inbetweens import edit_mode, live
 from .inbetweens.live import refresh, set_enabled
 from .inbetweens.mending import constraint_trouble, mend
 from .inbetweens.mode_keys import key_frames, modes_of, set_mode
@@ -65,9 +65,11 @@ __all__ = [
 
 def register() -> None:
     properties.register()
+    edit_mode.register()
     live.register()
 
 
 def unregister() -> None:
     live.unregister()
+    edit_mode.unregister()
     properties.unregister()

@@ -196,6 +196,11 @@ class ObjectMotion(_Motion, bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},
     )
+    laid_aside: BoolProperty(
+        description="Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
 
 
 CLASSES = (SlotRecord, BoneSlot, ActionMotion, ChangedAction, BoneMotion, ObjectMotion)

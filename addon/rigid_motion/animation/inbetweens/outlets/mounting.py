@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 
 from ...actions.slots import SlotTransform, uses_of
@@ -28,8 +30,37 @@ def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionCons
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
-    """The Action and the handle of the slot in it that a constraint shows."""
-    return constraint.action, constraint.action_slot_handle
+    """The Action and the handle of the slot in it that a constraint shows, or will when its rig leaves Edit Mode."""
+    handle = constraint.action_slot_handle
+    if not handle and constraint.id_data.mode == "EDIT" and (slot := _last_slot(constraint)) is not None:
+        handle = slot.handle
+    return constraint.action, handle
+
+
+def lay_aside(rig: bpy.types.Object) -> None:
+    """Have the constraints of a rig show no slot for now, which they remember by its name.
+
+    Blender's Symmetrize mirrors the keys of what Action constraints show, and crashes on F-curves that have none.
+    """
+    for constraint in _constraints_on(rig):
+        if constraint.action_slot_handle:
+            constraint.action_slot = None
+
+
+def take_up(rig: bpy.types.Object) -> None:
+    """Have the constraints of a rig that were laid aside show their slots again."""
+    for constraint in _constraints_on(rig):
+        if not constraint.action_slot_handle and (slot := _last_slot(constraint)) is not None:
+            constraint.action_slot = slot
+
+
+def _constraints_on(rig: bpy.types.Object) -> Iterator[bpy.types.ActionConstraint]:
+    return (constraint for bone in rig.pose.bones for constraint in bone.constraints if is_ours(constraint))
+
+
+def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot | None:
+    action = constraint.action
+    return None if action is None else action.slots.get(constraint.last_slot_identifier)
 
 
 def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:

@@ -1,0 +1,223 @@
+"""Rigs in Edit Mode: what Blender does to bones there finds no F-curves that it cannot handle, and nothing is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion import animation
+from rigid_motion.animation import constraint_trouble, modes_of, refresh, set_enabled, set_mode
+from tests.animation.bones.poses import assert_posed, assert_same_poses, expected_poses
+from tests.animation.bones.rigs import FRAMES, PLAYED, Rest, key_all, moving_rig, new_rig, own_constraints, select_only
+from tests.animation.bones.test_bone_files import SAVE_AS, posed_on_a_farm, reopened, save
+from tests.animation.bones.test_rig_edits import assert_nothing_stale
+from tests.animation.farm import on_a_farm
+from tests.animation.oracle import curves_of
+
+HANDS = (
+    Rest("Body", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    Rest("Hand.L", (0.5, 0.0, 1.0), (1.0, 0.1, 1.0), "Body", roll=0.3),
+    Rest("Hand.R", (-0.5, 0.0, 1.0), (-1.0, 0.1, 1.0), "Body", roll=-0.3),
+)
+
+
+def rig_with_hands(*bones: Rest, mode: str = "dq_sclerp") -> bpy.types.Object:
+    rig = key_all(new_rig("Rig", bones or HANDS))
+    set_mode(list(rig.pose.bones), mode)
+    return rig
+
+
+@contextmanager
+def edit_mode(rig: bpy.types.Object) -> Iterator[bpy.types.ArmatureEditBones]:
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    yield rig.data.edit_bones
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def symmetrize(edit_bones: bpy.types.ArmatureEditBones, name: str = "Hand.L") -> None:
+    for bone in edit_bones:
+        bone.select = bone.select_head = bone.select_tail = bone.name == name
+    bpy.ops.armature.symmetrize()
+
+
+def shown_slots(rig: bpy.types.Object) -> dict[str, tuple[str, ...]]:
+    return {
+        name: tuple(slot.name_display for held in constraints if (slot := held.action_slot) is not None)
+        for name, constraints in own_constraints(rig).items()
+    }
+
+
+ALL_SHOWN = dict.fromkeys(("Body", "Hand.L", "Hand.R"), ("Rigid Motion",))
+NONE_SHOWN = dict.fromkeys(ALL_SHOWN, ())
+
+
+@pytest.mark.parametrize("live", [True, False], ids=["live", "live update off"])
+def test_bones_with_modes_can_be_symmetrized(live_file, live):
+    rig = rig_with_hands()
+    set_enabled(live)
+    try:
+        with edit_mode(rig) as edit_bones:
+            symmetrize(edit_bones)
+    finally:
+        set_enabled(True)
+    assert shown_slots(rig) == ALL_SHOWN
+    assert refresh() == 0
+    assert_posed(rig, PLAYED)
+    assert_nothing_stale()
+
+
+def test_a_bone_that_symmetrize_makes_rests_and_has_no_constraint_of_the_first(live_file):
+    rig = rig_with_hands(*HANDS[:2])
+    with edit_mode(rig) as edit_bones:
+        symmetrize(edit_bones)
+    assert shown_slots(rig) == ALL_SHOWN | {"Hand.R": ()}
+    assert own_constraints(rig)["Hand.R"] == []
+    assert rig.pose.bones["Hand.R"].rigid_motion.mode == "BLENDER"
+    assert_posed(rig, PLAYED)
+    key_all(rig)
+    set_mode(rig.pose.bones["Hand.R"], "pga_lerp")
+    assert_posed(rig, PLAYED)
+
+
+def test_a_bone_that_symmetrize_makes_under_the_name_of_a_deleted_one_has_its_keys_and_its_mode(live_file):
+    rig = rig_with_hands()
+    set_mode(rig.pose.bones["Hand.R"], "pga_lerp")
+    with edit_mode(rig) as edit_bones:
+        edit_bones.remove(edit_bones["Hand.R"])
+        symmetrize(edit_bones)
+    refresh()
+    assert shown_slots(rig) == ALL_SHOWN
+    assert modes_of(rig.pose.bones["Hand.R"], np.array(FRAMES[:1])) == ["pga_lerp"]
+    assert_posed(rig, PLAYED)
+    assert_nothing_stale()
+
+
+def test_in_edit_mode_constraints_show_nothing_and_nobody_takes_them_for_removed(live_file):
+    rig = rig_with_hands()
+    with edit_mode(rig):
+        assert shown_slots(rig) == NONE_SHOWN
+        assert refresh() == 0
+        assert {constraint_trouble(bone) for bone in rig.pose.bones} == {""}
+        assert {animation.problem_of(bone) for bone in rig.pose.bones} == {""}
+        bpy.context.view_layer.update()
+        assert shown_slots(rig) == NONE_SHOWN
+    assert shown_slots(rig) == ALL_SHOWN
+    assert refresh() == 0
+    assert_posed(rig, PLAYED)
+
+
+def test_what_is_edited_and_chosen_in_edit_mode_is_seen_after_it(live_file):
+    rig = rig_with_hands()
+    with edit_mode(rig):
+        curves_of(rig.pose.bones["Hand.L"])["location", 0].keyframe_points[1].co_ui.y += 1.0
+        bpy.context.view_layer.update()
+        set_mode(rig.pose.bones["Hand.R"], "pga_lerp")
+        set_mode(rig.pose.bones["Body"], "BLENDER")
+        bpy.context.view_layer.update()
+        assert shown_slots(rig) == NONE_SHOWN
+    assert shown_slots(rig) == ALL_SHOWN | {"Body": ()}
+    assert_posed(rig, PLAYED)
+    assert_nothing_stale()
+
+
+def test_a_constraint_that_was_deleted_is_not_brought_back_by_edit_mode(live_file):
+    rig = rig_with_hands()
+    hand = rig.pose.bones["Hand.L"]
+    hand.constraints.remove(hand.constraints["Rigid Motion"])
+    with edit_mode(rig):
+        pass
+    assert own_constraints(rig)["Hand.L"] == []
+    assert constraint_trouble(rig.pose.bones["Hand.L"]) == "REMOVED"
+
+
+def test_another_rig_with_the_same_action_moves_on_while_one_is_in_edit_mode(live_file):
+    rig = rig_with_hands()
+    other = new_rig("Other", HANDS)
+    other.animation_data_create().action = rig.animation_data.action
+    other.animation_data.action_slot = rig.animation_data.action_slot
+    bpy.context.view_layer.update()
+    with edit_mode(rig):
+        assert shown_slots(other) == ALL_SHOWN
+        assert_posed(other, PLAYED)
+    assert_posed(rig, PLAYED)
+
+
+def test_each_of_several_actions_in_the_nla_is_shown_again_after_edit_mode(live_file):
+    rig = rig_with_hands()
+    data = rig.animation_data
+    for number in range(2):
+        if number:
+            data.action = None
+            key_all(rig, seed=number)
+            set_mode(list(rig.pose.bones), "pga_lerp")
+        data.nla_tracks.new().strips.new(f"Strip {number}", 1 + 60 * number, data.action)
+    data.action = None
+    bpy.context.view_layer.update()
+    refresh()
+    before = {name: [(c.name, c.action) for c in held] for name, held in own_constraints(rig).items()}
+    assert {len(held) for held in before.values()} == {2}
+    with edit_mode(rig) as edit_bones:
+        assert shown_slots(rig) == NONE_SHOWN
+        symmetrize(edit_bones)
+    assert {name: [(c.name, c.action) for c in held] for name, held in own_constraints(rig).items()} == before
+    assert set(shown_slots(rig).values()) == {("Rigid Motion", "Rigid Motion")}
+    assert refresh() == 0
+
+
+def test_a_file_that_is_saved_in_edit_mode_plays_in_a_blender_without_the_extension(live_file, tmp_path):
+    rig = rig_with_hands()
+    wanted = expected_poses(rig, PLAYED)
+    with edit_mode(rig):
+        path = save(tmp_path / "shot.blend")
+        assert shown_slots(rig) == NONE_SHOWN
+    on_a_farm("bpy.ops.object.mode_set(mode='OBJECT')\n" + SAVE_AS, path, path)
+    _, played = posed_on_a_farm(path, rig)
+    assert_same_poses(rig, PLAYED, played, wanted)
+
+
+def test_a_file_that_is_saved_in_edit_mode_is_opened_in_it(live_file, tmp_path):
+    with edit_mode(rig_with_hands()):
+        path = save(tmp_path / "shot.blend")
+    rig = reopened(path)
+    if rig.mode != "EDIT":
+        select_only(rig)
+        bpy.ops.object.mode_set(mode="EDIT")
+    assert shown_slots(rig) == NONE_SHOWN
+    symmetrize(rig.data.edit_bones)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert shown_slots(rig) == ALL_SHOWN
+    assert_posed(rig, PLAYED)
+
+
+def test_undo_and_redo_go_into_edit_mode_and_out_of_it(live_file):
+    rig_with_hands()
+    bpy.ops.ed.undo_push(message="rig")
+    select_only(bpy.data.objects["Rig"])
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.ed.undo_push(message="into Edit Mode")
+    symmetrize(bpy.data.objects["Rig"].data.edit_bones)
+    bpy.ops.ed.undo_push(message="symmetrized")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.ed.undo_push(message="out of Edit Mode")
+    steps = [bpy.ops.ed.undo] * 3 + [bpy.ops.ed.redo] * 3
+    for step, mode in zip(steps, ("EDIT", "EDIT", "OBJECT", "EDIT", "EDIT", "OBJECT"), strict=True):
+        step()
+        rig = bpy.data.objects["Rig"]
+        bpy.context.view_layer.update()
+        assert rig.mode == mode
+        assert shown_slots(rig) == (NONE_SHOWN if mode == "EDIT" else ALL_SHOWN)
+    assert_posed(rig, PLAYED)
+
+
+def test_a_rig_in_edit_mode_gets_its_slots_back_when_the_extension_is_switched_off(live_file):
+    rig = moving_rig()
+    with edit_mode(rig):
+        animation.unregister()
+        shown = shown_slots(rig)
+        animation.register()
+    assert shown == dict.fromkeys(shown, ("Rigid Motion",))
