@@ -67,7 +67,24 @@ def has_mode(place: SlotTransform) -> bool:
 
 def has_in_betweens(place: SlotTransform) -> bool:
     """Whether a transform was filled in, by whichever version; constants that are held beside strips are none."""
-    return bool(recorded_digest(place)) or any(len(fcurve.sampled_points) > 2 for fcurve in place.filled.values())
+    return (
+        bool(recorded_digest(place))
+        or any(len(fcurve.sampled_points) > 2 for fcurve in place.filled.values())
+        or _has_time_of_its_own(place)
+    )
+
+
+def _has_time_of_its_own(place: SlotTransform) -> bool:
+    """Whether a bone was filled in, be it in an Action that its slot was in before: it has the time of a constraint.
+
+    Those that are held in the NLA for other Actions have no influence.
+    """
+    influences = (
+        place.curves.get((path.removesuffix("eval_time") + "influence", 0))
+        for path, _ in place.curves
+        if place.prefix and path.endswith(".eval_time")
+    )
+    return any(influence is None or influence.evaluate(0.0) > 0.0 for influence in influences)
 
 
 def record_mode(place: SlotTransform, number: int) -> None:

@@ -35,6 +35,7 @@ from . import glances, insertion, known_sources
 from .densification import keep_motion
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
 from .outlets import outlet_of, regroup, release, remove_orphans
+from .separated import are_separated, discard, give_keys_back, notice_slots
 
 log = logging.getLogger(__package__)
 
@@ -102,13 +103,17 @@ def refresh(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
     with _turn() as ours:
         if not ours:
             return 0
+        separated = give_keys_back(bpy.data.actions) if targets is None else set()
         places = slot_transforms_of(transforms)
         moved = {user for place in places for user in place.users}
         unmoved = [transform for transform in transforms if transform not in moved]
         release(unmoved)
         show_awaited(unmoved)
         forget_names(unmoved)
-        return _refresh(places)
+        count = _refresh(places)
+        notice_slots({place.slot for place in places})
+        discard(separated)
+        return count
 
 
 def _all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
@@ -260,7 +265,9 @@ def _follow(actions: Collection[bpy.types.Action]) -> set[Transform]:
     """Refresh what these Actions, which were edited, move; and say what that is."""
     if not actions:
         return set()
-    places = [place for slot in slots_in(actions) for place in glances.edited_in(slot)]
+    slots = slots_in(actions)
+    notice_slots(slots)
+    places = [place for slot in slots for place in glances.edited_in(slot)]
     with _turn() as ours:
         if ours:
             _refresh(places)
@@ -420,7 +427,7 @@ def _before_update(scene: bpy.types.Scene, *_: object) -> None:
 @_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
-    if _State.unseen:
+    if _State.unseen or are_separated(_edited_actions(depsgraph)):
         _look_through()
     edited = _edited_actions(depsgraph)
     later = _follow([action for action in edited if action.session_uid not in _State.followed])

@@ -1,0 +1,99 @@
+"""Rigs that Blender's *Separate Slots* has left with their differences in place of their keys.
+
+It puts each slot into an Action of its own, and gives that to all users of the slot. For Blender a rig uses two slots:
+the one of its keys, and by its constraints the one of its differences. That comes later, so the rig ends up with it.
+Nothing in the new Actions says which of them were one, but for what is in them, and the names of their slots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+from ..actions.slots import Slot, is_time
+from ..transforms import bone_name, is_ours, split_path
+
+_names: dict[int, str] = {}
+"""Of each rig the name of the slot that has its keys, as last seen, by the rig's session id."""
+
+
+def notice_slots(slots: Iterable[Slot]) -> None:
+    """Keep in mind by which slots rigs are keyed that have differences in others."""
+    for slot in slots:
+        if any(pair.handle == slot.handle for pair in slot.action.rigid_motion.bone_slots):
+            for user in slot.users:
+                data = user.animation_data
+                if (data.action, data.action_slot_handle) == (slot.action, slot.handle):
+                    _names[user.session_uid] = data.action_slot.identifier
+
+
+def are_separated(actions: Iterable[bpy.types.Action]) -> bool:
+    """Whether one of these is what a rig was left with."""
+    return any(_rigs_left_with(action) for action in actions)
+
+
+def give_keys_back(actions: Iterable[bpy.types.Action]) -> set[bpy.types.Action]:
+    """Give rigs the Actions of their keys again that were left with one of these; which ones, is returned."""
+    left = {action: _rigs_left_with(action) for action in actions}
+    return {action for action, rigs in left.items() for rig in rigs if _has_keys_back(rig, action)}
+
+
+def discard(actions: Iterable[bpy.types.Action]) -> None:
+    """Delete those of these Actions that nothing uses any more."""
+    for action, users in bpy.data.user_map(subset=set(actions)).items():
+        if not users:
+            bpy.data.actions.remove(action)
+
+
+def _rigs_left_with(action: bpy.types.Action) -> list[bpy.types.Object]:
+    """The rigs whose own Action this is, although constraints of ours show it."""
+    if not _has_samples_alone(action):
+        return []
+    owners = bpy.data.user_map(subset={action}, key_types={"ACTION"}, value_types={"OBJECT"})[action]
+    return [rig for rig in owners if rig.is_editable and _has_own(rig, action) and _shows(rig, action)]
+
+
+def _has_samples_alone(action: bpy.types.Action) -> bool:
+    channelbag = _only_channelbag(action)
+    return channelbag is not None and all(
+        len(fcurve.sampled_points) and split_path(fcurve.data_path)[0] for fcurve in channelbag.fcurves
+    )
+
+
+def _only_channelbag(action: bpy.types.Action) -> bpy.types.ActionChannelbag | None:
+    """What is in an Action of one slot, to which none has the differences."""
+    is_single = len(action.slots) == 1 and not action.rigid_motion.bone_slots
+    return action_get_channelbag_for_slot(action, action.slots[0]) if is_single else None
+
+
+def _has_own(rig: bpy.types.Object, action: bpy.types.Action) -> bool:
+    return rig.animation_data is not None and rig.animation_data.action == action
+
+
+def _shows(rig: bpy.types.Object, action: bpy.types.Action) -> bool:
+    bones = () if rig.pose is None else rig.pose.bones
+    return any(is_ours(constraint) and constraint.action == action for bone in bones for constraint in bone.constraints)
+
+
+def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action) -> bool:
+    """Give a rig its keys again, unless it cannot be told where they are."""
+    bones = _bones_of(_only_channelbag(differences).fcurves)
+    timed = [action for action in bpy.data.actions if bones <= _timed_bones(action)]
+    named = [action for action in timed if action.slots[0].identifier == _names.get(rig.session_uid)]
+    if len(found := named or timed) != 1:
+        return False
+    rig.animation_data.action = found[0]
+    rig.animation_data.action_slot = found[0].slots[0]
+    return True
+
+
+def _timed_bones(action: bpy.types.Action) -> set[str]:
+    """The bones that an Action of one slot has times of differences for."""
+    channelbag = _only_channelbag(action) if action.is_editable else None
+    return _bones_of(filter(is_time, channelbag.fcurves)) if channelbag is not None else set()
+
+
+def _bones_of(fcurves: Iterable[bpy.types.FCurve]) -> set[str]:
+    return {bone_name(split_path(fcurve.data_path)[0]) for fcurve in fcurves}
