@@ -154,3 +154,79 @@ def test_an_action_without_modes_takes_none_from_the_strips_beside_it(live_file)
         bpy.context.view_layer.update()
         refresh()
     assert modes_of(rig.pose.bones["Hand"], np.array(FRAMES[:1])) == ["BLENDER"]
+
+
+def strip_of(rig: bpy.types.Object, action: bpy.types.Action, start: int = 1) -> bpy.types.NlaStrip:
+    tracks = rig.animation_data_create().nla_tracks
+    track = tracks[0] if len(tracks) else tracks.new()
+    strip = track.strips.new("Strip", start, action)
+    bpy.context.view_layer.update()
+    return strip
+
+
+def frames_of(strip: bpy.types.NlaStrip) -> tuple[float, ...]:
+    """Of the scene, and of the Action."""
+    return (strip.frame_start, strip.frame_end, strip.action_frame_start, strip.action_frame_end)
+
+
+def test_a_strip_with_the_action_of_another_rig_shows_its_keys_and_modes(live_file):
+    hero, villain = moving_rig(name="Hero"), new_rig("Villain")
+    strip = strip_of(villain, hero.animation_data.action)
+    assert strip.action_slot == hero.animation_data.action_slot
+    assert frames_of(strip) == (1.0, 40.0, 1.0, 40.0)
+    assert_same_poses(villain, PLAYED, *(shown_poses([rig], PLAYED)[0] for rig in (villain, hero)))
+    assert_posed(hero, PLAYED)
+
+
+@pytest.mark.parametrize("modes", [True, False], ids=["with modes", "without"])
+def test_strips_with_the_action_of_another_rig_are_as_long_as_without_modes(live_file, modes):
+    hero, villain = key_all(new_rig("Hero"), (-7.0, 5.0, 30.0)), new_rig("Villain")
+    if modes:
+        set_mode(list(hero.pose.bones), "dq_sclerp")
+    action = hero.animation_data.action
+    strips = [strip_of(villain, action, start) for start in (5, 80)]
+    assert [frames_of(strip) for strip in strips] == [(5.0, 42.0, -7.0, 30.0), (80.0, 117.0, -7.0, 30.0)]
+
+
+def test_a_strip_with_the_action_of_another_rig_does_not_reach_into_the_next(live_file):
+    hero, villain = moving_rig(name="Hero"), new_rig("Villain")
+    strip_of(villain, hero.animation_data.action, 21)
+    before = strip_of(villain, hero.animation_data.action, 11)
+    assert frames_of(before) == (11.0, 21.0, 1.0, 11.0)
+
+
+def test_a_strip_whose_frames_are_chosen_keeps_them_when_it_gets_its_slot(live_file):
+    hero, villain = moving_rig(name="Hero"), new_rig("Villain")
+    strip = villain.animation_data_create().nla_tracks.new().strips.new("Strip", 1, hero.animation_data.action)
+    strip.action_frame_end = 11.0
+    strip.action_frame_start = 2.0
+    before = frames_of(strip)
+    bpy.context.view_layer.update()
+    assert strip.action_slot == hero.animation_data.action_slot
+    assert frames_of(strip) == before
+
+
+def test_a_strip_that_is_to_show_no_slot_shows_none(live_file):
+    hero, villain = moving_rig(name="Hero"), new_rig("Villain")
+    strip = strip_of(villain, hero.animation_data.action)
+    strip.action_slot = None
+    bpy.context.view_layer.update()
+    villain.location.x = 1.0
+    bpy.context.view_layer.update()
+    refresh()
+    assert strip.action_slot is None
+    assert not any(own_constraints(villain).values())
+
+
+def test_a_strip_is_given_no_slot_where_there_are_two_with_keys(live_file):
+    hero, tool, villain = moving_rig(name="Hero"), key(new_object("Tool")), new_rig("Villain")
+    merge_into(hero, tool)
+    assert strip_of(villain, hero.animation_data.action).action_slot is None
+
+
+def test_a_strip_without_a_slot_stays_so_where_the_only_one_has_no_differences(live_file):
+    plain, villain = key_all(new_rig("Plain")), new_rig("Villain")
+    strip = strip_of(villain, plain.animation_data.action)
+    strip.action_slot = None
+    bpy.context.view_layer.update()
+    assert strip.action_slot is None

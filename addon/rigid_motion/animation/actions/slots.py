@@ -6,6 +6,7 @@ is where a slot is taken apart. What the in-betweens of bones differ in is in a 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -277,6 +278,40 @@ def _strips(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip
     for strip in strips:
         yield strip
         yield from _strips(strip.strips)
+
+
+def choose_slots(obj: bpy.types.Object) -> None:
+    """Have strips show the only slot with keys that they can, as Blender does where an Action has no differences in it.
+
+    A strip that was made to show none remembers which one it showed.
+    """
+    data = obj.animation_data
+    for track in data.nla_tracks if data is not None else ():
+        for strip in track.strips:
+            if (slot := _slot_to_choose(strip)) is not None:
+                is_new = not strip.last_slot_identifier
+                strip.action_slot = slot
+                if is_new:
+                    _give_length(strip, track)
+
+
+def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
+    action = strip.action
+    if action is None or strip.action_slot_handle or strip.last_slot_identifier in action.slots:
+        return None
+    differences = {pair.differences for pair in action.rigid_motion.bone_slots}
+    keyed = [slot for slot in strip.action_suitable_slots if slot.handle not in differences]
+    return keyed[0] if differences and len(keyed) == 1 else None
+
+
+def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack) -> None:
+    """Have a strip show all of its Action, up to the next strip: Blender makes those without a slot one frame long."""
+    if (strip.action_frame_start, strip.action_frame_end) != (0.0, 1.0):
+        return
+    first, last = strip.action.frame_range
+    room = min((one.frame_start for one in track.strips if one.frame_start > strip.frame_start), default=math.inf)
+    strip.action_frame_end = min(last, first + room - strip.frame_start)
+    strip.action_frame_start = first
 
 
 def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:

@@ -25,6 +25,7 @@ from ..actions.renaming import follow_renamed, forget_names
 from ..actions.slots import (
     SlotTransform,
     actions_of,
+    choose_slots,
     filled_places_of,
     slot_transforms_of,
     slots_in,
@@ -343,7 +344,10 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> list[bpy.types.O
     name = operator[1] if operator != _State.operator else ""
     _State.operator = operator
     for obj, depsgraph in edited.items():
-        for place in filled_places_of(obj) if obj.is_editable else ():
+        if not obj.is_editable:
+            continue
+        choose_slots(obj)
+        for place in filled_places_of(obj):
             with _turn() as ours:
                 if ours:
                     outlet_of(place).prepare(place)
