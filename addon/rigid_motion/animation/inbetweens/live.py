@@ -24,7 +24,6 @@ from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed, forget_names
 from ..actions.slots import (
     SlotTransform,
-    actions_of,
     choose_slots,
     filled_places_of,
     slot_transforms_of,
@@ -33,6 +32,7 @@ from ..actions.slots import (
 from ..actions.sources import Source
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from . import glances, insertion, known_sources
+from .concerned import all_under, concerns_us, has_bones, has_mode
 from .densification import keep_motion
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
 from .outlets import outlet_of, regroup, release, remove_orphans
@@ -100,7 +100,7 @@ def refresh(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
     int
         How much had to be filled in anew, counted in transforms of slots.
     """
-    transforms = _all_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
+    transforms = all_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
     with _turn() as ours:
         if not ours:
             return 0
@@ -117,31 +117,14 @@ def refresh(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
         return count
 
 
-def _all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
-    """These objects, and of rigs all bones that their Actions move, or that have modes or constraints for them."""
-    found: dict[Transform, None] = {}
-    for obj in objects:
-        found[transform_of(obj)] = None
-        if obj.pose is not None and _has_bones(obj):
-            found |= dict.fromkeys(map(transform_of, obj.pose.bones))
-    return list(found)
-
-
 def _edited_in(obj: bpy.types.Object, frame: float) -> list[Transform]:
     """An object that was edited on the frame that is shown, and of a rig the bones that were."""
-    if obj.pose is None or not _has_bones(obj):
+    if obj.pose is None or not has_bones(obj):
         return [transform_of(obj)]
     changed, posed = glances.changed_bones(obj, frame), insertion.posed_of(obj)
     also = [bone for bone in obj.pose.bones if prefix_of(bone.name) in posed] if posed else []
-    itself = (obj,) if _has_mode(obj) else ()
+    itself = (obj,) if has_mode(obj) else ()
     return list(dict.fromkeys(map(transform_of, (*itself, *changed, *also))))
-
-
-def _has_bones(obj: bpy.types.Object) -> bool:
-    """Whether bones of a rig have anything to do with modes."""
-    return obj.rigid_motion.has_bones or any(
-        record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
-    )
 
 
 def refresh_read(readings: Sequence[tuple[SlotTransform, list[Source | Refused]]]) -> None:
@@ -303,9 +286,9 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
             # Only the original has an identity: that of the evaluated scene is 0.
             scene, frames = block.original, (block.frame_start, block.frame_end)
             if _State.ranges.get(scene.session_uid, frames) != frames:
-                edited += _all_under(filter(_concerns_us, scene.objects))
+                edited += all_under(filter(concerns_us, scene.objects))
             _State.ranges[scene.session_uid] = frames
-        if isinstance(block, bpy.types.Object) and _concerns_us(block):
+        if isinstance(block, bpy.types.Object) and concerns_us(block):
             for transform in _edited_in(block.original, frame):
                 if transform not in seen:
                     insertion.notice_pose(transform, frame)
@@ -314,32 +297,12 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
         refresh(edited)
 
 
-def _concerns_us(obj: bpy.types.Object) -> bool:
-    """Whether an object or its bones have, or had, anything to do with modes."""
-    if obj.rigid_motion.has_bones or _has_properties(obj):
-        return True
-    return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
-
-
-def _has_mode(obj: bpy.types.Object) -> bool:
-    """Whether an object itself has, or had, anything to do with modes."""
-    records = (record for action in actions_of(obj) for record in action.rigid_motion.slots)
-    return _has_properties(obj) or any(not record.prefix for record in records)
-
-
-def _has_properties(obj: bpy.types.Object) -> bool:
-    motion = obj.rigid_motion
-    return (
-        any(motion.filled) or bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
-    )
-
-
 def _before_evaluation(scene: bpy.types.Scene, frame: float) -> list[bpy.types.Object]:
     """Look at what was set and is not evaluated yet: what in-betweens will overwrite, and poses set in one go.
 
     Returns the objects of which anything was, as far as they have to do with modes.
     """
-    edited = {obj: depsgraph for obj, depsgraph in _unevaluated(scene) if _concerns_us(obj)}
+    edited = {obj: depsgraph for obj, depsgraph in _unevaluated(scene) if concerns_us(obj)}
     operator = _last_operator()
     name = operator[1] if operator != _State.operator else ""
     _State.operator = operator
@@ -395,7 +358,7 @@ def _look_again() -> None:
         _look_through()
     else:
         _keep_ranges()
-        refresh(_all_under(filter(_concerns_us, bpy.data.objects)))
+        refresh(all_under(filter(concerns_us, bpy.data.objects)))
 
 
 def _keep_ranges() -> None:
@@ -455,7 +418,7 @@ def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _State.unseen:
         _look_through()
     elif edited:
-        refresh(_all_under(edited))
+        refresh(all_under(edited))
     _State.waiting = []
     insertion.forget_poses()
     _State.frame = scene.frame_current_final
@@ -484,7 +447,7 @@ def _on_load(*arguments: object) -> None:
     _State.unseen = True
     with _turn() as ours:
         if ours:
-            transforms = _all_under(bpy.data.objects)
+            transforms = all_under(bpy.data.objects)
             moved = {user for place in slot_transforms_of(transforms) for user in place.users}
             adopt_from_properties(transform for transform in transforms if transform not in moved)
     _on_file(*arguments)

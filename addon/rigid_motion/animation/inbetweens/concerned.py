@@ -1,0 +1,47 @@
+"""Which objects and bones have to do with modes: all others are never read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+from ..actions.slots import actions_of
+from ..transforms import Transform, transform_of
+
+
+def all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
+    """These objects, and of rigs all bones that their Actions move, or that have modes or constraints for them."""
+    found: dict[Transform, None] = {}
+    for obj in objects:
+        found[transform_of(obj)] = None
+        if obj.pose is not None and has_bones(obj):
+            found |= dict.fromkeys(map(transform_of, obj.pose.bones))
+    return list(found)
+
+
+def concerns_us(obj: bpy.types.Object) -> bool:
+    """Whether an object or its bones have, or had, anything to do with modes."""
+    if obj.rigid_motion.has_bones or _has_properties(obj):
+        return True
+    return any(len(action.rigid_motion.slots) > 0 for action in actions_of(obj))
+
+
+def has_mode(obj: bpy.types.Object) -> bool:
+    """Whether an object itself has, or had, anything to do with modes."""
+    records = (record for action in actions_of(obj) for record in action.rigid_motion.slots)
+    return _has_properties(obj) or any(not record.prefix for record in records)
+
+
+def has_bones(obj: bpy.types.Object) -> bool:
+    """Whether bones of a rig have anything to do with modes."""
+    return obj.rigid_motion.has_bones or any(
+        record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
+    )
+
+
+def _has_properties(obj: bpy.types.Object) -> bool:
+    motion = obj.rigid_motion
+    return (
+        any(motion.filled) or bool(motion.filled_components) or motion.mode != "BLENDER" or motion.awaited != "BLENDER"
+    )
