@@ -102,12 +102,10 @@ class Source:
         """How many keys its channels have."""
         return sum(keys.interpolation.size for keys in self.curves)
 
-    @cached_property
+    @property
     def is_together(self) -> bool:
-        """Whether all channels have their keys on the same frames, one on each, and go through them once."""
-        if len(self.channels) != 1 or self.cyclic is not None:
-            return False
-        return bool(np.all(np.diff(self.curves[0].times) > SAME_FRAME))
+        """Whether all channels have their keys on the same frames, and go through them once."""
+        return len(self.channels) == 1 and self.cyclic is None
 
     @cached_property
     def keyed_frames(self) -> np.ndarray:

@@ -353,16 +353,21 @@ def _with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: 
     Where there is none, or a cycle jumps, the motion goes on as in the segment; where a segment holds, it rests.
     """
     rows = _packed(keys)
-    duration = times[:, 1] - times[:, 0]
-    follows = np.flatnonzero((owners[1:] == owners[:-1]) & np.all(rows[1:, 0] == rows[:-1, 1], axis=1))
     previous, following = _packed(beyond(keys[:, 0], keys[:, 1])), _packed(beyond(keys[:, 1], keys[:, 0]))
-    previous[follows + 1] = np.where(holds[follows, None], rows[follows + 1, 0], rows[follows, 0])
-    following[follows] = np.where(holds[follows + 1, None], rows[follows, 1], rows[follows + 1, 1])
+    # Between two keys on one frame there is nothing, and what is on either side meets there.
+    lasts = times[:, 1] > times[:, 0]
+    duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
+    left, right = np.flatnonzero(lasts)[:-1], np.flatnonzero(lasts)[1:]
+    meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
+    left, right = left[meet], right[meet]
+    previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
+    following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
     before, behind = duration.copy(), duration.copy()
-    before[follows + 1], behind[follows] = duration[follows], duration[follows + 1]
+    before[right], behind[left] = duration[left], duration[right]
+    start, end = times[:, 0], np.where(lasts, times[:, 1], times[:, 0] + duration)
     four = np.stack((previous, rows[:, 0], rows[:, 1], following), axis=1)
     return (
-        np.stack((times[:, 0] - before, times[:, 0], times[:, 1], times[:, 1] + behind), axis=1),
+        np.stack((start - before, start, end, end + behind), axis=1),
         Poses(four[..., :3], four[..., 3:7], None if keys.scales is None else four[..., 7]),
     )
 
