@@ -115,7 +115,7 @@ class Search:
             keys = self.refined(self.densified(fewer))
             best = self._better(best, keys)
             found.append(keys.indices)
-        if self.reach <= 1 and tries and len(self.recording.starts) == 1:
+        if self._is_linkable and tries:
             linked = linked_keys(self, found)
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
@@ -128,13 +128,18 @@ class Search:
 
     def _traded(self, best: Keys, tries: int) -> Keys:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
-        if self.reach > 1 or len(self.recording.starts) > 1 or not tries:
+        if not (self._is_linkable and tries):
             return best
         found = [best.indices]
         for other in OTHERS[:tries]:
             found.append(self._first(other).indices)
         traded = traded_keys(self, found)
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
+
+    @property
+    def _is_linkable(self) -> bool:
+        """Whether keys of several searches can be put together."""
+        return self.reach <= 1 and len(self.recording.starts) == 1
 
     def within_budget(self, budget: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""

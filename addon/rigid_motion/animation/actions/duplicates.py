@@ -7,11 +7,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..transforms import CONSTRAINT
 from .records import has_mode, recorded_digest
-from .slots import SlotTransform
-
-_TIMES = f'constraints["{CONSTRAINT}'
+from .slots import SlotTransform, is_time
 
 
 def original_of(place: SlotTransform) -> SlotTransform | None:
@@ -19,7 +16,7 @@ def original_of(place: SlotTransform) -> SlotTransform | None:
 
     It has what only in-betweens have, none of which are recorded, and its F-curves are those of the other slot.
     """
-    if recorded_digest(place) or not (place.filled or any(_TIMES in path for path, _ in place.curves)):
+    if recorded_digest(place) or not (place.filled or any(map(is_time, place.curves.values()))):
         return None
     differences = {pair.differences for pair in place.slot.action.rigid_motion.bone_slots}
     handles = {slot.handle for slot in place.slot.action.slots} - differences - {place.slot.handle}

@@ -106,7 +106,7 @@ class SlotTransform:
         return {
             (fcurve.data_path, fcurve.array_index): fcurve
             for fcurve in group.channels
-            if not fcurve.keyframe_points and (self.prefix or is_difference(fcurve.data_path))
+            if not fcurve.keyframe_points and (self.prefix or _is_difference(fcurve.data_path))
         }
 
     def has_filled(self, curves: Curves) -> None:
@@ -327,10 +327,10 @@ def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
     group = fcurve.group
     is_ours = group is not None and group.name == GROUP
-    return is_ours and not fcurve.keyframe_points and is_difference(fcurve.data_path)
+    return is_ours and not fcurve.keyframe_points and _is_difference(fcurve.data_path)
 
 
-def is_difference(path: str) -> bool:
+def _is_difference(path: str) -> bool:
     """Whether a data path is that of a delta transform."""
     return path.startswith("delta_")
 

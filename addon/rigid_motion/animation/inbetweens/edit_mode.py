@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 import bpy
 from bpy.app.handlers import persistent
 
+from ..handlers import append_handlers, remove_handlers
 from .outlets.mounting import lay_aside, take_up
 
 
@@ -69,11 +70,9 @@ HANDLERS = {
 
 
 def register() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    append_handlers(HANDLERS)
 
 
 def unregister() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    remove_handlers(HANDLERS)
     _for_rigs(_put_back, bpy.data.objects)

@@ -30,6 +30,7 @@ from ..actions.slots import (
     slots_in,
 )
 from ..actions.sources import Source
+from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from . import glances, insertion, known_sources
 from .concerned import all_under, concerns_us, has_bones, has_mode
@@ -394,9 +395,11 @@ def _before_update(scene: bpy.types.Scene, *_: object) -> None:
 @_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
-    if _State.unseen or are_separated(_edited_actions(depsgraph)):
-        _look_through()
     edited = _edited_actions(depsgraph)
+    if _State.unseen or are_separated(edited):
+        _look_through()
+        # Some may have been deleted by that.
+        edited = _edited_actions(depsgraph)
     later = _follow([action for action in edited if action.session_uid not in _State.followed])
     insertion.forget_poses(later)
     seen = _State.moved | later
@@ -479,8 +482,7 @@ HANDLERS = {
 def register() -> None:
     _State.unseen = True
     _State.graphs.clear()
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    append_handlers(HANDLERS)
     if not bpy.app.background:
         # While an extension is switched on, the file is out of its reach.
         bpy.app.timers.register(_look_through, first_interval=0.0)
@@ -489,5 +491,4 @@ def register() -> None:
 def unregister() -> None:
     if bpy.app.timers.is_registered(_look_through):
         bpy.app.timers.unregister(_look_through)
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    remove_handlers(HANDLERS)

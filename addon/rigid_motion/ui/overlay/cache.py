@@ -18,6 +18,7 @@ from bpy.app.handlers import persistent
 
 from ...animation.actions.slots import SlotTransform
 from ...animation.actions.sources import Source
+from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.inbetweens.mode_keys import active_places_of, frames_in, sources_of
 from ...animation.transforms import BoneTransform, Transform, transform_of
 from .bones import axis_length_of_bone, followed
@@ -182,11 +183,9 @@ HANDLERS = {
 
 
 def register() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(handler)
+    append_handlers(HANDLERS)
 
 
 def unregister() -> None:
-    for name, handler in HANDLERS.items():
-        getattr(bpy.app.handlers, name).remove(handler)
+    remove_handlers(HANDLERS)
     _entries.clear()
