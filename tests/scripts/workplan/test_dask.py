@@ -42,8 +42,19 @@ class Cluster:
         self.processes: list[subprocess.Popen] = []
         options = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show")
         self.scheduler = self._start("scheduler", *options, "--scheduler-file", self.file)
-        wait_for(self.file.is_file)
-        self.address = json.loads(self.file.read_text())["address"]
+        try:
+            wait_for(self._is_announced)
+            self.address = json.loads(self.file.read_text())["address"]
+        except BaseException:
+            self.stop()
+            raise
+
+    def _is_announced(self) -> bool:
+        """Dask opens the file first and writes it next: for a moment it is there and empty."""
+        try:
+            return "address" in json.loads(self.file.read_text())
+        except (FileNotFoundError, json.JSONDecodeError):
+            return False
 
     @property
     def workers(self) -> list[subprocess.Popen]:
