@@ -7,6 +7,8 @@ that means nothing, of what is selected for example, counts too: whether in-betw
 
 from __future__ import annotations
 
+import itertools
+import operator
 from collections.abc import Iterable, Sequence
 
 import bpy
@@ -64,8 +66,7 @@ class _Look:
         self.places = [(0, 0)] * len(self.fcurves)
         """Where the keys of each are in memory, and how many bytes: 0 where that is not known."""
         self.views = [_NOTHING] * len(self.fcurves)
-        self.flags, self.sizes, self.contents = self._flags(), *self._contents()
-        self.modified = self._modified()
+        self.flags, self.contents, self.modified = self._flags(), self._contents(), self._modified()
 
     def is_at(self, channelbag: bpy.types.ActionChannelbag) -> bool:
         """Whether these are still the F-curves that there are, under the same data paths."""
@@ -76,25 +77,16 @@ class _Look:
             and self.paths == [fcurve.data_path for fcurve in fcurves]
         )
 
-    def again(self) -> list[int]:
+    def again(self) -> set[int]:
         """Look again: the numbers of those that may have something else than before."""
-        flags, sizes, contents, places = self.flags, self.sizes, self.contents, self.places
-        modified, self.modified = self.modified, self._modified()
-        self.flags, self.sizes, self.contents = self._flags(), *self._contents()
-        stay = np.array([now == before for now, before in zip(self.places, places, strict=True)], dtype=bool)
-        # Of keys that lie where they lay the bytes are compared, all in one go.
-        if stay.all():
-            now, before = self.contents, contents
-        else:
-            now, before = (
-                raw[stay.repeat(lengths)] for raw, lengths in ((self.contents, self.sizes), (contents, sizes))
-            )
-        ends = np.cumsum(self.sizes[stay])
-        changed = ~stay | (self.flags != flags).any(axis=0)
-        changed[np.flatnonzero(stay)[ends.searchsorted(np.flatnonzero(now != before), side="right")]] = True
-        changed |= (self.sizes == 0) & [address > 0 for address, _ in self.places]
-        changed[modified + self.modified] = True
-        return np.flatnonzero(changed).tolist()
+        flags, contents, modified = self.flags, self.contents, self.modified
+        self.flags, self.contents, self.modified = self._flags(), self._contents(), self._modified()
+        changed = {*modified, *self.modified, *np.flatnonzero((self.flags != flags).any(axis=0)).tolist()}
+        if self.contents != contents:
+            changed.update(itertools.compress(itertools.count(), map(operator.ne, self.contents, contents)))
+        if not _key_size:
+            changed.update(number for number, (address, _) in enumerate(self.places) if address)
+        return changed
 
     def curves_under(self, prefix: str) -> Curves:
         """The F-curves whose data paths begin so."""
@@ -116,19 +108,16 @@ class _Look:
             self.channelbag.fcurves.foreach_get(name, row)
         return flags
 
-    def _contents(self) -> tuple[np.ndarray, np.ndarray]:
-        """The keys of all F-curves as they are in memory: how many bytes each has, and all of them."""
-        size, counts = _size_of_key(self.keys), map(len, self.keys)
-        places = [
-            (keys[0].as_pointer(), size * count) if count else (0, 0)
-            for count, keys in zip(counts, self.keys, strict=True)
-        ]
-        for number, (place, before) in enumerate(zip(places, self.places, strict=True)):
-            if place != before:
-                self.views[number] = _view(*place) if place[1] else _NOTHING
-        self.places = places
-        sizes = np.array([length for _, length in places], dtype=np.int64)
-        return sizes, np.concatenate((_NOTHING, *self.views))
+    def _contents(self) -> list[bytes]:
+        """The keys of each F-curve as they are in memory."""
+        size = _size_of_key(self.keys)
+        places = [(keys[0].as_pointer(), size * count) if (count := len(keys)) else (0, 0) for keys in self.keys]
+        if places != self.places:
+            for number, (place, before) in enumerate(zip(places, self.places, strict=True)):
+                if place != before:
+                    self.views[number] = _view(*place) if place[1] else _NOTHING
+            self.places = places
+        return [view.tobytes() for view in self.views]
 
 
 _NOTHING = np.empty(0, np.uint8)

@@ -162,6 +162,8 @@ def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if not _entries:
+        return
     # To Blender, whatever is animated was updated on every frame. Unless it plays, a script may really have edited it.
     windows = bpy.context.window_manager.windows
     if not any(window.screen.is_animation_playing or window.screen.is_scrubbing for window in windows):
