@@ -164,13 +164,13 @@ def test_a_task_that_fails_or_kills_its_process_is_told_and_the_others_go_on(
 def test_a_run_that_stops_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> None:
     workers = [process.pid for process in cluster.workers]
     with Workspace(tmp_path) as workspace, Connecting(tmp_path, cluster.address).executor as executor:
-        order = order_for(task("a", "sleep", seconds=60.0), {}, (), workspace)
+        order = order_for(task("a", "sleep", seconds=600.0), {}, (), workspace)
         executor.submit(order)
         wait_for(lambda: list(workspace.own.glob("scratch/*/a.txt")))
         before = [child for worker in workers for child in children(worker)]
         executor.stop()
-        wait_for(lambda: len([child for worker in workers for child in children(worker)]) < len(before), 2.0)
-        wait_for(lambda: not list(workspace.own.glob("scratch/*/a.txt")), 2.0)
+        wait_for(lambda: len([child for worker in workers for child in children(worker)]) < len(before))
+        wait_for(lambda: not list(workspace.own.glob("scratch/*/a.txt")))
 
 
 def test_workers_of_another_version_are_left_out(cluster: Cluster, tmp_path: Path) -> None:
