@@ -163,7 +163,9 @@ def test_a_task_that_fails_or_kills_its_process_is_told_and_the_others_go_on(
 
 def test_a_run_that_stops_leaves_no_process_at_work(cluster: Cluster, tmp_path: Path) -> None:
     workers = [process.pid for process in cluster.workers]
-    with Workspace(tmp_path) as workspace, Connecting(tmp_path, cluster.address).executor as executor:
+    connecting = Connecting(tmp_path, cluster.address)
+    with Workspace(tmp_path) as workspace, connecting.executor as executor:
+        connecting.wait_for_workers(len(workers))
         order = order_for(task("a", "sleep", seconds=600.0), {}, (), workspace)
         executor.submit(order)
         wait_for(lambda: list(workspace.own.glob("scratch/*/a.txt")))
