@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from distributed import Client
 
 from rigid_motion_batch import compare
 from rigid_motion_batch.workplan import ExecutorError, Plan, Workspace, run
@@ -97,6 +98,9 @@ def cluster_in(folder: Path, workers: int) -> Iterator[Cluster]:
     try:
         for _ in range(workers):
             made.add_worker()
+        if workers:
+            with Client(made.address, set_as_default=False) as client:
+                client.wait_for_workers(workers, timeout=60)
         yield made
     finally:
         made.stop()
