@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import bpy
 import pytest
 
-from rigid_motion.animation import set_enabled
+from rigid_motion.animation import set_enabled, set_mode
 from rigid_motion.animation.actions.slots import Slot, slots_in
 from rigid_motion.animation.inbetweens import glances
 from tests.animation.bones.rigs import key_all, key_bone, new_rig, with_edit_bones
@@ -174,6 +174,32 @@ def test_a_constraint_that_is_switched_off_is_noticed(rig):
     glances.changed_bones(rig, 1.0)
     constraint.mute = True
     assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Upper"]
+
+
+def test_settings_are_looked_at_where_something_of_the_rig_was_set(rig):
+    upper = rig.pose.bones["Upper"]
+    glances.changed_bones(rig, 1.0)
+    upper.rigid_motion.awaited, upper.location.x = "pga_slerp", 2.0
+    assert glances.changed_bones(rig, 1.0, is_set=False) == [upper]
+    assert glances.changed_bones(rig, 1.0, is_set=False) == []
+    assert glances.changed_bones(rig, 1.0) == [upper]
+
+
+def test_a_constraint_that_is_switched_off_together_with_an_edit_of_a_key_is_noticed(rig, monkeypatch):
+    set_enabled(True)
+    set_mode(rig.pose.bones, "dq_sclerp")
+    bpy.context.view_layer.update()
+    look, seen = glances.changed_bones, []
+    monkeypatch.setattr(glances, "changed_bones", lambda *rig, **how: seen.append((look(*rig, **how), how)) or [])
+    edited = location(rig, "Body").keyframe_points[1]
+    upper = rig.pose.bones["Upper"]
+    for together, found in ((False, []), (True, [upper])):
+        edited.co_ui.y += 0.1
+        if together:
+            upper.constraints[0].mute = True
+        bpy.context.view_layer.update()
+        assert seen == [(found, {"is_set": together})]
+        seen.clear()
 
 
 def test_all_bones_count_as_other_after_one_was_made(rig):

@@ -158,7 +158,8 @@ SAME_VALUE = 1e-6
 class _States:
     """All about the bones of a rig that in-betweens may depend on, but for their channels."""
 
-    def __init__(self, rig: bpy.types.Object) -> None:
+    def __init__(self, rig: bpy.types.Object, as_in: _States | None) -> None:
+        """Settings are taken `as_in` an earlier look, where that was at the same bones."""
         bones = rig.pose.bones
         self.names, columns = bones.keys(), []
         for name, width in WIDTHS.items():
@@ -168,13 +169,8 @@ class _States:
         modes = np.empty(len(bones), np.int32)
         bones.foreach_get("rotation_mode", modes)
         self.numbers = np.column_stack((*columns, modes))
-        self.settings = [
-            (
-                *((motion := bone.rigid_motion).mode, motion.awaited, motion.mounted),
-                *((one.name, one.mute) for one in bone.constraints if is_ours(one)),
-            )
-            for bone in bones
-        ]
+        is_known = as_in is not None and as_in.names == self.names
+        self.settings = as_in.settings if is_known else [_settings_of(bone) for bone in bones]
 
     def changed_from(self, before: _States) -> list[int]:
         """The numbers of the bones, the same ones, that were otherwise before."""
@@ -208,14 +204,21 @@ class _States:
         return [number for number in numbers if number in posed]
 
 
-def changed_bones(rig: bpy.types.Object, frame: float) -> list[bpy.types.PoseBone]:
+def _settings_of(bone: bpy.types.PoseBone) -> tuple:
+    motion = bone.rigid_motion
+    shown_by = [(one.name, one.mute) for one in bone.constraints if is_ours(one)]
+    return motion.mode, motion.awaited, motion.mounted, shown_by
+
+
+def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -> list[bpy.types.PoseBone]:
     """The bones of a rig that are other than at the last look: how they are posed, or what moves them.
 
-    Where another frame is shown than then, those do not count that are where the rig's Action has them.
+    Where another frame is shown than then, those do not count that are where the rig's Action has them. Settings, which
+    take longest to be asked for, are looked at where something of the rig itself `is_set`, not of its Action alone.
     """
-    now, bones = _States(rig), rig.pose.bones
-    moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses_of(rig).items()]
     before = _rigs.get(rig.session_uid)
+    now, bones = _States(rig, None if is_set or before is None else before[1]), rig.pose.bones
+    moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses_of(rig).items()]
     _rigs[rig.session_uid] = moved_by, now, frame
     if before is None or before[0] != moved_by or before[1].names != now.names:
         return list(bones)

@@ -73,6 +73,9 @@ class _State:
     moved: ClassVar[set[Transform]] = set()
     """What these move."""
 
+    objects: ClassVar[set[int]] = set()
+    """The objects of which something was set before Blender evaluated them, by session id."""
+
     operator = (0, "")
     """The operator that had ended last when edits were last seen."""
 
@@ -119,10 +122,11 @@ def refresh(targets: Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
 
 
 def _edited_in(obj: bpy.types.Object, frame: float) -> list[Transform]:
-    """An object that was edited on the frame that is shown, and of a rig the bones that were."""
+    """An object that was evaluated on the frame that is shown, and of a rig the bones of which anything was edited."""
     if obj.pose is None or not has_bones(obj):
         return [transform_of(obj)]
-    changed, posed = glances.changed_bones(obj, frame), insertion.posed_of(obj)
+    is_set = obj.session_uid in _State.objects
+    changed, posed = glances.changed_bones(obj, frame, is_set=is_set), insertion.posed_of(obj)
     also = [bone for bone in obj.pose.bones if prefix_of(bone.name) in posed] if posed else []
     itself = (obj,) if has_mode(obj) else ()
     return list(dict.fromkeys(map(transform_of, (*itself, *changed, *also))))
@@ -384,7 +388,7 @@ def _careful(handler: Callable) -> Callable:
 @_careful
 def _before_update(scene: bpy.types.Scene, *_: object) -> None:
     _State.frame = scene.frame_current_final
-    _before_evaluation(scene, _State.frame)
+    _State.objects = {obj.session_uid for obj in _before_evaluation(scene, _State.frame)}
     # In-betweens that are there by now are evaluated with the edit; later they would cost an evaluation of their own.
     edited = _actions_to_evaluate(scene)
     _State.followed = {action.session_uid for action in edited}
