@@ -36,14 +36,19 @@ from . import glances, insertion, known_sources
 from .concerned import all_under, concerns_us, has_bones, has_mode
 from .densification import keep_motion
 from .filling import clear, fill_in, follow_ranges, hold, is_complete
+from .graphs import (
+    BlockKey,
+    actions_to_evaluate,
+    edited_actions,
+    forget_graphs,
+    key_of,
+    objects_of,
+    objects_to_evaluate,
+)
 from .outlets import outlet_of, regroup, release, remove_orphans
 from .separated import are_separated, discard, give_keys_back, notice_slots
 
 log = logging.getLogger(__package__)
-
-
-BlockKey = tuple[str, str | None]
-"""What a data-block is found by in the file: its name, and the file that it is linked from."""
 
 
 class _State:
@@ -81,9 +86,6 @@ class _State:
 
     ranges: ClassVar[dict[int, tuple[int, int]]] = {}
     """First and last frame of each scene when last seen, by session id."""
-
-    graphs: ClassVar[set[int]] = set()
-    """The dependency graphs that have been evaluated since the extension was switched on or the file was opened."""
 
 
 def set_enabled(enabled: bool) -> None:
@@ -263,25 +265,6 @@ def _follow(actions: Collection[bpy.types.Action]) -> set[Transform]:
     return {user for place in places for user in place.users}
 
 
-def _edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Action]:
-    """The Actions that wait to be evaluated, or just were."""
-    if depsgraph is None or not depsgraph.id_type_updated("ACTION"):
-        return []
-    # By name: the original of what was deleted just now is no longer there to be asked for.
-    blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
-    found = (bpy.data.actions.get(_key_of(block)) for block in blocks)
-    return [action for action in found if action is not None]
-
-
-def _actions_to_evaluate(scene: bpy.types.Scene) -> set[bpy.types.Action]:
-    """The Actions that were edited since any of the scene's graphs was evaluated."""
-    return {action for layer in scene.view_layers for action in _edited_actions(layer.depsgraph)}
-
-
-def _key_of(block: bpy.types.ID) -> BlockKey:
-    return block.name, block.library and block.library.filepath
-
-
 def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Transform]) -> None:
     """Refresh after an edit of scenes, or of other objects than these, and notice how one was posed by hand."""
     edited = []
@@ -307,7 +290,7 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> list[bpy.types.O
 
     Returns the objects of which anything was, as far as they have to do with modes.
     """
-    edited = {obj: depsgraph for obj, depsgraph in _unevaluated(scene) if concerns_us(obj)}
+    edited = {obj: depsgraph for obj, depsgraph in objects_to_evaluate(scene) if concerns_us(obj)}
     operator = _last_operator()
     name = operator[1] if operator != _State.operator else ""
     _State.operator = operator
@@ -324,23 +307,6 @@ def _before_evaluation(scene: bpy.types.Scene, frame: float) -> list[bpy.types.O
                     with suppress(Refused):
                         insertion.notice_assignment(transform, depsgraph, frame, operator=name)
     return list(edited)
-
-
-def _unevaluated(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
-    """The objects that wait to be evaluated: all where nothing has been yet. With the graph they were evaluated in."""
-    for layer in scene.view_layers:
-        depsgraph = layer.depsgraph
-        known = depsgraph is not None and depsgraph.as_pointer() in _State.graphs
-        if depsgraph is not None:
-            _State.graphs.add(depsgraph.as_pointer())
-        # What is new in a scene is in no graph yet.
-        if not known or depsgraph.id_type_updated("SCENE") or depsgraph.id_type_updated("COLLECTION"):
-            yield from ((obj, None) for obj in scene.objects)
-        if known and depsgraph.id_type_updated("OBJECT"):
-            # By name: the original of what was deleted just now is no longer there to be asked for.
-            blocks = (update.id for update in depsgraph.updates)
-            found = (bpy.data.objects.get(block.name) for block in blocks if isinstance(block, bpy.types.Object))
-            yield from ((obj, depsgraph) for obj in found if obj is not None)
 
 
 def _last_operator() -> tuple[int, str]:
@@ -390,7 +356,7 @@ def _before_update(scene: bpy.types.Scene, *_: object) -> None:
     _State.frame = scene.frame_current_final
     _State.objects = {obj.session_uid for obj in _before_evaluation(scene, _State.frame)}
     # In-betweens that are there by now are evaluated with the edit; later they would cost an evaluation of their own.
-    edited = _actions_to_evaluate(scene)
+    edited = actions_to_evaluate(scene)
     _State.followed = {action.session_uid for action in edited}
     _State.moved = _follow(edited)
     insertion.forget_poses(_State.moved)
@@ -399,11 +365,11 @@ def _before_update(scene: bpy.types.Scene, *_: object) -> None:
 @_careful
 def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _State.frame = scene.frame_current_final
-    edited = _edited_actions(depsgraph)
+    edited = edited_actions(depsgraph)
     if _State.unseen or are_separated(edited):
         _look_through()
         # Some may have been deleted by that.
-        edited = _edited_actions(depsgraph)
+        edited = edited_actions(depsgraph)
     later = _follow([action for action in edited if action.session_uid not in _State.followed])
     insertion.forget_poses(later)
     seen = _State.moved | later
@@ -415,13 +381,13 @@ def _on_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @_careful
 def _before_frame(scene: bpy.types.Scene, *_: object) -> None:
     # Edits that nobody has seen yet were made on the frame before this one. Afterwards all that is played looks edited.
-    _State.waiting = [_key_of(obj) for obj in _before_evaluation(scene, _State.frame)]
-    _follow(_actions_to_evaluate(scene))
+    _State.waiting = [key_of(obj) for obj in _before_evaluation(scene, _State.frame)]
+    _follow(actions_to_evaluate(scene))
 
 
 @_careful
 def _on_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    edited = [obj for obj in map(bpy.data.objects.get, _State.waiting) if obj is not None]
+    edited = objects_of(_State.waiting)
     if _State.unseen:
         _look_through()
     elif edited:
@@ -450,7 +416,7 @@ def _on_load(*arguments: object) -> None:
     insertion.forget_file()
     known_sources.forget_all()
     glances.forget_all()
-    _State.graphs.clear()
+    forget_graphs()
     _State.unseen = True
     with _turn() as ours:
         if ours:
@@ -485,7 +451,7 @@ HANDLERS = {
 
 def register() -> None:
     _State.unseen = True
-    _State.graphs.clear()
+    forget_graphs()
     append_handlers(HANDLERS)
     if not bpy.app.background:
         # While an extension is switched on, the file is out of its reach.

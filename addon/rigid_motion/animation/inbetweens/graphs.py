@@ -1,0 +1,58 @@
+"""What Blender's dependency graphs tell: which data-blocks were edited, before they are evaluated and after it.
+
+Data-blocks are found by their names, for the original of what was deleted just now is no longer there to be asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import bpy
+
+BlockKey = tuple[str, str | None]
+"""What a data-block is found by in the file: its name, and the file that it is linked from."""
+
+_evaluated: set[int] = set()
+"""The addresses of the graphs that have been evaluated since the extension was switched on or the file was opened."""
+
+
+def forget_graphs() -> None:
+    """Take nothing for evaluated."""
+    _evaluated.clear()
+
+
+def key_of(block: bpy.types.ID) -> BlockKey:
+    return block.name, block.library and block.library.filepath
+
+
+def objects_of(keys: Iterable[BlockKey]) -> list[bpy.types.Object]:
+    """The objects with these keys that are still there."""
+    return [obj for obj in map(bpy.data.objects.get, keys) if obj is not None]
+
+
+def edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Action]:
+    """The Actions that wait to be evaluated, or just were."""
+    if depsgraph is None or not depsgraph.id_type_updated("ACTION"):
+        return []
+    blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Action)]
+    return [action for action in map(bpy.data.actions.get, map(key_of, blocks)) if action is not None]
+
+
+def actions_to_evaluate(scene: bpy.types.Scene) -> set[bpy.types.Action]:
+    """The Actions that were edited since any of the scene's graphs was evaluated."""
+    return {action for layer in scene.view_layers for action in edited_actions(layer.depsgraph)}
+
+
+def objects_to_evaluate(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
+    """The objects that wait to be evaluated: all where nothing has been yet. With the graph they were evaluated in."""
+    for layer in scene.view_layers:
+        depsgraph = layer.depsgraph
+        known = depsgraph is not None and depsgraph.as_pointer() in _evaluated
+        if depsgraph is not None:
+            _evaluated.add(depsgraph.as_pointer())
+        # What is new in a scene is in no graph yet.
+        if not known or depsgraph.id_type_updated("SCENE") or depsgraph.id_type_updated("COLLECTION"):
+            yield from ((obj, None) for obj in scene.objects)
+        if known and depsgraph.id_type_updated("OBJECT"):
+            blocks = [update.id for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
+            yield from ((obj, depsgraph) for obj in objects_of(map(key_of, blocks)))
