@@ -56,6 +56,17 @@ def swap_two(rig: bpy.types.Object) -> None:
     rig.data.bones["Spare"].name = "Upper"
 
 
+def swap_two_in_edit_mode(rig: bpy.types.Object) -> None:
+    def swap(edit_bones: bpy.types.ArmatureEditBones) -> None:
+        # The first update in Edit Mode is when constraints are laid aside.
+        bpy.context.view_layer.update()
+        edit_bones["Lower"].name = "Spare"
+        edit_bones["Upper"].name = "Lower"
+        edit_bones["Spare"].name = "Upper"
+
+    with_edit_bones(rig, swap)
+
+
 def pass_names_on(rig: bpy.types.Object) -> None:
     rig.data.bones["Hand"].name = "Finger"
     rig.data.bones["Lower"].name = "Hand"
@@ -70,6 +81,7 @@ RENAMINGS = {
     "in Pose Mode": make_lower_fore,
     "in Edit Mode": make_lower_fore_in_edit_mode,
     "of two, swapped": swap_two,
+    "of two, swapped in Edit Mode": swap_two_in_edit_mode,
     "one after the other": pass_names_on,
     "with odd signs": into_odd_signs,
 }

@@ -141,6 +141,14 @@ def rename_records(slot: Slot, prefixes: Mapping[str, str]) -> None:
             record.name = _key(slot, record.prefix)
 
 
+def forget_in_betweens(slot: Slot, prefixes: Iterable[str]) -> None:
+    """Have records of a slot not say what in-betweens were made from: then they are made anew."""
+    prefixes = set(prefixes)
+    for record in slot.action.rigid_motion.slots:
+        if record.handle == slot.handle and record.prefix in prefixes:
+            record.digest = ""
+
+
 def _record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
     records, key = place.slot.action.rigid_motion.slots, _key(place.slot, place.prefix)
     number = _numbers.get(key, -1)

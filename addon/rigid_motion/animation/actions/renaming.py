@@ -6,12 +6,12 @@ at once, so that two can swap their names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 import bpy
 
 from ..transforms import Transform, prefix_of, split_path, transform_of
-from .records import NOTHING_RECORDED, keep_name, recorded, rename_records
+from .records import NOTHING_RECORDED, forget_in_betweens, keep_name, recorded, rename_records
 from .slots import Slot, SlotTransform, slots_of
 
 
@@ -21,16 +21,30 @@ def follow_renamed(places: Iterable[SlotTransform]) -> None:
     users = {user for place in bones for user in place.users}
     rigs = {user.animated for user in users}
     looked_at = (bone for rig in rigs for bone in _bones_of(rig)) if len(bones) > 1 else users
-    renamed = {bone.animated for bone in looked_at if _is_renamed(bone)}
-    for slot in slots_of(renamed) if renamed else ():
-        if slot.action.is_editable:
-            rename_records(slot, _renamed_in(slot))
-    for rig in renamed:
-        for bone in filter(_is_renamed, _bones_of(rig)):
-            bone.motion.recorded_as = bone.carrier.name
+    _follow({bone.animated for bone in looked_at if _is_renamed(bone)})
     for place in bones:
         if recorded(place) != NOTHING_RECORDED:
             keep_name(place)
+
+
+def follow_renamed_in(rig: bpy.types.Object) -> None:
+    """Have records follow the bones of a rig that were renamed."""
+    if any(map(_is_renamed, _bones_of(rig))):
+        _follow({rig})
+
+
+def _follow(renamed: Collection[bpy.types.Object]) -> None:
+    """Have records follow the bones of these rigs, all of which have some that were renamed."""
+    for slot in slots_of(renamed) if renamed else ():
+        if slot.action.is_editable:
+            names = _renamed_in(slot)
+            rename_records(slot, names)
+            # Of what no constraint shows Blender renames nothing: where two have swapped names, all looks complete.
+            if any(user.rigid_motion.laid_aside for user in slot.users):
+                forget_in_betweens(slot, names.values())
+    for rig in renamed:
+        for bone in filter(_is_renamed, _bones_of(rig)):
+            bone.motion.recorded_as = bone.carrier.name
 
 
 def forget_names(transforms: Iterable[Transform]) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 import bpy
 from bpy.app.handlers import persistent
 
+from ..actions.renaming import follow_renamed_in
 from ..handlers import append_handlers, remove_handlers
 from .outlets.mounting import lay_aside, take_up
 
@@ -28,6 +29,7 @@ def follow_mode(rig: bpy.types.Object) -> None:
 
 def _put_back(rig: bpy.types.Object) -> None:
     if rig.rigid_motion.laid_aside:
+        follow_renamed_in(rig)
         take_up(rig)
         rig.rigid_motion.laid_aside = False
 
