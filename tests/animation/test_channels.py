@@ -157,6 +157,21 @@ def test_linear_extrapolation_goes_on_with_the_rigid_motion(live_file, order, in
     assert_shown([obj], np.arange(71.0))
 
 
+@pytest.mark.parametrize("kind", ["LINK_COPY", "FULL_COPY"])
+def test_linear_extrapolation_goes_on_to_where_a_scene_ends_that_was_made_anew(live_file, kind):
+    obj = key(new_object(), (5.0, 11.0, 30.0), interpolation="LINEAR")
+    live_file.scene.frame_start, live_file.scene.frame_end = 0, 45
+    for fcurve in curves_of(obj).values():
+        fcurve.extrapolation = "LINEAR"
+    set_mode(obj, "dq_sclerp")
+    bpy.context.view_layer.update()
+    bpy.ops.scene.new(type=kind)
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_end = 70
+    bpy.context.view_layer.update()
+    assert_shown(bpy.context.scene.objects, np.arange(71.0))
+
+
 def test_linear_extrapolation_of_some_channels_leaves_the_others_at_rest(live_file):
     obj = key(new_object(), (5.0, 11.0, 30.0), interpolation="LINEAR")
     live_file.scene.frame_start, live_file.scene.frame_end = 0, 45

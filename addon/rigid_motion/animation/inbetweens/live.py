@@ -273,7 +273,7 @@ def _follow_objects(depsgraph: bpy.types.Depsgraph, frame: float, seen: set[Tran
         if isinstance(block, bpy.types.Scene):
             # Only the original has an identity: that of the evaluated scene is 0.
             scene, frames = block.original, (block.frame_start, block.frame_end)
-            if _State.ranges.get(scene.session_uid, frames) != frames:
+            if _State.ranges.get(scene.session_uid) != frames:
                 edited += all_under(filter(concerns_us, scene.objects))
             _State.ranges[scene.session_uid] = frames
         if isinstance(block, bpy.types.Object) and concerns_us(block):
