@@ -3,6 +3,8 @@ about their own, and go by the same screw as if there was no such setting."""
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from mathutils import Euler, Matrix, Vector
 
 from rigid_motion import animation
 from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.bones.rigs import with_edit_bones
 from tests.animation.oracle import curves_of
 from tests.rigs import scenes
 
@@ -91,13 +94,34 @@ def test_baked_it_stays_where_it_is(pair):
     np.testing.assert_allclose(after, before, atol=1e-5)
 
 
-def test_when_it_gets_other_axes_the_in_betweens_are_made_anew_at_once(pair):
+def toggle(rig: bpy.types.Object) -> None:
+    rig.data.bones["B"].use_local_location = True
+
+
+def roll(rig: bpy.types.Object, name: str) -> None:
+    with_edit_bones(rig, lambda bones: setattr(bones[name], "roll", 1.5))
+
+
+REST_EDITS = {
+    "by its setting": toggle,
+    "by its roll": partial(roll, name="B"),
+    "by its parent's": partial(roll, name="Parent"),
+}
+
+
+@pytest.mark.parametrize("edit", REST_EDITS.values(), ids=REST_EDITS)
+def test_when_it_gets_other_axes_the_in_betweens_are_made_anew_at_once(pair, edit):
     pose(pair)
     animation.set_mode([pair[1]], "dq_sclerp")
-    pair[1].bone.use_local_location = True
+    rig = pair[1].id_data
+    rig.update_tag()
     bpy.context.view_layer.update()
-    (followed,) = shown((pair[1],))
+    edit(rig)
+    bpy.context.view_layer.update()
+    bone = rig.pose.bones["B"]
+    (followed,) = shown((bone,))
+    assert animation.refresh() == 0
     for mode in ("BLENDER", "dq_sclerp"):
-        animation.set_mode([pair[1]], mode)
-    (anew,) = shown((pair[1],))
+        animation.set_mode([bone], mode)
+    (anew,) = shown((bone,))
     np.testing.assert_allclose(followed, anew, atol=1e-6)

@@ -22,7 +22,7 @@ _looks: dict[tuple[int, int], _Look] = {}
 """At the slots of rigs, the last of each: by the Action's session id, and the slot's handle."""
 
 _rigs: dict[int, tuple[object, _States, float]] = {}
-"""Of each rig what moves it, what its bones were, and on which frame, by its session id."""
+"""Of each rig what all its bones depend on, what they were, and on which frame, by its session id."""
 
 
 def forget_all() -> None:
@@ -219,13 +219,25 @@ def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -
     before = _rigs.get(rig.session_uid)
     now, bones = _States(rig, None if is_set or before is None else before[1]), rig.pose.bones
     moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses_of(rig).items()]
-    _rigs[rig.session_uid] = moved_by, now, frame
-    if before is None or before[0] != moved_by or before[1].names != now.names:
+    shared = moved_by, _rest_of(rig.data.bones)
+    _rigs[rig.session_uid] = shared, now, frame
+    if before is None or before[0] != shared or before[1].names != now.names:
         return list(bones)
     changed = now.changed_from(before[1])
     if changed and before[2] != frame:
         changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
     return [bones[number] for number in changed]
+
+
+def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:
+    """How bones are at rest, as far as it matters to any: for the axes of locations that are not the bone's own."""
+    is_local = np.empty(len(bones), bool)
+    bones.foreach_get("use_local_location", is_local)
+    if is_local.all():
+        return b""
+    at_rest = np.empty((len(bones), 16), np.float32)
+    bones.foreach_get("matrix_local", at_rest.ravel())
+    return is_local.tobytes() + at_rest.tobytes()
 
 
 def _played_fcurves(rig: bpy.types.Object) -> Iterable[bpy.types.FCurve]:
