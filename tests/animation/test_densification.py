@@ -107,3 +107,27 @@ def test_bake_channels_keeps_the_motion(tool, remove):
         bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, remove_outside_range=remove, interpolation_type="LIN")
     bpy.context.view_layer.update()
     assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)
+
+
+def test_keys_that_are_edited_before_blender_tells_of_bake_channels_stay_as_far_off(tool):
+    before = shown_worlds([tool], FRAMES)[0]
+    with dope_sheet():
+        bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, interpolation_type="LIN")
+    fcurve = curves_of(tool)["location", 1]
+    for frame in (14, 15, 30):
+        (point,) = (one for one in fcurve.keyframe_points if one.co.x == frame)
+        point.co_ui.y += 0.25
+        before[FRAMES.index(frame), 1, 3] += 0.25
+    bpy.context.view_layer.update()
+    assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)
+
+
+def test_where_most_keys_are_off_the_curves_they_stay_as_they_are(tool):
+    with dope_sheet():
+        bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, interpolation_type="LIN")
+    fcurve = curves_of(tool)["location", 1]
+    for point in fcurve.keyframe_points:
+        point.co_ui.y += 0.25
+    values = [point.co.y for point in fcurve.keyframe_points]
+    bpy.context.view_layer.update()
+    assert [point.co.y for point in fcurve.keyframe_points] == values
