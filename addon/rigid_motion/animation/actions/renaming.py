@@ -1,18 +1,19 @@
 """Bones that were renamed: Blender renames the F-curves of their Actions, and the records of these have to follow.
 
 A bone keeps the name that records have it under. Where it has another one by now, it was renamed. Several are followed
-at once, so that two can swap their names.
+at once, so that two can swap their names. Actions from before keys were baked or reduced, which nothing plays, Blender
+leaves as they are: there the F-curves follow as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import bpy
 
-from ..transforms import Transform, prefix_of, split_path, transform_of
+from ..transforms import Transform, bone_name, prefix_of, split_path, transform_of
 from .records import NOTHING_RECORDED, forget_in_betweens, keep_name, recorded, rename_records
-from .slots import Slot, SlotTransform, slots_of
+from .slots import Slot, SlotTransform, slots_in, slots_of
 
 
 def follow_renamed(places: Iterable[SlotTransform]) -> None:
@@ -36,14 +37,25 @@ def follow_renamed_in(rig: bpy.types.Object) -> None:
 def _follow(renamed: Collection[bpy.types.Object]) -> None:
     """Have records follow the bones of these rigs, all of which have some that were renamed."""
     for slot in slots_of(renamed) if renamed else ():
+        names = _renamed_in(slot)
         if slot.action.is_editable:
-            names = _renamed_in(slot)
             rename_records(slot, names)
             # Of what no constraint shows Blender renames nothing: where two have swapped names, all looks complete.
             if any(user.rigid_motion.laid_aside for user in slot.users):
                 forget_in_betweens(slot, names.values())
+        for original in _originals_of(slot) if names else ():
+            rename_records(original, names)
+            for channelbag in filter(None, (original.channelbag, original.bones_channelbag)):
+                _rename_channels(channelbag, names)
     for rig in renamed:
         for bone in filter(_is_renamed, _bones_of(rig)):
+            bone.motion.recorded_as = bone.carrier.name
+
+
+def keep_names(rig: bpy.types.Object) -> None:
+    """Have all bones of a rig keep their names, for Actions from before keys were baked or reduced."""
+    for bone in _bones_of(rig):
+        if not bone.motion.recorded_as:
             bone.motion.recorded_as = bone.carrier.name
 
 
@@ -79,3 +91,38 @@ def _renamed_in(slot: Slot) -> dict[str, str]:
         for known, found in names.items()
     }
     return {prefix_of(known): prefix_of(name) for known, name in now.items() if name != known}
+
+
+def _originals_of(slot: Slot) -> list[Slot]:
+    """The slots from before keys of rigs were baked or reduced in this one, as far as nothing moves by them."""
+    rigs = [user for user in slot.users if user.pose is not None]
+    owners = [owner for rig in rigs for owner in (rig, *rig.pose.bones)]
+    notes = [entry for owner in owners for entry in owner.rigid_motion.bakes if entry.changed == slot.action]
+    name = next(one.identifier for one in slot.action.slots if one.handle == slot.handle)
+    found = {
+        (action, action.slots[name].handle)
+        for action in {entry.original for entry in notes if entry.original is not None}
+        if action.is_editable and name in action.slots
+    }
+    played = {(other.action, other.handle) for other in slots_in({action for action, _ in found})}
+    return [Slot(*key, (), frozenset()) for key in found - played]
+
+
+def _rename_channels(channelbag: bpy.types.ActionChannelbag, prefixes: Mapping[str, str]) -> None:
+    """Give F-curves and their groups the names of other bones, all at once, in place of those that are gone."""
+    curves = [(fcurve, *split_path(fcurve.data_path)) for fcurve in channelbag.fcurves]
+    moved = {prefix for _, prefix, _ in curves} & set(prefixes)
+    gone = {prefixes[prefix] for prefix in moved} - moved
+    groups: dict[str, bpy.types.ActionGroup] = {}
+    for fcurve, prefix, rest in curves:
+        if prefix in moved:
+            fcurve.data_path = prefixes[prefix] + rest
+            if fcurve.group is not None and fcurve.group.name == bone_name(prefix):
+                groups[bone_name(prefixes[prefix])] = fcurve.group
+        elif prefix in gone:
+            channelbag.fcurves.remove(fcurve)
+    # Two groups that swap their names cannot have the same one in between.
+    for number, group in enumerate(groups.values()):
+        group.name = f"{number} renamed"
+    for name, group in groups.items():
+        group.name = name

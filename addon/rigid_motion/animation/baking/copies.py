@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
-from ..actions.slots import Slot, SlotTransform, places_of
+from ..actions.slots import Slot, SlotTransform, places_of, transforms_in
 from ..transforms import Transform, is_ours, transform_of
 
 BAKED, REDUCED = "BAKED", "REDUCED"
@@ -29,6 +29,27 @@ def note(transform: Transform, kind: str, changed: bpy.types.Action, original: b
     """Note on something that it was given other keys in an Action, and which one has those from before."""
     entry = transform.motion.bakes.add()
     entry.kind, entry.changed, entry.original = kind, changed, original
+    entry.components = transform.components()
+
+
+def let_rest(
+    transform: Transform, entry: bpy.types.PropertyGroup, changed: SlotTransform, original: SlotTransform
+) -> None:
+    """Give properties that got keys only with a copy the values that they had before."""
+    if not entry.is_property_set("components"):
+        # From a version that did not note them.
+        return
+    for row, (path, index) in transform.channels.items():
+        before = original.curves.get((path, index))
+        if (path, index) in changed.curves and (before is None or before.mute):
+            getattr(transform.carrier, path.removeprefix(transform.prefix))[index] = entry.components[row]
+
+
+def in_action(action: bpy.types.Action, place: SlotTransform) -> SlotTransform:
+    """The same transform in the slot of the same name in another Action."""
+    name = next(slot.identifier for slot in place.slot.action.slots if slot.handle == place.slot.handle)
+    slot = Slot(action, action.slots[name].handle, place.slot.users, place.slot.strips)
+    return transforms_in(slot, (place.prefix,))[0]
 
 
 def exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:

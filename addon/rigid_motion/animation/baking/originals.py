@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..actions.slots import SlotTransform, places_of
 from ..transforms import Refused, Transform
 from . import rigs
-from .copies import BAKED, REDUCED, copied, entries_in_use, exchange, note
+from .copies import BAKED, REDUCED, copied, entries_in_use, exchange, in_action, let_rest, note
 
 NOT_DONE = {
     BAKED: n_("{name} is not baked, or has another Action by now"),
@@ -87,7 +87,8 @@ def put_back(transform: Transform, kind: str) -> None:
     bakes = transform.motion.bakes
     for number in reversed(range(len(bakes))):
         entry = bakes[number]
-        if entry.original is None or all(place.slot.action != entry.changed for place in places_of(transform)):
+        place = next((place for place in places_of(transform) if place.slot.action == entry.changed), None)
+        if entry.original is None or place is None:
             continue
         if entry.kind != kind:
             break
@@ -95,7 +96,9 @@ def put_back(transform: Transform, kind: str) -> None:
         if entry.is_property_set("mode"):
             # From a version that kept modes on objects: the original takes it from there.
             transform.motion.mode = entry.mode
+        before = in_action(entry.original, place)
         exchange(transform.animated, changed, entry.original)
+        let_rest(transform, entry, place, before)
         bakes.remove(number)
         if not changed.users:
             bpy.data.actions.remove(changed)

@@ -15,10 +15,11 @@ import numpy as np
 
 from ..actions.channels import copy_fcurve, key_fields
 from ..actions.records import record_mode, recorded_mode
+from ..actions.renaming import keep_names
 from ..actions.slots import Slot, SlotTransform, places_of, slots_of, transforms_in
 from ..curves import read_keys
 from ..transforms import MODE_PROPERTY, WIDTHS, Transform
-from .copies import copied, exchange, note
+from .copies import copied, exchange, in_action, let_rest, note
 
 
 def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
@@ -34,6 +35,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
             changed = copied(place.slot, kind)
             exchange(rig, original, changed)
             _rename_in_notes(rig, original, changed)
+            keep_names(rig)
         else:
             original = before
     note(transform, kind, changed, original)
@@ -51,7 +53,9 @@ def put_back(transform: Transform, kind: str) -> None:
         if entry.kind != kind:
             break
         changed, original = entry.changed, entry.original
-        _copy_channels(_in(original, place), place)
+        before = in_action(original, place)
+        let_rest(transform, entry, place, before)
+        _copy_channels(before, place)
         bakes.remove(number)
         _go_back_to(transform.animated, changed, original, place.slot)
 
@@ -84,16 +88,9 @@ def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
     return any(one.users != (rig,) for one in slots_of([rig]) if (one.action, one.handle) == (slot.action, slot.handle))
 
 
-def _in(action: bpy.types.Action, place: SlotTransform) -> SlotTransform:
-    """The same transform in the slot of the same name in another Action."""
-    name = next(slot.identifier for slot in place.slot.action.slots if slot.handle == place.slot.handle)
-    slot = Slot(action, action.slots[name].handle, place.slot.users, place.slot.strips)
-    return transforms_in(slot, (place.prefix,))[0]
-
-
 def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
     """Whether a transform has the same keys and modes in another Action."""
-    other = _in(action, place)
+    other = in_action(action, place)
     return _summary(other) == _summary(place) and recorded_mode(other) == recorded_mode(place)
 
 
@@ -136,7 +133,7 @@ def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.
     if any(entry.changed == changed and entry.original == original for entry in _entries(rig)):
         return
     here = transforms_in(slot)
-    there = {place.prefix for place in transforms_in(_in(original, here[0]).slot)}
+    there = {place.prefix for place in transforms_in(in_action(original, here[0]).slot)}
     if {place.prefix for place in here} == there and all(_is_as_in(original, place) for place in here):
         exchange(rig, changed, original)
         _rename_in_notes(rig, changed, original)

@@ -1,0 +1,110 @@
+"""The way back from baked and reduced keys, whatever has become of bones and their names meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import bake, channelbag_of, reduce_keys_of, refresh, restore_keys, set_mode, unbake
+from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_poses
+from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig, select_only
+from tests.animation.bones.test_rig_edits import RENAMINGS, assert_nothing_stale
+from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.scenes import key, new_object
+
+Change = tuple[bpy.types.Object, Callable[[], None]]
+
+
+@pytest.fixture(params=["all bones baked", "some bones baked", "all bones reduced"])
+def changed(request, live_file) -> Iterator[Change]:
+    """A rig, the keys of which get others, and what brings them back."""
+    if "reduced" in request.param:
+        rig = key_all(new_rig(), np.arange(1.0, 41.0), amount=0.05)
+        yield rig, lambda: reduce_keys_of(list(rig.pose.bones), "motor_spline", 0.5), restore_keys
+    else:
+        rig = moving_rig()
+        count = 2 if "some" in request.param else 4
+        yield rig, lambda: bake(list(rig.pose.bones)[:count]), unbake
+
+
+@pytest.mark.parametrize("rename", RENAMINGS.values(), ids=RENAMINGS)
+def test_bones_that_were_renamed_get_their_own_keys_back(changed, rename):
+    rig, change, go_back = changed
+    bones, own = list(rig.pose.bones), rig.animation_data.action
+    before, wanted, was = (
+        [snapshot(bone) for bone in bones],
+        shown_poses([rig], PLAYED)[0],
+        [bone.name for bone in bones],
+    )
+    change()
+    assert rig.animation_data.action != own
+    rename(rig)
+    bpy.context.view_layer.update()
+    go_back([bone for bone in rig.pose.bones if len(bone.rigid_motion.bakes)])
+    bpy.context.view_layer.update()
+    assert rig.animation_data.action == own
+    assert [snapshot(bone) for bone in rig.pose.bones] == before
+    now = dict(zip(rig.pose.bones.keys(), was, strict=True))
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], {name: wanted[old] for name, old in now.items()})
+    assert refresh() == 0
+    assert_nothing_stale()
+
+
+def test_copies_of_bones_leave_the_originals_their_keys(changed):
+    rig, change, go_back = changed
+    before = {bone.name: snapshot(bone) for bone in rig.pose.bones}
+    change()
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.armature.select_all(action="SELECT")
+    bpy.ops.armature.duplicate()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    refresh()
+    go_back([bone for bone in rig.pose.bones if len(bone.rigid_motion.bakes) and bone.name in before])
+    assert {name: snapshot(rig.pose.bones[name]) for name in before} == before
+
+
+def test_an_original_that_another_rig_plays_keeps_its_names(live_file):
+    rig = moving_rig()
+    own = rig.animation_data.action
+    bake(list(rig.pose.bones))
+    other = new_rig("Other")
+    other.animation_data_create().action = own
+    other.animation_data.action_slot = own.slots[0]
+    refresh()
+    wanted = shown_poses([other], PLAYED)[0]
+    rig.data.bones["Lower"].name = "Fore"
+    bpy.context.view_layer.update()
+    refresh()
+    assert_same_poses(other, PLAYED, shown_poses([other], PLAYED)[0], wanted)
+
+
+@pytest.mark.parametrize("muted", [False, True], ids=["without keys", "muted"])
+@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
+    obj = key_all(new_rig()) if of_bones else key(new_object())
+    carrier, targets = (obj.pose.bones["Upper"], list(obj.pose.bones)) if of_bones else (obj, obj)
+    for index in (1, 2):
+        fcurve = curves_of(carrier)["location", index]
+        if muted:
+            fcurve.mute = True
+        else:
+            channelbag_of(obj).fcurves.remove(fcurve)
+    carrier.location.yz = rest = (0.75, 0.25)
+    set_mode(targets, "dq_sclerp")
+    wanted = shown_poses([obj], PLAYED)[0] if of_bones else shown_worlds([obj], PLAYED)[0]
+    bpy.context.scene.frame_set(20)
+    bake(targets)
+    bpy.context.view_layer.update()
+    assert tuple(carrier.location.yz) != rest
+    unbake(targets)
+    assert tuple(carrier.location.yz) == rest
+    if of_bones:
+        assert_same_poses(obj, PLAYED, shown_poses([obj], PLAYED)[0], wanted)
+        assert_posed(obj, PLAYED)
+    else:
+        assert np.abs(shown_worlds([obj], PLAYED)[0] - wanted).max() < 1e-5
