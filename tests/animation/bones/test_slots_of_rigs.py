@@ -230,3 +230,14 @@ def test_a_strip_without_a_slot_stays_so_where_the_only_one_has_no_differences(l
     strip.action_slot = None
     bpy.context.view_layer.update()
     assert strip.action_slot is None
+
+
+def test_rigs_with_the_same_keys_that_are_merged_keep_modes_of_their_own(live_file):
+    modes = {"A": "dq_sclerp", "B": "pga_lerp", "C": "motor_spline"}
+    rigs = [moving_rig(mode, name=name) for name, mode in modes.items()]
+    before = shown_poses(rigs, PLAYED)
+    merge_into(*rigs)
+    assert len({rig.animation_data.action for rig in rigs}) == 1
+    for rig, wanted, shown in zip(rigs, before, shown_poses(rigs, PLAYED), strict=True):
+        assert_same_poses(rig, PLAYED, shown, wanted)
+        assert_posed(rig, PLAYED)

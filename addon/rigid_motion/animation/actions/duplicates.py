@@ -1,14 +1,21 @@
-"""Slots that were duplicated in their Action: Blender duplicates their F-curves, and no records of them."""
+"""Slots that were duplicated in their Action, or moved into another: their F-curves come along, and no records of them.
+
+*Merge Animation* leaves the differences of bones where they were, and their records with them.
+"""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
+from ..transforms import Refused
+from .reading import read
 from .records import has_mode, recorded_digest
 from .slots import SlotTransform, is_time
+from .sources import MODE_NUMBERS
 
 
 def original_of(place: SlotTransform) -> SlotTransform | None:
@@ -24,6 +31,25 @@ def original_of(place: SlotTransform) -> SlotTransform | None:
     # To look at F-curves takes longer, and those that Actions hold for one another in the NLA look like in-betweens.
     with_modes = (other.read_again() for other in others if has_mode(other))
     return next((other for other in with_modes if _have_same_curves(place, other)), None)
+
+
+def mode_before_move(place: SlotTransform) -> int | None:
+    """The number of the mode that a bone had in the Action that its slot was moved from, None where it was not.
+
+    What a slot was moved from has its differences and not the slot; and was filled in from the same keys. Of several,
+    it is the one with the mode that the bone shows.
+    """
+    found = []
+    for action in bpy.data.actions if place.prefix else ():
+        moved = {pair.handle for pair in action.rigid_motion.bone_slots} - {slot.handle for slot in action.slots}
+        for record in action.rigid_motion.slots if moved and action != place.slot.action else ():
+            if record.handle in moved and record.prefix == place.prefix and record.digest:
+                number = MODE_NUMBERS.get(record.mode, 0)
+                with suppress(Refused):
+                    if read(place, number).digest == record.digest:
+                        found.append(number)
+    shown = {MODE_NUMBERS.get(user.motion.mode) for user in place.users}
+    return next((number for number in found if number in shown), found[0] if found else None)
 
 
 def _have_same_curves(one: SlotTransform, other: SlotTransform) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ..transforms import Transform
-from .duplicates import original_of
+from .duplicates import mode_before_move, original_of
 from .records import NOTHING_RECORDED, has_in_betweens, has_mode, record_mode, recorded, recorded_mode
 from .slots import SlotTransform
 from .sources import MODE_NAMES, MODE_NUMBERS
@@ -79,11 +79,13 @@ def _is_shown(user: Transform, place: SlotTransform) -> bool:
 def _adopt(place: SlotTransform, users: Sequence[Transform]) -> None:
     """Let a slot without a mode have that which a user waits with.
 
-    Where there are in-betweens already, it was duplicated, and has the mode of the slot that it is a duplicate of. Or
-    it came from a version that kept the mode on the object, or from another Action by one of Blender's operators that
-    move slots: it goes on as its user shows it.
+    Where there are in-betweens already, one of Blender's operators has moved it out of another Action, and it has the
+    mode that it had there. Or it was duplicated, and has the mode of the slot that it is a duplicate of. Or it came
+    from a version that kept the mode on the object: it goes on as its user shows it.
     """
     waiting = next((user.motion.awaited for user in users if user.motion.awaited not in ("BLENDER", "")), None)
+    if waiting is None and has_in_betweens(place) and (number := mode_before_move(place)) is not None:
+        waiting = MODE_NAMES[number]
     if waiting is None and (original := original_of(place)) is not None:
         waiting = MODE_NAMES.get(recorded_mode(original))
     if waiting is None and has_in_betweens(place):
