@@ -102,6 +102,8 @@ class ChangedAction(bpy.types.PropertyGroup):
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
+    if live.is_busy():
+        return
     obj = motion.id_data
     if isinstance(motion, BoneMotion):
         # Blender has no way from it to its bone.

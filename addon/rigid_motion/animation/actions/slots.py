@@ -7,9 +7,9 @@ is where a slot is taken apart. What the in-betweens of bones differ in is in a 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 
 import bpy
 import numpy as np
@@ -81,8 +81,13 @@ class SlotTransform:
     """Where the F-curves of the slot are."""
 
     users: tuple[Transform, ...]
-    curves: Curves
-    """Its F-curves, those that in-betweens are in among them."""
+    find: Callable[[], Mapping[str, Curves]]
+    """Looks for the F-curves under its prefix, and those under others along with them."""
+
+    @cached_property
+    def curves(self) -> Curves:
+        """Its F-curves, those that in-betweens are in among them; looked for when they are first asked for."""
+        return self.find()[self.prefix]
 
     @property
     def name(self) -> str:
@@ -115,34 +120,59 @@ class SlotTransform:
 
     def read_again(self) -> SlotTransform:
         """The same, with the F-curves that there are by now."""
-        return next(one for one in transforms_in(self.slot, (self.prefix,)) if one.prefix == self.prefix)
+        return read_again([self])[0]
 
 
 def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[SlotTransform]:
     """What a slot moves, transform by transform: these, or all that it has something of."""
     channelbag = slot.channelbag
-    curves: dict[str, Curves] = {"": {}} if prefixes is None else {prefix: {} for prefix in prefixes}
+    if prefixes is not None:
+        return _transforms(slot, channelbag, prefixes, cache(partial(_curves_under, channelbag, prefixes)))
+    curves: dict[str, Curves] = {"": {}}
     for fcurve in () if channelbag is None else channelbag.fcurves:
         path = fcurve.data_path
         prefix, prop = split_path(path)
-        if prefixes is not None:
-            if (own := curves.get(prefix)) is not None:
-                own[path, fcurve.array_index] = fcurve
-        elif prefix in curves or prop in WIDTHS or prop == MODE_PROPERTY or prop.startswith(_TIMES):
+        if prefix in curves or prop in WIDTHS or prop == MODE_PROPERTY or prop.startswith(_TIMES):
             curves.setdefault(prefix, {})[path, fcurve.array_index] = fcurve
-    if prefixes is None:
-        for record in slot.action.rigid_motion.slots:
-            if record.handle == slot.handle:
-                curves.setdefault(record.prefix, {})
+    for record in slot.action.rigid_motion.slots:
+        if record.handle == slot.handle:
+            curves.setdefault(record.prefix, {})
     return transforms_with(slot, channelbag, curves)
+
+
+def read_again(places: Sequence[SlotTransform]) -> list[SlotTransform]:
+    """The same, with the F-curves that there are by now."""
+    prefixes: dict[Slot, set[str]] = {}
+    for place in places:
+        prefixes.setdefault(place.slot, set()).add(place.prefix)
+    found = {(slot, place.prefix): place for slot, own in prefixes.items() for place in transforms_in(slot, own)}
+    return [found[place.slot, place.prefix] for place in places]
 
 
 def transforms_with(
     slot: Slot, channelbag: bpy.types.ActionChannelbag | None, curves: Mapping[str, Curves]
 ) -> list[SlotTransform]:
     """What a slot moves by these F-curves, transform by transform: all there are of each prefix."""
-    places = (SlotTransform(slot, prefix, channelbag, _users_of(slot, prefix), own) for prefix, own in curves.items())
+    return _transforms(slot, channelbag, curves, lambda: curves)
+
+
+def _transforms(
+    slot: Slot,
+    channelbag: bpy.types.ActionChannelbag | None,
+    prefixes: Iterable[str],
+    find: Callable[[], Mapping[str, Curves]],
+) -> list[SlotTransform]:
+    places = (SlotTransform(slot, prefix, channelbag, _users_of(slot, prefix), find) for prefix in prefixes)
     return [place for place in places if place.users]
+
+
+def _curves_under(channelbag: bpy.types.ActionChannelbag | None, prefixes: Iterable[str]) -> dict[str, Curves]:
+    curves: dict[str, Curves] = {prefix: {} for prefix in prefixes}
+    for fcurve in () if channelbag is None else channelbag.fcurves:
+        path = fcurve.data_path
+        if (own := curves.get(split_path(path)[0])) is not None:
+            own[path, fcurve.array_index] = fcurve
+    return curves
 
 
 _TIMES = f'constraints["{CONSTRAINT}'

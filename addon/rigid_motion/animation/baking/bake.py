@@ -23,12 +23,12 @@ from ..actions.channels import (
 )
 from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
-from ..inbetweens.acting import Readings, Target, Targets, act_on, readable
+from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
 from ..inbetweens.channel_values import channel_values
 from ..inbetweens.differences import in_betweens
 from ..inbetweens.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of
-from .copies import BAKED
+from .copies import BAKED, Lookup
 from .originals import has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
 
 
@@ -160,7 +160,8 @@ def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
         refuse_without_original(transform, kind)
         refuse_tweak_mode(transform)
 
-    act_on(targets, plan, lambda transform, _: put_back(transform, kind), refused)
+    lookup = Lookup(transforms_of(targets))
+    act_on(targets, plan, lambda transform, _: put_back(transform, kind, lookup), refused)
 
 
 def is_baked(target: Target) -> bool:
@@ -210,7 +211,8 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
                 # Its keys have had no say, and what there was in their place is baked.
                 fcurves.remove(copy.curves.pop((path, index)))
                 fcurve = None
-            fcurve = fcurve or fcurves.new(path, index=index)
+            if fcurve is None:
+                fcurve = copy.curves[path, index] = fcurves.new(path, index=index)
             _bake_channel(fcurve, frames, column)
             if cycles is not None:
                 add_cycles(fcurve, cycles)
@@ -218,7 +220,7 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
     if frames[0] <= begin + SAME_FRAME and frames[-1] >= end - SAME_FRAME:
         set_whole(copy, "BLENDER")
     else:
-        set_mode_in(copy.read_again(), "BLENDER", frames[:-1])
+        set_mode_in(copy, "BLENDER", frames[:-1])
 
 
 def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import bpy
 
-from ..actions.slots import Slot, SlotTransform, places_of, transforms_in
-from ..transforms import Transform, is_ours, transform_of
+from ..actions.slots import Slot, SlotTransform, transforms_in, transforms_with, uses_of
+from ..transforms import Transform, is_ours
 
 BAKED, REDUCED = "BAKED", "REDUCED"
 """What was done to the keys."""
@@ -45,11 +46,39 @@ def let_rest(
             getattr(transform.carrier, path.removeprefix(transform.prefix))[index] = entry.components[row]
 
 
-def in_action(action: bpy.types.Action, place: SlotTransform) -> SlotTransform:
-    """The same transform in the slot of the same name in another Action."""
-    name = next(slot.identifier for slot in place.slot.action.slots if slot.handle == place.slot.handle)
-    slot = Slot(action, action.slots[name].handle, place.slot.users, place.slot.strips)
-    return transforms_in(slot, (place.prefix,))[0]
+def used_in(animated: bpy.types.Object, action: bpy.types.Action | None) -> Slot | None:
+    """The slot of an Action that something moves by, as if nothing else used it."""
+    uses = uses_of(animated).values()
+    return next((Slot(action, handle, (animated,), frozenset(at)) for used, handle, at in uses if used == action), None)
+
+
+def in_copy(transform: Transform, place: SlotTransform, changed: bpy.types.Action) -> SlotTransform:
+    """Something in the copy that it moves by, which has the same channels as the original."""
+    slot = used_in(transform.animated, changed)
+    channelbag = slot.channelbag
+    found = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in place.curves}
+    curves = {channel: fcurve for channel, fcurve in found.items() if fcurve is not None}
+    return transforms_with(slot, channelbag, {place.prefix: curves})[0]
+
+
+def in_action(action: bpy.types.Action, slot: Slot) -> Slot:
+    """The slot of the same name in another Action."""
+    name = next(one.identifier for one in slot.action.slots if one.handle == slot.handle)
+    return replace(slot, action=action, handle=action.slots[name].handle)
+
+
+class Lookup:
+    """The same transforms in one slot and another: each slot is looked through once."""
+
+    def __init__(self, transforms: Iterable[Transform]) -> None:
+        self._prefixes = {transform.prefix for transform in transforms}
+        self._found: dict[tuple[bpy.types.Action, int], dict[str, SlotTransform]] = {}
+
+    def find(self, slot: Slot, prefix: str) -> SlotTransform:
+        key = slot.action, slot.handle
+        if key not in self._found:
+            self._found[key] = {place.prefix: place for place in transforms_in(slot, self._prefixes)}
+        return self._found[key][prefix]
 
 
 def exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
@@ -70,22 +99,15 @@ def exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action
 
 
 def entries_of(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, list[bpy.types.PropertyGroup]]]:
-    """What has such notes, and those in use: there is one look at what moves a data-block."""
-    places: dict[bpy.types.Object, list[SlotTransform]] = {}
+    """What has such notes, and those in use."""
     for transform in transforms:
         if len(transform.motion.bakes):
-            animated = transform.animated
-            if animated not in places:
-                places[animated] = places_of(transform_of(animated))
-            yield transform, list(entries_in_use(transform, places[animated]))
+            yield transform, list(entries_in_use(transform))
 
 
-def entries_in_use(
-    transform: Transform, places: Iterable[SlotTransform] | None = None
-) -> Iterator[bpy.types.PropertyGroup]:
-    """The notes on copies that something moves by, the latest first. `places` move it, where that is known already."""
+def entries_in_use(transform: Transform) -> Iterator[bpy.types.PropertyGroup]:
+    """The notes on copies that something moves by, the latest first."""
     bakes = transform.motion.bakes
     if len(bakes):
-        places = places_of(transform) if places is None else places
-        actions = {place.slot.action for place in places}
+        actions = {action for action, *_ in uses_of(transform.animated).values()}
         yield from (entry for entry in reversed(bakes) if entry.changed in actions)

@@ -13,7 +13,19 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..actions.slots import SlotTransform, places_of
 from ..transforms import Refused, Transform
 from . import rigs
-from .copies import BAKED, REDUCED, copied, entries_in_use, exchange, in_action, let_rest, note
+from .copies import (
+    BAKED,
+    REDUCED,
+    Lookup,
+    copied,
+    entries_in_use,
+    exchange,
+    in_action,
+    in_copy,
+    let_rest,
+    note,
+    used_in,
+)
 
 NOT_DONE = {
     BAKED: n_("{name} is not baked, or has another Action by now"),
@@ -58,7 +70,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
     original, changed = place.slot.action, copied(place.slot, kind)
     note(transform, kind, changed, original)
     exchange(transform.animated, original, changed)
-    return next(copy for copy in places_of(transform) if copy.slot.action == changed)
+    return in_copy(transform, place, changed)
 
 
 def has_original(transform: Transform, kind: str) -> bool:
@@ -76,19 +88,20 @@ def refuse_without_original(transform: Transform, kind: str) -> None:
         raise Refused(rpt_(DONE_SINCE[latest]).format(name=transform.name))
 
 
-def put_back(transform: Transform, kind: str) -> None:
+def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
     """Let something move again by the Actions from before its keys were baked or reduced, to the last handle.
 
-    What was done before that stays, and so do notes on copies that it does not move by any more.
+    What was done before that stays, and so do notes on copies that it does not move by any more. The `lookup` is for
+    all that this is done with in one go.
     """
     if transform.animated.pose is not None:
-        rigs.put_back(transform, kind)
+        rigs.put_back(transform, kind, lookup)
         return
     bakes = transform.motion.bakes
     for number in reversed(range(len(bakes))):
         entry = bakes[number]
-        place = next((place for place in places_of(transform) if place.slot.action == entry.changed), None)
-        if entry.original is None or place is None:
+        slot = used_in(transform.animated, entry.changed)
+        if entry.original is None or slot is None:
             continue
         if entry.kind != kind:
             break
@@ -96,9 +109,9 @@ def put_back(transform: Transform, kind: str) -> None:
         if entry.is_property_set("mode"):
             # From a version that kept modes on objects: the original takes it from there.
             transform.motion.mode = entry.mode
-        before = in_action(entry.original, place)
+        places = [lookup.find(one, transform.prefix) for one in (slot, in_action(entry.original, slot))]
+        let_rest(transform, entry, *places)
         exchange(transform.animated, changed, entry.original)
-        let_rest(transform, entry, place, before)
         bakes.remove(number)
         if not changed.users:
             bpy.data.actions.remove(changed)

@@ -170,7 +170,7 @@ def reduction_of(target: Target) -> Reduction | None:
     if not len(transform.motion.bakes):
         return None
     places = places_of(transform)
-    entries = _reduced(entries_in_use(transform, places))
+    entries = _reduced(entries_in_use(transform))
     reduced = {entry.changed for entry in entries}
     modes = [mode for place in places if place.slot.action in reduced for mode in segment_modes(place)]
     return _summed(entries, entries if transform.prefix else [], dict(Counter(modes)))
@@ -258,10 +258,11 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
         entry.slide_before, entry.slide_after = fewer.rig.slide_before, fewer.rig.slide_after
     fcurves = copy.channelbag.fcurves
     for (path, index), values in fewer.values.items():
-        fcurve = copy.curves.get((path, index)) or fcurves.new(path, index=index)
+        fcurve = copy.curves.get((path, index))
+        if fcurve is None:
+            fcurve = copy.curves[path, index] = fcurves.new(path, index=index)
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
-    copy = copy.read_again()
     if transform.mode_channel in copy.curves:
         fcurves.remove(copy.curves.pop(transform.mode_channel))
     for mode in np.unique(fewer.modes):

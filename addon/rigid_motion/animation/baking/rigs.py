@@ -16,22 +16,21 @@ import numpy as np
 from ..actions.channels import copy_fcurve, key_fields
 from ..actions.records import record_mode, recorded_mode
 from ..actions.renaming import keep_names
-from ..actions.slots import Slot, SlotTransform, places_of, slots_of, transforms_in
+from ..actions.slots import Slot, SlotTransform, slots_of, transforms_in
 from ..curves import read_keys
 from ..transforms import MODE_PROPERTY, WIDTHS, Transform
-from .copies import copied, exchange, in_action, let_rest, note
+from .copies import Lookup, copied, exchange, in_action, in_copy, let_rest, note, used_in
 
 
 def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
     """Let something of a rig be moved by a copy of what moves it, see `originals.move_by_copy`."""
     rig, original = transform.animated, place.slot.action
-    places = places_of(transform)
     changed = _copy_of(rig, original)
-    if changed is None or all(other.slot.action != changed for other in places):
+    if changed is None or used_in(rig, changed) is None:
         # Not in this go, but before: it may be in a copy by now itself.
         before = next(iter(_originals_of(rig, original)), None)
         changed = original
-        if before is None or _is_shared(rig, place.slot) or not _is_as_in(before, place):
+        if before is None or _is_shared(rig, place.slot) or not _is_as(_in(before, place), place):
             changed = copied(place.slot, kind)
             exchange(rig, original, changed)
             _rename_in_notes(rig, original, changed)
@@ -39,25 +38,25 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
         else:
             original = before
     note(transform, kind, changed, original)
-    return next(other for other in places_of(transform) if other.slot.action == changed)
+    return in_copy(transform, place, changed)
 
 
-def put_back(transform: Transform, kind: str) -> None:
+def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
     """Give something of a rig its own channels back, see `originals.put_back`."""
     bakes = transform.motion.bakes
     for number in reversed(range(len(bakes))):
         entry = bakes[number]
-        place = next((place for place in places_of(transform) if place.slot.action == entry.changed), None)
-        if place is None or entry.original is None:
+        slot = used_in(transform.animated, entry.changed)
+        if slot is None or entry.original is None:
             continue
         if entry.kind != kind:
             break
         changed, original = entry.changed, entry.original
-        before = in_action(original, place)
+        place, before = (lookup.find(one, transform.prefix) for one in (slot, in_action(original, slot)))
         let_rest(transform, entry, place, before)
         _copy_channels(before, place)
         bakes.remove(number)
-        _go_back_to(transform.animated, changed, original, place.slot)
+        _go_back_to(transform.animated, changed, original, slot)
 
 
 def _copy_of(rig: bpy.types.Object, original: bpy.types.Action) -> bpy.types.Action | None:
@@ -88,10 +87,14 @@ def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
     return any(one.users != (rig,) for one in slots_of([rig]) if (one.action, one.handle) == (slot.action, slot.handle))
 
 
-def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
-    """Whether a transform has the same keys and modes in another Action."""
-    other = in_action(action, place)
-    return _summary(other) == _summary(place) and recorded_mode(other) == recorded_mode(place)
+def _in(action: bpy.types.Action, place: SlotTransform) -> SlotTransform:
+    """The same transform in the slot of the same name in another Action."""
+    return transforms_in(in_action(action, place.slot), (place.prefix,))[0]
+
+
+def _is_as(one: SlotTransform, other: SlotTransform) -> bool:
+    """Whether a transform has the same keys and modes in two Actions."""
+    return _summary(one) == _summary(other) and recorded_mode(one) == recorded_mode(other)
 
 
 def _animators(place: SlotTransform) -> dict[tuple[str, int], bpy.types.FCurve]:
@@ -132,9 +135,8 @@ def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.
     """Let a rig move by an original again, if all of its keys are what it has by now."""
     if any(entry.changed == changed and entry.original == original for entry in _entries(rig)):
         return
-    here = transforms_in(slot)
-    there = {place.prefix for place in transforms_in(in_action(original, here[0]).slot)}
-    if {place.prefix for place in here} == there and all(_is_as_in(original, place) for place in here):
+    here, there = ({place.prefix: place for place in transforms_in(one)} for one in (slot, in_action(original, slot)))
+    if here.keys() == there.keys() and all(_is_as(place, there[prefix]) for prefix, place in here.items()):
         exchange(rig, changed, original)
         _rename_in_notes(rig, changed, original)
         if not changed.users:

@@ -20,7 +20,7 @@ from ..actions.sources import FULL_TURN, Source
 from ..transforms import PART_OF, ROTATION, Channel
 from .differences import NOTHING, differences
 from .known_sources import changed_range, recall
-from .outlets import outlet_of
+from .outlets import outlet_of, release
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -121,12 +121,14 @@ def is_complete(place: SlotTransform, source: Source) -> bool:
     )
 
 
-def clear(place: SlotTransform) -> None:
-    """Take the in-betweens out of a slot, and give its users their original differences back."""
-    outlet_of(place).write(place, {}, None)
-    _tag(place)
-    record_in_betweens(place, "", ())
-    _limit_ranges({place.slot.action}, set())
+def clear(places: Sequence[SlotTransform]) -> None:
+    """Take the in-betweens out of slots, and give their users their original differences back."""
+    for place in places:
+        outlet_of(place).write(place, {}, None)
+        _tag(place)
+        record_in_betweens(place, "", ())
+    release(user for place in places for user in place.users)
+    _limit_ranges({place.slot.action for place in places}, set())
 
 
 def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:

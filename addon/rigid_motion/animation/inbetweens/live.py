@@ -26,6 +26,7 @@ from ..actions.slots import (
     SlotTransform,
     choose_slots,
     filled_places_of,
+    read_again,
     slot_transforms_of,
     slots_in,
 )
@@ -157,7 +158,7 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         concerned = [place for place in places if has_to_do_with_modes(place)]
         keyed = dict(zip(concerned, keyed_in(concerned), strict=True))
         sources = [keyed.get(place) for place in places]
-    stale, idle = [], []
+    stale, idle, emptied, keyed_anew = [], [], [], []
     for place, source in zip(places, sources, strict=True):
         outlet_of(place).show(place)
         # What is linked has the in-betweens that its own file was saved with.
@@ -168,17 +169,18 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         if not _is_wanted(place, source, before):
             # Of bones, Blender can bring differences that no record speaks of: it flips Actions, F-curve by F-curve.
             if before or (place.prefix and place.filled):
-                clear(place)
+                emptied.append(place)
             idle.append(place)
-            release(place.users)
         elif source.digest != before or not is_complete(place, source):
             kept = insertion.keep_pose(place, before, source, _State.frame, again=_State.again)
             if kept or keep_motion(place, before, source):
-                place = place.read_again()
-                (source,) = keyed_in([place])
-                if not _is_wanted(place, source, before):
-                    continue
-            stale.append((place, source))
+                keyed_anew.append(place)
+            else:
+                stale.append((place, source))
+    clear(emptied)
+    release(user for place in idle for user in place.users)
+    again = read_again(keyed_anew)
+    stale += [pair for pair in zip(again, keyed_in(again), strict=True) if _is_wanted(*pair, recorded_digest(pair[0]))]
     try:
         fill_in(stale)
     except ValueError:
@@ -187,7 +189,7 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
             try:
                 fill_in([(place, source)])
             except ValueError:
-                clear(place)
+                clear([place])
                 idle.append(place)
     editable = [place for place in places if place.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.

@@ -84,5 +84,5 @@ def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]
                 if record.handle != handle or not record.digest or (bone := bones.get(record.prefix)) is None:
                     continue
                 # The constraint alone is looked at, not the channels.
-                if trouble := trouble_of(bone, SlotTransform(slot, bone.prefix, None, (bone,), {})):
+                if trouble := trouble_of(bone, SlotTransform(slot, bone.prefix, None, (bone,), dict)):
                     yield bone, trouble

@@ -182,8 +182,6 @@ def set_mode(
 
 def on_property(transform: Transform) -> None:
     """Take it as a choice for the whole that somebody set the mode property."""
-    if live.is_busy():
-        return
     mode = transform.motion.mode
     places = [place for place in slot_transforms_of([transform]) if place.slot.action.is_editable]
     if not places:

@@ -6,6 +6,7 @@ a constraint takes, its evaluation time says, see `times`.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Iterable, Sequence
 
 import bpy
@@ -13,7 +14,7 @@ import numpy as np
 from mathutils import Euler, Quaternion
 
 from ...actions.records import record_constraint, recorded_digest
-from ...actions.slots import Slot, SlotTransform, slot_transforms_of, uses_of
+from ...actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, uses_of
 from ...actions.sources import Source
 from ...transforms import (
     CONSTRAINT,
@@ -67,7 +68,6 @@ class Constraints(Outlet):
             replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
             place.has_filled({})
             _remove_slot_if_empty(place.slot)
-            self.release(place.users)
 
     def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
         if not channels:
@@ -174,13 +174,12 @@ def _avoid_names(place: SlotTransform) -> None:
     tracked = [
         user for user in place.users if len(user.animated.animation_data.nla_tracks) and len(uses_of(user.animated)) > 1
     ]
-    if tracked:
-        others = slot_transforms_of(tracked)
-        taken |= {name_of(other) for other in others if recorded_digest(other) and not is_same(other, place)}
+    others = (other for user in tracked for other in places_of(user) if not is_same(other, place))
+    taken |= {name_of(other) for other in others if recorded_digest(other)}
     if name_of(place) in taken:
         remove_time(place)
-        numbers = (f"{CONSTRAINT}.{number:03d}" for number in range(1, 1000))
-        name = next(name for name in (CONSTRAINT, *numbers) if name not in taken)
+        numbered = (f"{CONSTRAINT}.{number:03d}" for number in itertools.count(1))
+        name = next(name for name in itertools.chain((CONSTRAINT,), numbered) if name not in taken)
         record_constraint(place, name)
 
 

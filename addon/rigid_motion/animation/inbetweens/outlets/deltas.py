@@ -29,7 +29,7 @@ class Deltas(Outlet):
             del place.curves[channel]
         place.curves.update(curves)
         place.has_filled(curves)
-        if gone:
+        if gone and points:
             self.release(place.users)
 
     def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:

@@ -24,7 +24,7 @@ class Outlet(ABC):
     def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
         """Replace the in-betweens of a transform by these samples, frame and value of each by turns.
 
-        Channels that have none are taken out; without any, its users move as Blender has it.
+        Channels that have none are taken out; without any, its users are to be released.
         """
 
     @abstractmethod
