@@ -13,7 +13,7 @@ from rigid_motion.animation import modes_of, refresh, set_enabled, set_mode
 from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_poses
 from tests.animation.bones.rigs import FRAMES, PLAYED, key_all, moving_rig, new_rig, own_constraints, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
-from tests.animation.oracle import assert_shown, snapshot
+from tests.animation.oracle import assert_shown, curves_of, snapshot
 from tests.animation.scenes import key, new_object
 
 
@@ -241,3 +241,18 @@ def test_rigs_with_the_same_keys_that_are_merged_keep_modes_of_their_own(live_fi
     for rig, wanted, shown in zip(rigs, before, shown_poses(rigs, PLAYED), strict=True):
         assert_same_poses(rig, PLAYED, shown, wanted)
         assert_posed(rig, PLAYED)
+
+
+def test_a_rig_whose_slot_was_removed_keeps_nobody_from_following_edits(live_file, caplog):
+    rig, tool = moving_rig(), key(new_object("Tool"))
+    set_mode(tool, "dq_sclerp")
+    action = rig.animation_data.action
+    action.slots.remove(rig.animation_data.action_slot)
+    assert rig.animation_data.action_slot is None
+    curves_of(tool)["location", 0].keyframe_points[1].co_ui.y += 0.5
+    rig.update_tag()
+    bpy.context.view_layer.update()
+    assert refresh() == 0
+    assert_shown([tool], PLAYED)
+    assert not any(own_constraints(rig).values())
+    assert not caplog.records

@@ -288,14 +288,14 @@ def uses_of(obj: bpy.types.Object) -> Uses:
     if data is None:
         return {}
     found = {}
-    action = data.action
-    if action is not None and (handle := data.action_slot_handle):
-        found[action.as_pointer(), handle] = (action, handle, {None})
+    # Some of Blender's operators leave the handle of a slot that is no longer there.
+    if data.action is not None and (slot := data.action_slot) is not None:
+        found[data.action.as_pointer(), slot.handle] = (data.action, slot.handle, {None})
     if len(data.nla_tracks):
         for strip in strips_of(obj):
-            if (action := strip.action) is not None and (handle := strip.action_slot_handle):
+            if (action := strip.action) is not None and (slot := strip.action_slot) is not None:
                 span = int(np.floor(strip.action_frame_start)), int(np.ceil(strip.action_frame_end))
-                found.setdefault((action.as_pointer(), handle), (action, handle, set()))[2].add(span)
+                found.setdefault((action.as_pointer(), slot.handle), (action, slot.handle, set()))[2].add(span)
     return found
 
 
