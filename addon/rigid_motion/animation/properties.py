@@ -86,11 +86,8 @@ class ChangedAction(bpy.types.PropertyGroup):
     changed: PointerProperty(type=bpy.types.Action)
     original: PointerProperty(type=bpy.types.Action)
     mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
-    components: FloatVectorProperty(
-        size=10,
-        description="Location, rotation and scale when the copy was made: what those had that had no keys",
-        options={"HIDDEN"},
-    )
+    # What location, rotation and scale had when the copy was made: what had no keys gets it back.
+    components: FloatVectorProperty(size=10, options={"HIDDEN"})
     keys_before: IntProperty(options={"HIDDEN"})
     keys_after: IntProperty(options={"HIDDEN"})
     largest_error: FloatProperty(

@@ -8,10 +8,21 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import bake, channelbag_of, reduce_keys_of, refresh, restore_keys, set_mode, unbake
+from rigid_motion.animation import (
+    Refused,
+    bake,
+    channelbag_of,
+    is_baked,
+    reduce_keys_of,
+    refresh,
+    restore_keys,
+    set_mode,
+    unbake,
+)
 from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_poses
 from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig, select_only
 from tests.animation.bones.test_rig_edits import RENAMINGS, assert_nothing_stale
+from tests.animation.bones.test_slots_of_rigs import separate_slots_of
 from tests.animation.oracle import curves_of, shown_worlds, snapshot
 from tests.animation.scenes import key, new_object
 
@@ -108,3 +119,41 @@ def test_what_has_no_keys_gets_its_value_back(live_file, of_bones, muted):
         assert_posed(obj, PLAYED)
     else:
         assert np.abs(shown_worlds([obj], PLAYED)[0] - wanted).max() < 1e-5
+
+
+def sharing(of_bones: bool) -> tuple[bpy.types.Object, list | bpy.types.Object, bpy.types.Object]:
+    """Something baked, its targets, and what still moves by its original."""
+    obj = moving_rig() if of_bones else key(new_object())
+    targets = list(obj.pose.bones)[:2] if of_bones else obj
+    set_mode(targets, "dq_sclerp")
+    other = obj.copy()
+    bpy.context.scene.collection.objects.link(other)
+    bake(targets)
+    bpy.context.view_layer.update()
+    return obj, targets, other
+
+
+@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+def test_a_slot_that_was_renamed_in_the_original_is_found(live_file, of_bones):
+    obj, targets, other = sharing(of_bones)
+    other.animation_data.action_slot.name_display = "Hero"
+    unbake(targets)
+    assert (obj.animation_data.action, obj.animation_data.action_slot) == (
+        other.animation_data.action,
+        other.animation_data.action_slot,
+    )
+
+
+@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+def test_a_slot_that_was_taken_out_of_the_original_refuses_the_way_back_with_a_way_out(live_file, of_bones):
+    obj, targets, other = sharing(of_bones)
+    baked, original = obj.animation_data.action, other.animation_data.action
+    separate_slots_of(other)
+    assert other.animation_data.action != original
+    with pytest.raises(Refused, match=f"their slot was taken out of the Action {original.name}. Choose by hand"):
+        unbake(targets)
+    assert obj.animation_data.action == baked
+    assert is_baked(targets[0] if of_bones else obj)
+    refused = []
+    bake(other if not of_bones else list(other.pose.bones), refused=refused)
+    assert refused == []

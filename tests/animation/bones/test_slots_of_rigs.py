@@ -256,3 +256,37 @@ def test_a_rig_whose_slot_was_removed_keeps_nobody_from_following_edits(live_fil
     assert_shown([tool], PLAYED)
     assert not any(own_constraints(rig).values())
     assert not caplog.records
+
+
+def unlink(rig: bpy.types.Object) -> None:
+    rig.animation_data.action = None
+
+
+def delete(rig: bpy.types.Object) -> None:
+    bpy.data.objects.remove(rig)
+
+
+def make_single_user(rig: bpy.types.Object) -> None:
+    select_only(rig)
+    bpy.ops.object.make_single_user(type="SELECTED_OBJECTS", object=True, animation=True)
+
+
+@pytest.mark.parametrize("leave", [unlink, delete, make_single_user])
+def test_a_rig_that_turns_otherwise_gets_in_betweens_of_its_own_when_the_other_leaves(live_file, leave):
+    rig = key_all(new_rig("A"))
+    other = rig.copy()
+    other.name = "B"
+    bpy.context.scene.collection.objects.link(other)
+    for bone in other.pose.bones:
+        bone.rotation_mode = "XYZ"
+    key_all(other, seed=4)
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    for _ in range(2):
+        other.update_tag()
+        bpy.context.view_layer.update()
+    with pytest.raises(AssertionError, match="B, Body"):
+        assert_posed(other, PLAYED)
+    leave(rig)
+    bpy.context.view_layer.update()
+    assert_posed(other, PLAYED)
+    assert refresh() == 0

@@ -13,7 +13,7 @@ import bpy
 
 from ..transforms import Transform, bone_name, prefix_of, split_path, transform_of
 from .records import NOTHING_RECORDED, forget_in_betweens, keep_name, recorded, rename_records
-from .slots import Slot, SlotTransform, slots_in, slots_of
+from .slots import Slot, SlotTransform, counterpart_in, slots_in, slots_of
 
 
 def follow_renamed(places: Iterable[SlotTransform]) -> None:
@@ -98,11 +98,11 @@ def _originals_of(slot: Slot) -> list[Slot]:
     rigs = [user for user in slot.users if user.pose is not None]
     owners = [owner for rig in rigs for owner in (rig, *rig.pose.bones)]
     notes = [entry for owner in owners for entry in owner.rigid_motion.bakes if entry.changed == slot.action]
-    name = next(one.identifier for one in slot.action.slots if one.handle == slot.handle)
+    own = next(one for one in slot.action.slots if one.handle == slot.handle)
     found = {
-        (action, action.slots[name].handle)
+        (action, same.handle)
         for action in {entry.original for entry in notes if entry.original is not None}
-        if action.is_editable and name in action.slots
+        if action.is_editable and (same := counterpart_in(action, own)) is not None
     }
     played = {(other.action, other.handle) for other in slots_in({action for action, _ in found})}
     return [Slot(*key, (), frozenset()) for key in found - played]
@@ -123,6 +123,6 @@ def _rename_channels(channelbag: bpy.types.ActionChannelbag, prefixes: Mapping[s
             channelbag.fcurves.remove(fcurve)
     # Two groups that swap their names cannot have the same one in between.
     for number, group in enumerate(groups.values()):
-        group.name = f"{number} renamed"
+        group.name = f"#{number}"
     for name, group in groups.items():
         group.name = name

@@ -299,6 +299,12 @@ def uses_of(obj: bpy.types.Object) -> Uses:
     return found
 
 
+def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.types.ActionSlot | None:
+    """The slot in a copy of an Action, or in the original, that is the same: by its name, or renamed by its handle."""
+    found = action.slots.get(slot.identifier)
+    return found or next((one for one in action.slots if one.handle == slot.handle), None)
+
+
 def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:
     """The strips in the NLA of an object, those in strips of strips among them."""
     return _strips(strip for track in obj.animation_data.nla_tracks for strip in track.strips)

@@ -29,7 +29,14 @@ from ..inbetweens.differences import in_betweens
 from ..inbetweens.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of
 from .copies import BAKED, Lookup
-from .originals import has_original, move_by_copy, put_back, refuse_tweak_mode, refuse_without_original
+from .originals import (
+    has_original,
+    move_by_copy,
+    put_back,
+    refuse_tweak_mode,
+    refuse_without_original,
+    refuse_without_slot,
+)
 
 
 def bake_poses(obj: bpy.types.Object, frames: np.ndarray, poses: Poses, *, key_type: str = "GENERATED") -> None:
@@ -158,6 +165,7 @@ def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
 
     def plan(transform: Transform, _readings: Readings) -> None:
         refuse_without_original(transform, kind)
+        refuse_without_slot(transform, kind)
         refuse_tweak_mode(transform)
 
     lookup = Lookup(transforms_of(targets))

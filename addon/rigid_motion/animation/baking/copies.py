@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import bpy
 
-from ..actions.slots import Slot, SlotTransform, transforms_in, transforms_with, uses_of
+from ..actions.slots import Slot, SlotTransform, counterpart_in, transforms_in, transforms_with, uses_of
 from ..transforms import Transform, is_ours
 
 BAKED, REDUCED = "BAKED", "REDUCED"
@@ -61,10 +61,11 @@ def in_copy(transform: Transform, place: SlotTransform, changed: bpy.types.Actio
     return transforms_with(slot, channelbag, {place.prefix: curves})[0]
 
 
-def in_action(action: bpy.types.Action, slot: Slot) -> Slot:
-    """The slot of the same name in another Action."""
-    name = next(one.identifier for one in slot.action.slots if one.handle == slot.handle)
-    return replace(slot, action=action, handle=action.slots[name].handle)
+def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
+    """The same slot in a copy of its Action, or in the original. None where it was taken out of it."""
+    own = next(one for one in slot.action.slots if one.handle == slot.handle)
+    found = counterpart_in(action, own)
+    return None if found is None else replace(slot, action=action, handle=found.handle)
 
 
 class Lookup:
@@ -82,20 +83,20 @@ class Lookup:
 
 
 def exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
-    """Let an object move by another Action, with the slot of the same name in it."""
+    """Let an object move by another Action, with the same slot in it."""
     data = obj.animation_data
     strips = [strip for track in data.nla_tracks for strip in track.strips]
     for user in (data, *strips):
         if user.action == old:
-            name = user.action_slot.identifier
+            slot = counterpart_in(new, user.action_slot)
             user.action = new
-            user.action_slot = new.slots[name]
+            user.action_slot = slot
     for bone in obj.pose.bones if obj.pose is not None else ():
         for constraint in filter(is_ours, bone.constraints):
             if constraint.action == old and constraint.action_slot is not None:
-                name = constraint.action_slot.identifier
+                slot = counterpart_in(new, constraint.action_slot)
                 constraint.action = new
-                constraint.action_slot = new.slots.get(name)
+                constraint.action_slot = slot
 
 
 def entries_of(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, list[bpy.types.PropertyGroup]]]:

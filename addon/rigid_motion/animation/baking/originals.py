@@ -40,6 +40,13 @@ DONE_SINCE = {
 """Why that cannot which was done before, by what was done last."""
 
 
+WITHOUT_SLOT = n_(
+    "{name} cannot get its keys back: their slot was taken out of the Action {action}. "
+    "Choose by hand the Action that has them by now"
+)
+"""Why something cannot be taken back although its original is still in the file."""
+
+
 def refuse_tweak_mode(transform: Transform) -> None:
     """Raise `Refused` where a strip is being edited: its Action cannot be exchanged meanwhile."""
     data = transform.animated.animation_data
@@ -86,6 +93,14 @@ def refuse_without_original(transform: Transform, kind: str) -> None:
         raise Refused(rpt_(NOT_DONE[kind]).format(name=transform.name))
     if latest != kind:
         raise Refused(rpt_(DONE_SINCE[latest]).format(name=transform.name))
+
+
+def refuse_without_slot(transform: Transform, kind: str) -> None:
+    """Raise `Refused` where an original no longer has the slot that something moved by."""
+    for entry in entries_in_use(transform):
+        slot, original = used_in(transform.animated, entry.changed), entry.original
+        if entry.kind == kind and slot is not None and original is not None and in_action(original, slot) is None:
+            raise Refused(rpt_(WITHOUT_SLOT).format(name=transform.name, action=original.name))
 
 
 def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:

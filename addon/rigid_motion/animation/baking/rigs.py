@@ -30,7 +30,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
         # Not in this go, but before: it may be in a copy by now itself.
         before = next(iter(_originals_of(rig, original)), None)
         changed = original
-        if before is None or _is_shared(rig, place.slot) or not _is_as(_in(before, place), place):
+        if before is None or _is_shared(rig, place.slot) or not _is_as_in(before, place):
             changed = copied(place.slot, kind)
             exchange(rig, original, changed)
             _rename_in_notes(rig, original, changed)
@@ -87,13 +87,14 @@ def _is_shared(rig: bpy.types.Object, slot: Slot) -> bool:
     return any(one.users != (rig,) for one in slots_of([rig]) if (one.action, one.handle) == (slot.action, slot.handle))
 
 
-def _in(action: bpy.types.Action, place: SlotTransform) -> SlotTransform:
-    """The same transform in the slot of the same name in another Action."""
-    return transforms_in(in_action(action, place.slot), (place.prefix,))[0]
+def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
+    """Whether a transform has the same keys and modes in another Action."""
+    slot = in_action(action, place.slot)
+    return slot is not None and _is_as(*transforms_in(slot, (place.prefix,)), place)
 
 
 def _is_as(one: SlotTransform, other: SlotTransform) -> bool:
-    """Whether a transform has the same keys and modes in two Actions."""
+    """Whether a transform has the same keys and modes in these two."""
     return _summary(one) == _summary(other) and recorded_mode(one) == recorded_mode(other)
 
 

@@ -10,18 +10,19 @@ from __future__ import annotations
 import itertools
 import operator
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Curves, Slot, SlotTransform, transforms_in, transforms_with, uses_of
+from ..actions.slots import Curves, Slot, SlotTransform, slots_of, transforms_in, transforms_with, uses_of
 from ..transforms import WIDTHS, Channel, is_ours, prefix_of, split_path
 
 _looks: dict[tuple[int, int], _Look] = {}
 """At the slots of rigs, the last of each: by the Action's session id, and the slot's handle."""
 
-_rigs: dict[int, tuple[object, _States, float]] = {}
+_rigs: dict[int, tuple[_Shared, _States, float]] = {}
 """Of each rig what all its bones depend on, what they were, and on which frame, by its session id."""
 
 
@@ -218,15 +219,44 @@ def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -
     """
     before = _rigs.get(rig.session_uid)
     now, bones = _States(rig, None if is_set or before is None else before[1]), rig.pose.bones
-    moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses_of(rig).items()]
-    shared = moved_by, _rest_of(rig.data.bones)
+    shared = _Shared.of(rig, None if before is None else before[0])
     _rigs[rig.session_uid] = shared, now, frame
-    if before is None or before[0] != shared or before[1].names != now.names:
+    if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
         return list(bones)
     changed = now.changed_from(before[1])
     if changed and before[2] != frame:
         changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
     return [bones[number] for number in changed]
+
+
+class _Shared(NamedTuple):
+    """What all bones of a rig depend on."""
+
+    moved_by: list[tuple[tuple[int, int], list[str]]]
+    """The slots, and the strips that show them."""
+
+    counts: list[int]
+    """How many users the Actions have, constraints among them. While these stay, so do those of the slots."""
+
+    users: list[tuple]
+    """The users of each slot, and whether any of them has an NLA."""
+
+    rest: bytes
+
+    @classmethod
+    def of(cls, rig: bpy.types.Object, before: _Shared | None) -> _Shared:
+        uses = uses_of(rig)
+        moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses.items()]
+        counts = [action.users for action, *_ in uses.values()]
+        if before is not None and (before.moved_by, before.counts) == (moved_by, counts):
+            users = before.users
+        else:
+            users = [(slot.in_nla, *(user.session_uid for user in slot.users)) for slot in slots_of([rig])]
+        return cls(moved_by, counts, users, _rest_of(rig.data.bones))
+
+    def is_as(self, other: _Shared) -> bool:
+        """Whether the bones depend on the same, however many constraints there are."""
+        return (self.moved_by, self.users, self.rest) == (other.moved_by, other.users, other.rest)
 
 
 def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:

@@ -147,6 +147,13 @@ REFUSALS = {
     "{name} has its keys from frame {first:g} to {last:g}: none of them is in that range": (
         "{name} hat seine Schlüsselbilder von Einzelbild {first:g} bis {last:g}: keines davon liegt in diesem Bereich"
     ),
+    (
+        "{name} cannot get its keys back: their slot was taken out of the Action {action}. "
+        "Choose by hand the Action that has them by now"
+    ): (
+        "{name} kann seine Schlüsselbilder nicht zurückbekommen: ihr Slot wurde aus der Aktion {action} genommen. "
+        "Die Aktion, die sie jetzt hat, von Hand wählen"
+    ),
     "{name} is not baked, or has another Action by now": (
         "{name} ist nicht gebacken oder hat inzwischen eine andere Aktion"
     ),
