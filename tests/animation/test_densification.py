@@ -109,7 +109,9 @@ def test_bake_channels_keeps_the_motion(tool, remove):
     assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)
 
 
-def test_keys_that_are_edited_before_blender_tells_of_bake_channels_stay_as_far_off(tool):
+@pytest.mark.parametrize("shown", [1, 17])
+def test_keys_that_are_edited_before_blender_tells_of_bake_channels_stay_as_far_off(tool, shown):
+    bpy.context.scene.frame_set(shown)
     before = shown_worlds([tool], FRAMES)[0]
     with dope_sheet():
         bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, interpolation_type="LIN")

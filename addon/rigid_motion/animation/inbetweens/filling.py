@@ -38,15 +38,18 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     anew += _fill_in_changed(changed)
     # However far cycles are seen, one round is all that is written where it repeats.
     rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
-    longer = set()
+    longer, emptied = set(), []
     for (place, source), samples in zip(anew, differences(rounds), strict=True):
         outlet = outlet_of(place)
         layout, channels = outlet.layout(source), _channels(place, source)
         outlet.write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
         _tag(place)
         record_in_betweens(place, source.digest, samples)
+        if not samples:
+            emptied += place.users
         if layout.outermost[0] < source.keyed_range[0] or layout.outermost[1] > source.keyed_range[1]:
             longer.add(place.slot.action)
+    release(emptied)
     _limit_ranges({place.slot.action for place, _ in readings}, longer)
 
 
