@@ -312,3 +312,22 @@ def test_an_action_that_leaves_its_strip_leaves_nothing(live_file):
     shown, resting = shown_poses([rig, twin], frames)
     assert_same_poses(rig, frames, shown, resting)
     assert not any(own_constraints(rig).values())
+
+
+@pytest.mark.parametrize("name", ["Before", "Zulu"])
+def test_a_strip_beside_another_shows_the_action_that_a_rig_without_strips_plays(live_file, name):
+    rig, wanted = filled()
+    rig.name = name
+    walk = rig.animation_data
+    other = moving_rig(name="Runner", seed=5, frames=KEYS)
+    own = expected_poses(other, ACTION_FRAMES)
+    push_down(other)
+    strip = other.animation_data.nla_tracks.new().strips.new("Walk", 100, walk.action)
+    strip.action_slot, strip.action_frame_start, strip.action_frame_end = walk.action_slot, 1, 41
+    for track in other.animation_data.nla_tracks:
+        track.strips[0].extrapolation = "NOTHING"
+    bpy.context.view_layer.update()
+    assert_at(other, ACTION_FRAMES + 99.0, wanted)
+    assert_at(other, ACTION_FRAMES, own)
+    assert_at(rig, ACTION_FRAMES, wanted)
+    assert refresh() == 0

@@ -20,11 +20,11 @@ from rigid_motion.animation import (
     unbake,
 )
 from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_poses
-from tests.animation.bones.rigs import PLAYED, key_all, moving_rig, new_rig, select_only
+from tests.animation.bones.rigs import ARM, PLAYED, Rest, key_all, key_bone, moving_rig, new_rig, select_only
 from tests.animation.bones.test_rig_edits import RENAMINGS, assert_nothing_stale
 from tests.animation.bones.test_slots_of_rigs import separate_slots_of
 from tests.animation.oracle import curves_of, shown_worlds, snapshot
-from tests.animation.scenes import key, new_object
+from tests.animation.scenes import key, new_object, push_down
 
 Change = tuple[bpy.types.Object, Callable[[], None]]
 
@@ -157,3 +157,103 @@ def test_a_slot_that_was_taken_out_of_the_original_refuses_the_way_back_with_a_w
     refused = []
     bake(other if not of_bones else list(other.pose.bones), refused=refused)
     assert refused == []
+
+
+def test_two_rigs_that_shared_an_action_get_it_back_in_one_go(live_file):
+    first = moving_rig(name="A")
+    second = key_all(new_rig("B", [Rest("Alone", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), ARM[0]]))
+    original = second.animation_data.action = first.animation_data.action
+    second.animation_data.action_slot = first.animation_data.action_slot
+    key_bone(second.pose.bones["Alone"])
+    bones = [*first.pose.bones, *second.pose.bones]
+    set_mode(bones, "dq_sclerp")
+    before = [snapshot(bone) for bone in bones]
+    bake(bones)
+    bpy.context.view_layer.update()
+    assert len({original, first.animation_data.action, second.animation_data.action}) == 3
+    unbake(bones)
+    assert {original} == {first.animation_data.action, second.animation_data.action}
+    assert [snapshot(bone) for bone in bones] == before
+    assert_posed(first, PLAYED)
+    assert_posed(second, PLAYED)
+
+
+def put_into_a_meta_strip(obj: bpy.types.Object) -> None:
+    for strip in obj.animation_data.nla_tracks[0].strips:
+        strip.select = True
+    obj.animation_data.nla_tracks[0].select = True
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, "NLA_EDITOR"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.nla.meta_add()
+    area.type = before
+
+
+def shown(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
+    if obj.pose is None:
+        return shown_worlds([obj], frames)[0]
+    return np.stack([*shown_poses([obj], frames)[0].values()])
+
+
+@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+def test_what_plays_in_a_strip_of_strips_is_baked_there(live_file, of_bones):
+    obj = moving_rig() if of_bones else key(new_object())
+    targets = list(obj.pose.bones) if of_bones else obj
+    set_mode(targets, "dq_sclerp")
+    own = push_down(obj).action
+    select_only(obj)
+    put_into_a_meta_strip(obj)
+    bpy.context.view_layer.update()
+    before = shown(obj, PLAYED)
+    (strip,) = obj.animation_data.nla_tracks[0].strips[0].strips
+    for act, action in ((bake, f"{own.name} Baked"), (unbake, own.name)):
+        act(targets)
+        bpy.context.view_layer.update()
+        assert strip.action.name == action
+        assert np.abs(shown(obj, PLAYED) - before).max() < 2e-5
+
+
+@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+def test_beside_a_strip_that_shows_no_slot_keys_are_baked_and_come_back(live_file, of_bones):
+    obj = moving_rig() if of_bones else key(new_object())
+    targets = list(obj.pose.bones) if of_bones else obj
+    set_mode(targets, "dq_sclerp")
+    own = obj.animation_data.action
+    strip = obj.animation_data.nla_tracks.new().strips.new("Mute", 60, own)
+    strip.action_slot = None
+    bpy.context.view_layer.update()
+    bake(targets)
+    assert (obj.animation_data.action.name, strip.action) == (f"{own.name} Baked", own)
+    unbake(targets)
+    assert obj.animation_data.action == own
+
+
+@pytest.mark.parametrize("in_strips", [False, True], ids=["Action and strip", "two strips"])
+@pytest.mark.parametrize("of_bones", [False, True], ids=["object", "bones"])
+def test_two_slots_of_one_action_that_move_the_same_are_baked_each_for_itself(live_file, of_bones, in_strips):
+    def made(name: str, mode: str) -> bpy.types.Object:
+        obj = moving_rig(name=name) if of_bones else key(new_object(name), seed=len(mode))
+        set_mode(list(obj.pose.bones) if of_bones else obj, mode)
+        return obj
+
+    obj, other = made("A", "dq_sclerp"), made("B", "pga_lerp")
+    select_only(obj, other)
+    bpy.ops.anim.merge_animation()
+    data, targets = obj.animation_data, list(obj.pose.bones) if of_bones else obj
+    action, own = data.action, data.action_slot
+    starts = [(1, own)] if in_strips else []
+    if in_strips:
+        data.action = None
+    for start, slot in (*starts, (50, other.animation_data.action_slot)):
+        strip = data.nla_tracks.new().strips.new(slot.name_display, start, action)
+        strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, 40
+    bpy.context.view_layer.update()
+    frames = np.arange(1.0, 90.0)
+    before = shown(obj, frames)
+    for act in (bake, unbake):
+        act(targets)
+        bpy.context.view_layer.update()
+        assert np.abs(shown(obj, frames) - before).max() < 2e-5
+    assert strip.action == action

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import bpy
 
-from ..actions.slots import Slot, SlotTransform, counterpart_in, transforms_in, transforms_with, uses_of
+from ..actions.slots import Slot, SlotTransform, counterpart_in, strips_of, transforms_in, transforms_with, uses_of
 from ..transforms import Transform, is_ours
 
 BAKED, REDUCED = "BAKED", "REDUCED"
@@ -73,30 +73,28 @@ class Lookup:
 
     def __init__(self, transforms: Iterable[Transform]) -> None:
         self._prefixes = {transform.prefix for transform in transforms}
-        self._found: dict[tuple[bpy.types.Action, int], dict[str, SlotTransform]] = {}
+        self._found: dict[tuple, dict[str, SlotTransform]] = {}
 
     def find(self, slot: Slot, prefix: str) -> SlotTransform:
-        key = slot.action, slot.handle
+        key = slot.action.session_uid, slot.handle, slot.users
         if key not in self._found:
             self._found[key] = {place.prefix: place for place in transforms_in(slot, self._prefixes)}
         return self._found[key][prefix]
 
 
-def exchange(obj: bpy.types.Object, old: bpy.types.Action, new: bpy.types.Action) -> None:
-    """Let an object move by another Action, with the same slot in it."""
-    data = obj.animation_data
-    strips = [strip for track in data.nla_tracks for strip in track.strips]
-    for user in (data, *strips):
-        if user.action == old:
-            slot = counterpart_in(new, user.action_slot)
-            user.action = new
-            user.action_slot = slot
+def exchange(obj: bpy.types.Object, old: Slot, new: bpy.types.Action) -> None:
+    """Let an object move by the same slot in another Action, wherever it moves by this one."""
+    shown_by = [(obj.animation_data, old.handle)]
+    shown_by += [(strip, old.handle) for strip in strips_of(obj)]
+    differences = {pair.handle: pair.differences for pair in old.action.rigid_motion.bone_slots}.get(old.handle)
     for bone in obj.pose.bones if obj.pose is not None else ():
-        for constraint in filter(is_ours, bone.constraints):
-            if constraint.action == old and constraint.action_slot is not None:
-                slot = counterpart_in(new, constraint.action_slot)
-                constraint.action = new
-                constraint.action_slot = slot
+        shown_by += [(constraint, differences) for constraint in filter(is_ours, bone.constraints)]
+    for user, handle in shown_by:
+        slot = user.action_slot
+        if user.action == old.action and slot is not None and slot.handle == handle:
+            same = counterpart_in(new, slot)
+            user.action = new
+            user.action_slot = same
 
 
 def entries_of(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, list[bpy.types.PropertyGroup]]]:

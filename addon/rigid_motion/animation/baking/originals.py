@@ -76,7 +76,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
         return rigs.move_by_copy(transform, place, kind)
     original, changed = place.slot.action, copied(place.slot, kind)
     note(transform, kind, changed, original)
-    exchange(transform.animated, original, changed)
+    exchange(transform.animated, place.slot, changed)
     return in_copy(transform, place, changed)
 
 
@@ -126,7 +126,7 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
             transform.motion.mode = entry.mode
         places = [lookup.find(one, transform.prefix) for one in (slot, in_action(entry.original, slot))]
         let_rest(transform, entry, *places)
-        exchange(transform.animated, changed, entry.original)
+        exchange(transform.animated, slot, entry.original)
         bakes.remove(number)
         if not changed.users:
             bpy.data.actions.remove(changed)

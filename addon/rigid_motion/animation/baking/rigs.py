@@ -25,14 +25,14 @@ from .copies import Lookup, copied, exchange, in_action, in_copy, let_rest, note
 def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotTransform:
     """Let something of a rig be moved by a copy of what moves it, see `originals.move_by_copy`."""
     rig, original = transform.animated, place.slot.action
-    changed = _copy_of(rig, original)
+    changed = _copy_of(rig, place.slot)
     if changed is None or used_in(rig, changed) is None:
         # Not in this go, but before: it may be in a copy by now itself.
         before = next(iter(_originals_of(rig, original)), None)
         changed = original
         if before is None or _is_shared(rig, place.slot) or not _is_as_in(before, place):
             changed = copied(place.slot, kind)
-            exchange(rig, original, changed)
+            exchange(rig, place.slot, changed)
             _rename_in_notes(rig, original, changed)
             keep_names(rig)
         else:
@@ -59,10 +59,10 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
         _go_back_to(transform.animated, changed, original, slot)
 
 
-def _copy_of(rig: bpy.types.Object, original: bpy.types.Action) -> bpy.types.Action | None:
-    """The Action that has other keys for parts of a rig, which this one has from before."""
-    found = (entry.changed for entry in _entries(rig) if entry.original == original)
-    return next((changed for changed in found if changed is not None), None)
+def _copy_of(rig: bpy.types.Object, slot: Slot) -> bpy.types.Action | None:
+    """The Action that has other keys for parts of a rig, which this slot has from before."""
+    found = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
+    return next((changed for changed in found if changed is not None and in_action(changed, slot) is not None), None)
 
 
 def _originals_of(rig: bpy.types.Object, changed: bpy.types.Action) -> Iterator[bpy.types.Action]:
@@ -138,7 +138,7 @@ def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.
         return
     here, there = ({place.prefix: place for place in transforms_in(one)} for one in (slot, in_action(original, slot)))
     if here.keys() == there.keys() and all(_is_as(place, there[prefix]) for prefix, place in here.items()):
-        exchange(rig, changed, original)
+        exchange(rig, slot, original)
         _rename_in_notes(rig, changed, original)
         if not changed.users:
             bpy.data.actions.remove(changed)

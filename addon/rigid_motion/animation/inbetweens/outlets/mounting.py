@@ -12,7 +12,7 @@ from ...transforms import (
     Transform,
     is_ours,
 )
-from .times import name_of, span_of
+from .times import constraint_path, name_of, span_of
 
 SETTINGS = {
     "use_eval_time": True,
@@ -101,15 +101,10 @@ def mount(user: BoneTransform, place: SlotTransform) -> None:
         # This slot gets a constraint of another name when it is written.
         return
     if constraint is None:
-        constraint = constraints.new("ACTION")
-        for setting, value in SETTINGS.items():
-            setattr(constraint, setting, value)
-        constraints.move(len(constraints) - 1, 0)
-        constraint = constraints[0]
-        constraint.show_expanded = False
+        constraint = _new(user, 0, name)
     names = [one for one in user.motion.mounted.split("\n") if one not in ("", name, constraint.name)]
     if constraint.name != name:
-        constraint.name = name
+        constraint = _renamed(constraint, name, user, place)
     action, handle = slot_of_differences(place)
     if shown_by(constraint) != (action, handle):
         constraint.action = action
@@ -119,6 +114,42 @@ def mount(user: BoneTransform, place: SlotTransform) -> None:
         user.motion.mounted = mounted
     if not user.animated.rigid_motion.has_bones:
         user.animated.rigid_motion.has_bones = True
+
+
+def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstraint:
+    """A constraint of this name, at a place in the stack of a bone."""
+    constraints = user.carrier.constraints
+    constraint = constraints.new("ACTION")
+    constraint.name = name
+    for setting, value in SETTINGS.items():
+        setattr(constraint, setting, value)
+    constraints.move(len(constraints) - 1, index)
+    constraint = constraints[index]
+    constraint.show_expanded = False
+    return constraint
+
+
+def _renamed(
+    constraint: bpy.types.ActionConstraint, name: str, user: BoneTransform, place: SlotTransform
+) -> bpy.types.ActionConstraint:
+    """A constraint of another name in place of one, and channels of it in its slot.
+
+    Where one is renamed, Blender renames channels of the same name as well that other slots of the rig have for
+    constraints of their own, of all bones that lack them yet.
+    """
+    constraints = user.carrier.constraints
+    before = constraint.name
+    settings = {setting: getattr(constraint, setting) for setting in ("influence", "mute", "show_expanded")}
+    index = constraints.find(before)
+    constraints.remove(constraint)
+    constraint = _new(user, index, name)
+    for setting, value in settings.items():
+        setattr(constraint, setting, value)
+    keyed = place.curves.pop((f"{constraint_path(place, before)}.influence", 0), None)
+    if keyed is not None:
+        keyed.data_path = f"{constraint_path(place, name)}.influence"
+        place.curves[keyed.data_path, 0] = keyed
+    return constraint
 
 
 def _is_to_be_had(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:

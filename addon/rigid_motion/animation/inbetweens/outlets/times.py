@@ -77,17 +77,17 @@ def held_by(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Chann
 
     The others are among what is `beside` it there.
     """
-    user = place.users[0]
-    if not (len(user.animated.animation_data.nla_tracks) and _moves_bone(place)):
-        return {}
     held: dict[Channel, Line] = {}
-    others = [other for other in beside if user in other.users and not is_same(other, place) and _moves_bone(other)]
-    for other in others:
-        if other.filled:
-            held[influence_path(other), 0] = (0.0, 0.0)
-            held[time_path(other), 0] = _time_seen_from(place, other, user.animated)
-    if others and place.filled:
-        held[influence_path(place), 0] = (1.0, 0.0)
+    for user in place.users if _moves_bone(place) else ():
+        if not len(user.animated.animation_data.nla_tracks):
+            continue
+        others = [other for other in beside if user in other.users and not is_same(other, place) and _moves_bone(other)]
+        for other in others:
+            if other.filled:
+                held[influence_path(other), 0] = (0.0, 0.0)
+                held[time_path(other), 0] = _time_seen_from(place, other, user.animated)
+        if others and place.filled:
+            held[influence_path(place), 0] = (1.0, 0.0)
     return held
 
 
