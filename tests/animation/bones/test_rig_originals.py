@@ -257,3 +257,16 @@ def test_two_slots_of_one_action_that_move_the_same_are_baked_each_for_itself(li
         bpy.context.view_layer.update()
         assert np.abs(shown(obj, frames) - before).max() < 2e-5
     assert strip.action == action
+
+
+def test_a_baked_copy_knows_of_no_slot_but_its_own(live_file):
+    first, second = moving_rig(name="A"), moving_rig("pga_lerp", name="B", seed=3)
+    select_only(first, second)
+    bpy.ops.anim.merge_animation()
+    bpy.context.view_layer.update()
+    bake(first.pose.bones["Hand"])
+    action = first.animation_data.action
+    handles = {slot.handle for slot in action.slots}
+    assert len(handles) == 2
+    motion = action.rigid_motion
+    assert {record.handle for record in motion.slots} | {pair.handle for pair in motion.bone_slots} <= handles

@@ -271,7 +271,11 @@ def make_single_user(rig: bpy.types.Object) -> None:
     bpy.ops.object.make_single_user(type="SELECTED_OBJECTS", object=True, animation=True)
 
 
-@pytest.mark.parametrize("leave", [unlink, delete, make_single_user])
+def go_to_another_slot(rig: bpy.types.Object) -> None:
+    rig.animation_data.action_slot = rig.animation_data.action.slots.new("OBJECT", "Other")
+
+
+@pytest.mark.parametrize("leave", [unlink, delete, make_single_user, go_to_another_slot])
 def test_a_rig_that_turns_otherwise_gets_in_betweens_of_its_own_when_the_other_leaves(live_file, leave):
     rig = key_all(new_rig("A"))
     other = rig.copy()
@@ -290,3 +294,21 @@ def test_a_rig_that_turns_otherwise_gets_in_betweens_of_its_own_when_the_other_l
     bpy.context.view_layer.update()
     assert_posed(other, PLAYED)
     assert refresh() == 0
+
+
+@pytest.mark.parametrize("alone", [False, True], ids=["by itself and in a strip", "in a strip alone"])
+def test_a_strip_of_a_slot_that_is_separated_keeps_its_keys(live_file, alone):
+    rig, other = moving_rig(), moving_rig("pga_lerp", name="Other", seed=5)
+    merge_into(rig, other)
+    (before,) = shown_poses([rig], PLAYED)
+    data = rig.animation_data
+    strip = data.nla_tracks.new().strips.new("Strip", 1, data.action)
+    strip.action_slot, strip.action_frame_start, strip.action_frame_end = data.action_slot, 1, 40
+    if alone:
+        data.action = None
+    bpy.context.view_layer.update()
+    separate_slots_of(other if alone else rig)
+    assert [slot.name_display for slot in strip.action.slots] == ["Rig", "Rigid Motion"]
+    data.action = None
+    bpy.context.view_layer.update()
+    assert_same_poses(rig, PLAYED, shown_poses([rig], PLAYED)[0], before)

@@ -23,6 +23,9 @@ def copied(slot: Slot, kind: str) -> bpy.types.Action:
     kept = {slot.handle, *(pair.differences for pair in changed.rigid_motion.bone_slots if pair.handle == slot.handle)}
     for other in [other for other in changed.slots if other.handle not in kept]:
         changed.slots.remove(other)
+    for notes in (changed.rigid_motion.slots, changed.rigid_motion.bone_slots):
+        for number in [number for number, one in enumerate(notes) if one.handle != slot.handle][::-1]:
+            notes.remove(number)
     return changed
 
 

@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Curves, Slot, SlotTransform, slots_of, transforms_in, transforms_with, uses_of
+from ..actions.slots import Curves, Slot, SlotTransform, slots_in, slots_of, transforms_in, transforms_with, uses_of
 from ..transforms import WIDTHS, Channel, is_ours, prefix_of, split_path
 
 _looks: dict[tuple[int, int], _Look] = {}
@@ -214,6 +214,7 @@ def _settings_of(bone: bpy.types.PoseBone) -> tuple:
 def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -> list[bpy.types.PoseBone]:
     """The bones of a rig that are other than at the last look: how they are posed, or what moves them.
 
+    Along with them those of other rigs that move by slots which this one has left.
     Where another frame is shown than then, those do not count that are where the rig's Action has them. Settings, which
     take longest to be asked for, are looked at where something of the rig itself `is_set`, not of its Action alone.
     """
@@ -222,7 +223,8 @@ def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -
     shared = _Shared.of(rig, None if before is None else before[0])
     _rigs[rig.session_uid] = shared, now, frame
     if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
-        return list(bones)
+        left = () if before is None else _users_of({key for key, _ in before[0].moved_by if key not in uses_of(rig)})
+        return [*bones, *(bone for other in left for bone in other.pose.bones)]
     changed = now.changed_from(before[1])
     if changed and before[2] != frame:
         changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
@@ -257,6 +259,14 @@ class _Shared(NamedTuple):
     def is_as(self, other: _Shared) -> bool:
         """Whether the bones depend on the same, however many constraints there are."""
         return (self.moved_by, self.users, self.rest) == (other.moved_by, other.users, other.rest)
+
+
+def _users_of(keys: set[tuple[int, int]]) -> set[bpy.types.Object]:
+    """The rigs that slots move: given by the addresses of their Actions, and their handles."""
+    addresses = {address for address, _ in keys}
+    actions = [action for action in bpy.data.actions if action.as_pointer() in addresses] if keys else ()
+    slots = [slot for slot in slots_in(actions) if (slot.action.as_pointer(), slot.handle) in keys]
+    return {user for slot in slots for user in slot.users if user.pose is not None}
 
 
 def _rest_of(bones: bpy.types.ArmatureBones) -> bytes:

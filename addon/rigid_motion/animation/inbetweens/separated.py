@@ -1,7 +1,8 @@
 """Rigs that Blender's *Separate Slots* has left with their differences in place of their keys.
 
 It puts each slot into an Action of its own, and gives that to all users of the slot. For Blender a rig uses two slots:
-the one of its keys, and by its constraints the one of its differences. That comes later, so the rig ends up with it.
+the one of its keys, and by its constraints the one of its differences. That comes later, so the rig ends up with it, by
+itself and in strips.
 Nothing in the new Actions says which of them were one, but for what is in them, and the names of their slots.
 """
 
@@ -12,11 +13,11 @@ from collections.abc import Iterable
 import bpy
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import Slot, is_time
+from ..actions.slots import Slot, is_time, strips_of, uses_of
 from ..transforms import bone_name, is_ours, split_path
 
-_names: dict[int, str] = {}
-"""Of each rig the name of the slot that has its keys, as last seen, by the rig's session id."""
+_names: dict[int, set[str]] = {}
+"""Of each rig the names of the slots that have its keys, as last seen, by the rig's session id."""
 
 
 def notice_slots(slots: Iterable[Slot]) -> None:
@@ -24,9 +25,19 @@ def notice_slots(slots: Iterable[Slot]) -> None:
     for slot in slots:
         if any(pair.handle == slot.handle for pair in slot.action.rigid_motion.bone_slots):
             for user in slot.users:
-                data = user.animation_data
-                if (data.action, data.action_slot_handle) == (slot.action, slot.handle):
-                    _names[user.session_uid] = data.action_slot.identifier
+                _names[user.session_uid] = _names_of(user)
+
+
+def _names_of(rig: bpy.types.Object) -> set[str]:
+    """The names of the slots that a rig moves by and that have differences in others."""
+    keyed = {(action, handle) for action, handle, _ in uses_of(rig).values()}
+    return {
+        slot.identifier
+        for action in {action for action, _ in keyed}
+        for pair in action.rigid_motion.bone_slots
+        for slot in action.slots
+        if slot.handle == pair.handle and (action, slot.handle) in keyed
+    }
 
 
 def are_separated(actions: Iterable[bpy.types.Action]) -> bool:
@@ -48,11 +59,11 @@ def discard(actions: Iterable[bpy.types.Action]) -> None:
 
 
 def _rigs_left_with(action: bpy.types.Action) -> list[bpy.types.Object]:
-    """The rigs whose own Action this is, although constraints of ours show it."""
+    """The rigs that move by this Action, although constraints of ours show it."""
     if not _has_samples_alone(action):
         return []
     owners = bpy.data.user_map(subset={action}, key_types={"ACTION"}, value_types={"OBJECT"})[action]
-    return [rig for rig in owners if rig.is_editable and _has_own(rig, action) and _shows(rig, action)]
+    return [rig for rig in owners if rig.is_editable and _moving(rig, action) and _shows(rig, action)]
 
 
 def _has_samples_alone(action: bpy.types.Action) -> bool:
@@ -68,8 +79,10 @@ def _only_channelbag(action: bpy.types.Action) -> bpy.types.ActionChannelbag | N
     return action_get_channelbag_for_slot(action, action.slots[0]) if is_single else None
 
 
-def _has_own(rig: bpy.types.Object, action: bpy.types.Action) -> bool:
-    return rig.animation_data is not None and rig.animation_data.action == action
+def _moving(rig: bpy.types.Object, action: bpy.types.Action) -> list[bpy.types.AnimData | bpy.types.NlaStrip]:
+    """By what of its animation a rig moves by an Action: it itself, and strips."""
+    data = rig.animation_data
+    return [] if data is None else [user for user in (data, *strips_of(rig)) if user.action == action]
 
 
 def _shows(rig: bpy.types.Object, action: bpy.types.Action) -> bool:
@@ -81,11 +94,12 @@ def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action) -> bool
     """Give a rig its keys again, unless it cannot be told where they are."""
     bones = _bones_of(_only_channelbag(differences).fcurves)
     timed = [action for action in bpy.data.actions if bones <= _timed_bones(action)]
-    named = [action for action in timed if action.slots[0].identifier == _names.get(rig.session_uid)]
+    named = [action for action in timed if action.slots[0].identifier in _names.get(rig.session_uid, ())]
     if len(found := named or timed) != 1:
         return False
-    rig.animation_data.action = found[0]
-    rig.animation_data.action_slot = found[0].slots[0]
+    for user in _moving(rig, differences):
+        user.action = found[0]
+        user.action_slot = found[0].slots[0]
     return True
 
 
