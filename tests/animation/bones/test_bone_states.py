@@ -255,21 +255,52 @@ class EditingBones(RigEditing):
     # Bones that come and go
 
     @precondition(lambda self: self.on)
-    @rule(who=shares)
-    def rename_a_bone(self, who):
-        name = self._named(who)
-        rig, old = name
-        if not self._is_free(rig):
+    @rule(who=shares, in_edit_mode=st.booleans())
+    def rename_a_bone(self, who, in_edit_mode):
+        rig, old = self._named(who)
+        if self._rigs_sharing(rig) != {rig}:
             return
         new, self.fresh = f'Renamed "{self.fresh}"', self.fresh + 1
-        keyed = self._keyed()[name]
+        self._rename(rig, {old: new}, in_edit_mode)
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, other=shares, in_edit_mode=st.booleans())
+    def swap_the_names_of_two_bones(self, who, other, in_edit_mode):
+        rig, one = self._named(who)
+        bones = [bone for owner, bone in self.names if owner == rig and bone != one]
+        if self._rigs_sharing(rig) != {rig} or not bones:
+            return
+        two = bones[int(other * len(bones))]
+        self._rename(rig, {one: two, two: one}, in_edit_mode)
+
+    def _rename(self, rig: str, names: dict[str, str], in_edit_mode: bool) -> None:
+        """Rename bones, whatever is baked, all at once."""
+        keyed = self._keyed()
+
+        def rename(bones: bpy.types.ArmatureBones | bpy.types.ArmatureEditBones) -> None:
+            bpy.context.view_layer.update()
+            given = [(bones[old], new) for old, new in names.items()]
+            for number, (bone, _) in enumerate(given):
+                bone.name = f"Between {number}"
+            for bone, new in given:
+                bone.name = new
 
         def change() -> None:
-            bpy.data.objects[rig].data.bones[old].name = new
-            self.names[self.names.index(name)] = (rig, new)
+            obj = bpy.data.objects[rig]
+            if in_edit_mode:
+                with_edit_bones(obj, rename)
+            else:
+                rename(obj.data.bones)
+            self.names = [self._now(name, rig, names) for name in self.names]
+            self.before_bake = {self._now(name, rig, names): kept for name, kept in self.before_bake.items()}
+            self.taken_off = {self._now(name, rig, names) for name in self.taken_off}
 
         self._edit(change)
-        assert self._keyed()[rig, new] == keyed
+        assert self._keyed() == {self._now(name, rig, names): kept for name, kept in keyed.items()}
+
+    @staticmethod
+    def _now(name: Name, rig: str, names: dict[str, str]) -> Name:
+        return (rig, names.get(name[1], name[1])) if name[0] == rig else name
 
     @precondition(lambda self: self.on and len(self.names) < 8)
     @rule(who=shares)
