@@ -291,6 +291,26 @@ def test_baking_keeps_the_motion_and_un_baking_gives_back_what_was_there(scene, 
     assert list(bpy.data.actions) == [action]
 
 
+@pytest.mark.parametrize(
+    ("modes", "options", "baked"),
+    [
+        ({1: "motor_spline"}, {"last": 12}, (1.0, 41.0)),
+        ({1: "motor_spline"}, {"first": 30}, (1.0, 41.0)),
+        ({1: "motor_spline", 31: "dq_sclerp"}, {"last": 12}, (1.0, 31.0)),
+        ({1: "dq_sclerp", 11: "motor_spline"}, {"last": 5}, (1.0, 41.0)),
+        ({1: "dq_sclerp", 11: "pga_lerp", 31: "motor_spline"}, {"last": 5}, (1.0, 11.0)),
+    ],
+    ids=str,
+)
+def test_what_a_smooth_mode_hangs_together_with_is_baked_as_a_whole(scene, modes, options, baked):
+    obj = keyed()
+    for frame, mode in modes.items():
+        set_mode(obj, mode, [one for one in key_frames(obj) if one >= frame])
+    before = read_poses(obj, FRAMES)
+    assert animation.bake(obj, **options) == baked
+    assert_same(read_poses(obj, FRAMES), before)
+
+
 def test_there_is_nothing_to_bake_without_a_mode(scene):
     with pytest.raises(Refused, match="Tool has no rigid in-betweens"):
         animation.bake(keyed())

@@ -169,7 +169,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
     )
     frames: EnumProperty(
         name="Frames",
-        description="What to bake, widened to whole segments",
+        description="What to bake, widened to whole segments, and those of smooth modes beside them",
         items=[
             ("ACTION", "Action", "From the first key of each to its last"),
             ("SCENE", "Scene", "The frame range of the scene, or its preview range while that is in use"),

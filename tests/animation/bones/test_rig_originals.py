@@ -270,3 +270,28 @@ def test_a_baked_copy_knows_of_no_slot_but_its_own(live_file):
     assert len(handles) == 2
     motion = action.rigid_motion
     assert {record.handle for record in motion.slots} | {pair.handle for pair in motion.bone_slots} <= handles
+
+
+@pytest.mark.parametrize("again", ["bake", "reduce"])
+def test_keys_are_changed_again_after_the_original_was_chosen_by_hand(live_file, again):
+    rig = key_all(new_rig(), np.arange(1.0, 41.0, 3.0), amount=0.05)
+    bones, data = list(rig.pose.bones), rig.animation_data
+    set_mode(bones, "dq_sclerp")
+    own, slot = data.action, data.action_slot
+
+    def change() -> None:
+        if again == "bake":
+            bake(bones)
+        else:
+            reduce_keys_of(bones, "motor_spline", 50.0)
+        bpy.context.view_layer.update()
+
+    change()
+    first = data.action
+    data.action, data.action_slot = own, slot
+    bpy.context.view_layer.update()
+    change()
+    assert data.action not in (own, first)
+    counts = {len(curves_of(bone)["location", 0].keyframe_points) for bone in bones}
+    assert 14 not in counts
+    assert len(bpy.data.actions) == 3

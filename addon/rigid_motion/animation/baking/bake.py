@@ -25,7 +25,7 @@ from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
 from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
 from ..inbetweens.channel_values import channel_values
-from ..inbetweens.differences import in_betweens
+from ..inbetweens.differences import SMOOTH, in_betweens
 from ..inbetweens.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of
 from .copies import BAKED, Lookup
@@ -99,7 +99,8 @@ def bake(
     step : float
         Frames from key to key, counted from the first. The animator's own keys are kept whatever the step.
     first, last : float, optional
-        The frames to bake, widened to whole segments. From the first key to the last, otherwise.
+        The frames to bake, widened to whole segments, and over those of smooth modes beside them, which go by keys that
+        would be others. From the first key to the last, otherwise.
     refused : list, optional
         Takes the refusals, and all other targets are baked.
 
@@ -178,7 +179,7 @@ def is_baked(target: Target) -> bool:
 
 
 def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
-    """The range from key to key that has the frames from first to last in it."""
+    """The range from key to key that has the frames from first to last in it, and what hangs together with them."""
     keys = source.key_frames
     if source.repeats:
         # Cycles go on from the outermost keys: what lies in between is baked as a whole.
@@ -193,7 +194,13 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
         )
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
-    return float(keys[np.clip(begin, 0, len(keys) - 2)]), float(keys[np.clip(end, 1, len(keys) - 1)])
+    begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))
+    is_smooth = np.isin(source.modes, SMOOTH)
+    while begin > 0 and is_smooth[begin - 1]:
+        begin -= 1
+    while end < len(keys) - 1 and is_smooth[end]:
+        end += 1
+    return float(keys[begin]), float(keys[end])
 
 
 def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray:

@@ -26,7 +26,7 @@ def move_by_copy(transform: Transform, place: SlotTransform, kind: str) -> SlotT
     """Let something of a rig be moved by a copy of what moves it, see `originals.move_by_copy`."""
     rig, original = transform.animated, place.slot.action
     changed = _copy_of(rig, place.slot)
-    if changed is None or used_in(rig, changed) is None:
+    if changed is None:
         # Not in this go, but before: it may be in a copy by now itself.
         before = next(iter(_originals_of(rig, original)), None)
         changed = original
@@ -60,9 +60,10 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
 
 
 def _copy_of(rig: bpy.types.Object, slot: Slot) -> bpy.types.Action | None:
-    """The Action that has other keys for parts of a rig, which this slot has from before."""
-    found = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
-    return next((changed for changed in found if changed is not None and in_action(changed, slot) is not None), None)
+    """The Action that a rig moves by and that has other keys for parts of it, which this slot has from before."""
+    noted = {entry.changed for entry in _entries(rig) if entry.original == slot.action}
+    # One that somebody has put the original in place of by hand is not used any more.
+    return next((one for one in noted if used_in(rig, one) is not None and in_action(one, slot) is not None), None)
 
 
 def _originals_of(rig: bpy.types.Object, changed: bpy.types.Action) -> Iterator[bpy.types.Action]:

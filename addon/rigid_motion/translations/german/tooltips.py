@@ -98,7 +98,9 @@ TOOLTIPS = {
         "Einzelbilder von einem gebackenen Schlüsselbild zum nächsten. "
         "Unter 1 liegen auch Schlüsselbilder zwischen den Einzelbildern, für Bewegungsunschärfe"
     ),
-    "What to bake, widened to whole segments": "Was gebacken wird, erweitert auf ganze Segmente",
+    "What to bake, widened to whole segments, and those of smooth modes beside them": (
+        "Was gebacken wird, erweitert auf ganze Segmente und die weicher Modi daneben"
+    ),
     "From the first key of each to its last": "Jeweils vom ersten Schlüsselbild bis zum letzten",
     "The frame range of the scene, or its preview range while that is in use": (
         "Der Bildbereich der Szene, oder ihr Vorschaubereich, solange dieser benutzt wird"
