@@ -456,3 +456,25 @@ def test_strips_that_are_blended_are_noted(rig):
     strip.blend_in = 10.0
     assert ("INFO", BLENDED) in notes_on(bone(rig))[0]
     assert ("INFO", BLENDED) not in notes_on(bone(rig, "Arm"))[0]
+
+
+def test_a_transition_between_strips_is_noted(rig):
+    set_mode(bone(rig), SCREW)
+    data = rig.animation_data
+    action, slot, data.action = data.action, data.action_slot, None
+    track = data.nla_tracks.new()
+    for start in (1, 100):
+        strip = track.strips.new("Strip", start, action)
+        strip.action_slot, strip.action_frame_start, strip.action_frame_end, strip.select = slot, 1, 21, True
+    bpy.context.view_layer.update()
+    assert ("INFO", BLENDED) not in notes_on(bone(rig))[0]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, "NLA_EDITOR"
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.nla.transition_add()
+    area.type = before
+    assert [strip.type for strip in track.strips] == ["CLIP", "TRANSITION", "CLIP"]
+    assert ("INFO", BLENDED) in notes_on(bone(rig))[0]

@@ -152,12 +152,12 @@ def is_blended(transform: Transform) -> bool:
         below = any(track.strips for track in data.nla_tracks)
         if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
             return True
-    strips = (strip for track in data.nla_tracks if not track.mute for strip in track.strips if not strip.mute)
+    strips = [strip for track in data.nla_tracks if not track.mute for strip in track.strips if not strip.mute]
     return any(
         strip.blend_in or strip.blend_out or strip.use_animated_influence or strip.blend_type != "REPLACE"
         for strip in strips
         if (strip.action, strip.action_slot_handle) in own
-    )
+    ) or bool(own and any(strip.type == "TRANSITION" for strip in strips))
 
 
 def has_edited_differences(transform: Transform, frame: float) -> bool:
