@@ -12,7 +12,7 @@ from mathutils import Euler, Matrix
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.animation.inbetweens.known_sources import MOST_BYTES, known, size_of
 from tests.animation.oracle import curves_of, expected_bases
-from tests.animation.scenes import key, new_object
+from tests.animation.scenes import key, new_object, push_down, tweak
 
 
 @pytest.fixture
@@ -190,3 +190,19 @@ def test_sources_that_are_kept_for_comparison_are_few_bytes_and_go_with_the_file
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert not known
     assert known.size == 0
+
+
+def test_a_key_of_another_user_of_a_slot_has_the_pose_of_that_one(live_file):
+    first = key(new_object("A"))
+    set_mode(first, "dq_sclerp")
+    second = first.copy()
+    second.name = "B"
+    bpy.context.scene.collection.objects.link(second)
+    tweak(first, push_down(first, 50))
+    bpy.context.scene.frame_set(17)
+    bpy.context.view_layer.objects.active = second
+    before = np.array(second.matrix_world)
+    second.keyframe_insert("location")
+    second.keyframe_insert("rotation_quaternion")
+    bpy.context.view_layer.update()
+    assert np.abs(np.array(second.matrix_world) - before).max() < 1e-5

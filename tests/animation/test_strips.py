@@ -12,7 +12,7 @@ import pytest
 from rigid_motion.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
 from rigid_motion.animation.inbetweens.outlets import deltas, sampled
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
-from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
+from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
@@ -345,3 +345,29 @@ def test_a_strip_without_an_action_to_set_keys_on_is_explained(live_file):
     with pytest.raises(ValueError, match=r"Tool.*enter a strip"):
         set_mode(obj, "dq_sclerp", KEYS)
     assert obj.rigid_motion.mode == before
+
+
+def test_an_own_delta_transform_is_held_in_an_action_that_an_object_without_strips_plays_too(live_file):
+    obj = new_object("B")
+    own = give_own_deltas(obj, 3)
+    data, plays = obj.animation_data_create(), []
+    for seed in (5, 8):
+        data.action = None
+        key(obj, seed=seed)
+        plays.append((data.action, data.action_slot))
+    set_mode(obj, "dq_sclerp")
+    data.action, data.action_slot = plays[0]
+    bpy.context.view_layer.update()
+    frames = np.arange(1.0, 40.0)
+    wanted = shown_worlds([obj], frames)[0]
+    data.action = None
+    other = new_object("A")
+    give_own_deltas(other, 3)
+    other.animation_data_create().action, other.animation_data.action_slot = plays[0]
+    for start, (action, slot) in zip((1, 50), plays, strict=True):
+        strip = data.nla_tracks.new().strips.new("Strip", start, action)
+        strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, 40
+        strip.extrapolation = "NOTHING"
+    bpy.context.view_layer.update()
+    assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5
+    assert own_deltas(other) == own

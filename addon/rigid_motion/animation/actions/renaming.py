@@ -7,6 +7,7 @@ leaves as they are: there the F-curves follow as well.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 import bpy
@@ -43,6 +44,7 @@ def _follow(renamed: Collection[bpy.types.Object]) -> None:
             # Of what no constraint shows Blender renames nothing: where two have swapped names, all looks complete.
             if any(user.rigid_motion.laid_aside for user in slot.users):
                 forget_in_betweens(slot, names.values())
+            _take_out_doubles(slot, names.values())
         for original in _originals_of(slot) if names else ():
             rename_records(original, names)
             for channelbag in filter(None, (original.channelbag, original.bones_channelbag)):
@@ -106,6 +108,21 @@ def _originals_of(slot: Slot) -> list[Slot]:
     }
     played = {(other.action, other.handle) for other in slots_in({action for action, _ in found})}
     return [Slot(*key, (), frozenset()) for key in found - played]
+
+
+def _take_out_doubles(slot: Slot, prefixes: Iterable[str]) -> None:
+    """Take out in-betweens that bones have twice: by their own, and by those of bones that are gone, whose names they
+    have. Of both Blender makes two groups of one name, and leaves it open which of them counts."""
+    channelbag = slot.bones_channelbag
+    if channelbag is None:
+        return
+    counts = Counter(group.name for group in channelbag.groups)
+    doubled = {prefix for prefix in prefixes if counts[bone_name(prefix)] > 1}
+    for fcurve in list(channelbag.fcurves) if doubled else ():
+        if split_path(fcurve.data_path)[0] in doubled:
+            # Groups that nothing is left in go with it.
+            channelbag.fcurves.remove(fcurve)
+    forget_in_betweens(slot, doubled)
 
 
 def _rename_channels(channelbag: bpy.types.ActionChannelbag, prefixes: Mapping[str, str]) -> None:

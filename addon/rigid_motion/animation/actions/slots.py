@@ -142,9 +142,9 @@ def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[S
 
 def read_again(places: Sequence[SlotTransform]) -> list[SlotTransform]:
     """The same, with the F-curves that there are by now."""
-    prefixes: dict[Slot, set[str]] = {}
+    prefixes: dict[Slot, dict[str, None]] = {}
     for place in places:
-        prefixes.setdefault(place.slot, set()).add(place.prefix)
+        prefixes.setdefault(place.slot, {})[place.prefix] = None
     found = {(slot, place.prefix): place for slot, own in prefixes.items() for place in transforms_in(slot, own)}
     return [found[place.slot, place.prefix] for place in places]
 
@@ -195,15 +195,14 @@ def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChanne
 
 def slot_transforms_of(transforms: Iterable[Transform]) -> list[SlotTransform]:
     """The slots that move these, and of each slot what is in it of them."""
-    transforms = list(transforms)
-    prefixes: dict[bpy.types.Object, set[str]] = {}
+    prefixes: dict[bpy.types.Object, dict[str, None]] = {}
     for transform in transforms:
-        prefixes.setdefault(transform.animated, set()).add(transform.prefix)
-    return [
-        one
-        for slot in slots_of(prefixes)
-        for one in transforms_in(slot, set().union(*(prefixes.get(user, ()) for user in slot.users)))
-    ]
+        prefixes.setdefault(transform.animated, {})[transform.prefix] = None
+    found = []
+    for slot in slots_of(prefixes):
+        wanted = dict.fromkeys(prefix for user in slot.users for prefix in prefixes.get(user, ()))
+        found += transforms_in(slot, wanted)
+    return found
 
 
 def slot_transforms_in(actions: Iterable[bpy.types.Action]) -> list[SlotTransform]:

@@ -44,7 +44,7 @@ def edited_in(slot: Slot) -> list[SlotTransform]:
     if look is None or not look.is_at(channelbag):
         _looks[key] = _Look(channelbag)
         return transforms_in(slot)
-    changed = {look.prefixes[number] for number in look.again()}
+    changed = dict.fromkeys(look.prefixes[number] for number in sorted(look.again()))
     return transforms_with(slot, channelbag, {prefix: look.curves_under(prefix) for prefix in changed})
 
 

@@ -131,24 +131,37 @@ def keep_pose(place: SlotTransform, before: str, source: Source, frame: float, *
     if old is None or source.key_count <= old.key_count or old.order != source.order:
         return False
     users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
-    if not users:
-        return False
-    posed = next((_posed[identity] for identity in map(_identity, users) if identity in _posed), None)
+    return any(_keep_pose_of(user, place, old, source, frame, again) for user in sorted(users, key=_precedence))
+
+
+def _precedence(user: Transform) -> tuple[bool, bool]:
+    """Which of the users of a slot a key is of that comes first: what was posed by hand, or else what is active."""
+    layer = bpy.context.view_layer
+    active = None if layer is None else layer.objects.active
+    return _identity(user) not in _posed, user.animated != active
+
+
+def _keep_pose_of(
+    user: Transform, place: SlotTransform, old: Source, source: Source, frame: float, again: bool
+) -> bool:
+    """Give it the pose of one of the users of the slot, if it can be of that one."""
+    posed = _posed.get(_identity(user))
     posed = posed if posed is not None and posed.frame == frame else None
-    data = users[0].animated.animation_data
+    data = user.animated.animation_data
     if data.use_tweak_mode:
         frame = data.nla_tweak_strip_time_to_scene(frame, invert=True)
     if not _is_inserted(old, source, frame):
         return False
-    shown = _inserted.get((before, source.digest)) if again else None
+    change = old.digest, source.digest
+    shown = _inserted.get(change) if again else None
     if shown is None:
         shown = old.values_at(np.array([frame]))[:, 0] if posed is None else posed.components
         if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
             return False
-        _inserted[before, source.digest] = shown
+        _inserted[change] = shown
         if len(_inserted) > MOST_INSERTED:
             _inserted.popitem(last=False)
-    for channel, value in _on_screen(users[0], place, old, shown, frame).items():
+    for channel, value in _on_screen(user, place, old, shown, frame).items():
         if (fcurve := place.curves.get(channel)) is not None:
             _set_key(fcurve, frame, value)
     return True

@@ -7,7 +7,7 @@ written down on the object, component by component, before in-betweens take thei
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache
 
 import bpy
@@ -58,16 +58,16 @@ class ObjectTransform(Transform):
     def differences_for(self, rotation: str) -> dict[int, Channel]:
         return channels_under("delta_", rotation)
 
+    def original_values(self, path: str) -> Sequence[float]:
+        """What one of its delta properties has without in-betweens."""
+        noted, now = self._noted, getattr(self.carrier, path)[:]
+        if not noted:
+            return now
+        then = getattr(self.motion, ORIGINALS[path][0])[:]
+        return [then[i] if _BITS[path, i] & noted else value for i, value in enumerate(now)]
+
     def original(self) -> np.ndarray:
-        noted = self._noted
-
-        def values(path: str) -> list[float]:
-            now = getattr(self.carrier, path)[:]
-            if not noted:
-                return now
-            then = getattr(self.motion, ORIGINALS[path][0])[:]
-            return [then[i] if _BITS[path, i] & noted else value for i, value in enumerate(now)]
-
+        values = self.original_values
         rotation = REST[ROWS[ROTATION]]
         if self.carrier.rotation_mode in ORDERS:
             angles = values("delta_rotation_euler")

@@ -92,8 +92,14 @@ def _is_overwritten(user: ObjectTransform, filled: dict[Channel, bpy.types.FCurv
 
 def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
     """The channels that a slot which is not filled in has to have, and what they hold."""
-    first, *others = (_held_for(user, place, beside) for user in place.users)
-    if any(held != first for held in others):
+    in_nla = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
+    first, *others = [_held_for(user, place, beside) for user in in_nla] or [{}]
+    if any(held != first for held in others) or any(
+        user.original_values(path)[index] != value
+        for user in place.users
+        if user not in in_nla
+        for (path, index), value in first.items()
+    ):
         return {}
     # What it does not key may be another strip's to move, below it, and then so are the differences of that.
     animated = {path for (path, _), fcurve in place.curves.items() if not is_filled_in(fcurve)}
@@ -105,8 +111,6 @@ def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel
 
 
 def _held_for(user: ObjectTransform, place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
-    if not len(user.animated.animation_data.nla_tracks):
-        return {}
     originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
     originals = {
         path: values
