@@ -76,7 +76,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--step", type=_step, metavar="N", help="frames from key to key; 0.25 for keys between the frames (1)"
     )
     keys.add_argument(
-        "--first", type=_frame, metavar="FRAME", help="bake from here on, widened to whole segments (first key)"
+        "--first",
+        type=_frame,
+        metavar="FRAME",
+        help="bake from here on, widened to whole segments, and over smooth ones beside them (first key)",
     )
     keys.add_argument("--last", type=_frame, metavar="FRAME", help="bake up to here (last key)")
     add_file_options(parser)
