@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -86,3 +87,19 @@ def tweak(obj: bpy.types.Object, strip: bpy.types.NlaStrip) -> None:
     data.use_tweak_mode = True
     bpy.context.view_layer.update()
     assert data.use_tweak_mode
+
+
+@contextmanager
+def editor(kind: str, mode: str | None = None) -> Iterator[bpy.types.Space]:
+    """Have operators run in an editor of this kind."""
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    before, area.type = area.type, kind
+    if mode is not None:
+        area.spaces.active.mode = mode
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            yield area.spaces.active
+    finally:
+        area.type = before

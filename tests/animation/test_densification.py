@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-
 import bpy
 import pytest
 
 from rigid_motion.animation import key_frames, set_mode
 from tests.animation.oracle import curves_of, shown_worlds
-from tests.animation.scenes import key, new_object
+from tests.animation.scenes import editor, key, new_object
 
 FRAMES = range(1, 41)
 
@@ -34,21 +32,8 @@ def select(fcurve: bpy.types.FCurve, frames) -> None:
             setattr(point, part, point.co.x in frames)
 
 
-@contextmanager
-def dope_sheet():
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    before, area.type = area.type, "DOPESHEET_EDITOR"
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    try:
-        with bpy.context.temp_override(window=window, area=area, region=region):
-            yield
-    finally:
-        area.type = before
-
-
 def bake_keyframes():
-    with dope_sheet():
+    with editor("DOPESHEET_EDITOR"):
         bpy.ops.action.bake_keys()
     bpy.context.view_layer.update()
 
@@ -89,7 +74,7 @@ def test_keys_that_are_not_on_the_curves_stay_as_they_are(tool):
 def test_undo_and_redo_give_the_same_motion(tool):
     before = shown_worlds([tool], FRAMES)[0]
     bpy.ops.ed.undo_push(message="begin")
-    with dope_sheet():
+    with editor("DOPESHEET_EDITOR"):
         bpy.ops.action.bake_keys()
     bpy.ops.ed.undo_push(message="baked")
     bpy.context.view_layer.update()
@@ -103,7 +88,7 @@ def test_undo_and_redo_give_the_same_motion(tool):
 @pytest.mark.parametrize("remove", [False, True])
 def test_bake_channels_keeps_the_motion(tool, remove):
     before = shown_worlds([tool], FRAMES)[0]
-    with dope_sheet():
+    with editor("DOPESHEET_EDITOR"):
         bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, remove_outside_range=remove, interpolation_type="LIN")
     bpy.context.view_layer.update()
     assert shown_worlds([tool], FRAMES)[0] == pytest.approx(before, abs=2e-5)
@@ -113,7 +98,7 @@ def test_bake_channels_keeps_the_motion(tool, remove):
 def test_keys_that_are_edited_before_blender_tells_of_bake_channels_stay_as_far_off(tool, shown):
     bpy.context.scene.frame_set(shown)
     before = shown_worlds([tool], FRAMES)[0]
-    with dope_sheet():
+    with editor("DOPESHEET_EDITOR"):
         bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, interpolation_type="LIN")
     fcurve = curves_of(tool)["location", 1]
     for frame in (14, 15, 30):
@@ -125,7 +110,7 @@ def test_keys_that_are_edited_before_blender_tells_of_bake_channels_stay_as_far_
 
 
 def test_where_most_keys_are_off_the_curves_they_stay_as_they_are(tool):
-    with dope_sheet():
+    with editor("DOPESHEET_EDITOR"):
         bpy.ops.anim.channels_bake(range=(1, 40), step=1.0, interpolation_type="LIN")
     fcurve = curves_of(tool)["location", 1]
     for point in fcurve.keyframe_points:

@@ -32,12 +32,12 @@ from rigid_motion.ui.targets import (
     targets_of,
 )
 from rigid_motion.ui.wording import BLENDED, NO_KEYS, NO_SEGMENT, TROUBLES, kind_of, reduction_rows, spoken_of
+from tests.animation.scenes import editor
 from tests.rigs.recorded import FRAMES as RECORDED
 from tests.rigs.recorded import recorded_rig
 from tests.ui.conftest import keyed
 from tests.ui.rigs import FRAMES, key_bone, keyed_rig, new_rig, select, select_keys
 from tests.ui.test_menus import drawn
-from tests.ui.test_targets import editor
 
 operators = bpy.ops.rigid_motion
 SCREW = "dq_sclerp"
@@ -469,12 +469,7 @@ def test_a_transition_between_strips_is_noted(rig):
     bpy.context.view_layer.update()
     assert ("INFO", BLENDED) not in notes_on(bone(rig))[0]
     bpy.ops.object.mode_set(mode="OBJECT")
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    before, area.type = area.type, "NLA_EDITOR"
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with editor("NLA_EDITOR"):
         bpy.ops.nla.transition_add()
-    area.type = before
     assert [strip.type for strip in track.strips] == ["CLIP", "TRANSITION", "CLIP"]
     assert ("INFO", BLENDED) in notes_on(bone(rig))[0]

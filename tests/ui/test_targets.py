@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-
 import bpy
 import pytest
 
 from rigid_motion.animation import modes_of
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, scope_for, targets_of
+from tests.animation.scenes import editor
 from tests.ui.conftest import FRAMES, keyed, select_keys
-
-
-@contextmanager
-def editor(kind):
-    """The context of an editor of this type."""
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    before, area.type = area.type, kind
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    try:
-        with bpy.context.temp_override(window=window, area=area, region=region):
-            yield area.spaces.active
-    finally:
-        area.type = before
 
 
 @pytest.mark.parametrize("kind", KEY_EDITORS)

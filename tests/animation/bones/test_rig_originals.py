@@ -24,7 +24,7 @@ from tests.animation.bones.rigs import ARM, PLAYED, Rest, key_all, key_bone, mov
 from tests.animation.bones.test_rig_edits import RENAMINGS, assert_nothing_stale
 from tests.animation.bones.test_slots_of_rigs import separate_slots_of
 from tests.animation.oracle import curves_of, shown_worlds, snapshot
-from tests.animation.scenes import key, new_object, push_down
+from tests.animation.scenes import editor, key, new_object, push_down
 
 Change = tuple[bpy.types.Object, Callable[[], None]]
 
@@ -182,13 +182,8 @@ def put_into_a_meta_strip(obj: bpy.types.Object) -> None:
     for strip in obj.animation_data.nla_tracks[0].strips:
         strip.select = True
     obj.animation_data.nla_tracks[0].select = True
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    before, area.type = area.type, "NLA_EDITOR"
-    region = next(region for region in area.regions if region.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with editor("NLA_EDITOR"):
         bpy.ops.nla.meta_add()
-    area.type = before
 
 
 def shown(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:

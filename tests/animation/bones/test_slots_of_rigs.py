@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import bpy
 import numpy as np
 import pytest
@@ -14,20 +11,7 @@ from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_p
 from tests.animation.bones.rigs import FRAMES, PLAYED, key_all, moving_rig, new_rig, own_constraints, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
 from tests.animation.oracle import assert_shown, curves_of, snapshot
-from tests.animation.scenes import key, new_object
-
-
-@contextmanager
-def action_editor() -> Iterator[None]:
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    before, area.type = area.type, "DOPESHEET_EDITOR"
-    area.spaces.active.mode = "ACTION"
-    try:
-        with bpy.context.temp_override(window=window, area=area):
-            yield
-    finally:
-        area.type = before
+from tests.animation.scenes import editor, key, new_object
 
 
 def merge_into(first: bpy.types.Object, *others: bpy.types.Object) -> None:
@@ -40,7 +24,7 @@ def merge_into(first: bpy.types.Object, *others: bpy.types.Object) -> None:
 def separate_slots_of(obj: bpy.types.Object) -> None:
     """Put each slot of an object's Action into one of its own."""
     select_only(obj)
-    with action_editor():
+    with editor("DOPESHEET_EDITOR", "ACTION"):
         bpy.ops.anim.separate_slots()
     bpy.context.view_layer.update()
 
