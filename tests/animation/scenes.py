@@ -89,6 +89,15 @@ def tweak(obj: bpy.types.Object, strip: bpy.types.NlaStrip) -> None:
     assert data.use_tweak_mode
 
 
+def new_strip(
+    obj: bpy.types.Object, start: int, action: bpy.types.Action, slot: bpy.types.ActionSlot, last: int = 40
+) -> bpy.types.NlaStrip:
+    """A strip in its own track, of frames 1 to `last`: Blender makes it one frame long where several slots fit."""
+    strip = obj.animation_data.nla_tracks.new().strips.new(slot.name_display, start, action)
+    strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, last
+    return strip
+
+
 @contextmanager
 def editor(kind: str, mode: str | None = None) -> Iterator[bpy.types.Space]:
     """Have operators run in an editor of this kind."""

@@ -12,7 +12,7 @@ import pytest
 from rigid_motion.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
 from rigid_motion.animation.inbetweens.outlets import deltas, sampled
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
-from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down, tweak
+from tests.animation.scenes import give_own_deltas, key, new_object, new_strip, own_deltas, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
@@ -365,9 +365,7 @@ def test_an_own_delta_transform_is_held_in_an_action_that_an_object_without_stri
     give_own_deltas(other, 3)
     other.animation_data_create().action, other.animation_data.action_slot = plays[0]
     for start, (action, slot) in zip((1, 50), plays, strict=True):
-        strip = data.nla_tracks.new().strips.new("Strip", start, action)
-        strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, 40
-        strip.extrapolation = "NOTHING"
+        new_strip(obj, start, action, slot).extrapolation = "NOTHING"
     bpy.context.view_layer.update()
     assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5
     assert own_deltas(other) == own

@@ -24,7 +24,7 @@ from tests.animation.bones.rigs import (
     twin_of,
 )
 from tests.animation.oracle import curves_of, expected_bases
-from tests.animation.scenes import push_down, tweak
+from tests.animation.scenes import new_strip, push_down, tweak
 
 KEYS = (1.0, 11.0, 21.0, 41.0)
 ACTION_FRAMES = np.arange(1.0, 42.0)
@@ -322,8 +322,7 @@ def test_a_strip_beside_another_shows_the_action_that_a_rig_without_strips_plays
     other = moving_rig(name="Runner", seed=5, frames=KEYS)
     own = expected_poses(other, ACTION_FRAMES)
     push_down(other)
-    strip = other.animation_data.nla_tracks.new().strips.new("Walk", 100, walk.action)
-    strip.action_slot, strip.action_frame_start, strip.action_frame_end = walk.action_slot, 1, 41
+    new_strip(other, 100, walk.action, walk.action_slot, last=41)
     for track in other.animation_data.nla_tracks:
         track.strips[0].extrapolation = "NOTHING"
     bpy.context.view_layer.update()

@@ -24,7 +24,7 @@ from tests.animation.bones.rigs import ARM, PLAYED, Rest, key_all, key_bone, mov
 from tests.animation.bones.test_rig_edits import RENAMINGS, assert_nothing_stale
 from tests.animation.bones.test_slots_of_rigs import separate_slots_of
 from tests.animation.oracle import curves_of, shown_worlds, snapshot
-from tests.animation.scenes import editor, key, new_object, push_down
+from tests.animation.scenes import editor, key, new_object, new_strip, push_down
 
 Change = tuple[bpy.types.Object, Callable[[], None]]
 
@@ -44,12 +44,8 @@ def changed(request, live_file) -> Iterator[Change]:
 @pytest.mark.parametrize("rename", RENAMINGS.values(), ids=RENAMINGS)
 def test_bones_that_were_renamed_get_their_own_keys_back(changed, rename):
     rig, change, go_back = changed
-    bones, own = list(rig.pose.bones), rig.animation_data.action
-    before, wanted, was = (
-        [snapshot(bone) for bone in bones],
-        shown_poses([rig], PLAYED)[0],
-        [bone.name for bone in bones],
-    )
+    own, was = rig.animation_data.action, rig.pose.bones.keys()
+    before, wanted = [snapshot(bone) for bone in rig.pose.bones], shown_poses([rig], PLAYED)[0]
     change()
     assert rig.animation_data.action != own
     rename(rig)
@@ -242,8 +238,7 @@ def test_two_slots_of_one_action_that_move_the_same_are_baked_each_for_itself(li
     if in_strips:
         data.action = None
     for start, slot in (*starts, (50, other.animation_data.action_slot)):
-        strip = data.nla_tracks.new().strips.new(slot.name_display, start, action)
-        strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, 40
+        strip = new_strip(obj, start, action, slot)
     bpy.context.view_layer.update()
     frames = np.arange(1.0, 90.0)
     before = shown(obj, frames)

@@ -11,7 +11,7 @@ from tests.animation.bones.poses import assert_posed, assert_same_poses, shown_p
 from tests.animation.bones.rigs import FRAMES, PLAYED, key_all, moving_rig, new_rig, own_constraints, select_only
 from tests.animation.bones.test_rig_edits import assert_nothing_stale
 from tests.animation.oracle import assert_shown, curves_of, snapshot
-from tests.animation.scenes import editor, key, new_object
+from tests.animation.scenes import editor, key, new_object, new_strip
 
 
 def merge_into(first: bpy.types.Object, *others: bpy.types.Object) -> None:
@@ -286,8 +286,7 @@ def test_a_strip_of_a_slot_that_is_separated_keeps_its_keys(live_file, alone):
     merge_into(rig, other)
     (before,) = shown_poses([rig], PLAYED)
     data = rig.animation_data
-    strip = data.nla_tracks.new().strips.new("Strip", 1, data.action)
-    strip.action_slot, strip.action_frame_start, strip.action_frame_end = data.action_slot, 1, 40
+    strip = new_strip(rig, 1, data.action, data.action_slot)
     if alone:
         data.action = None
     bpy.context.view_layer.update()

@@ -14,7 +14,7 @@ import bpy
 
 from ..transforms import Transform, bone_name, prefix_of, split_path, transform_of
 from .records import NOTHING_RECORDED, forget_in_betweens, keep_name, recorded, rename_records
-from .slots import Slot, SlotTransform, counterpart_in, slots_in, slots_of
+from .slots import Slot, SlotTransform, in_action, slots_in, slots_of
 
 
 def follow_renamed(places: Iterable[SlotTransform]) -> None:
@@ -100,14 +100,10 @@ def _originals_of(slot: Slot) -> list[Slot]:
     rigs = [user for user in slot.users if user.pose is not None]
     owners = [owner for rig in rigs for owner in (rig, *rig.pose.bones)]
     notes = [entry for owner in owners for entry in owner.rigid_motion.bakes if entry.changed == slot.action]
-    own = next(one for one in slot.action.slots if one.handle == slot.handle)
-    found = {
-        (action, same.handle)
-        for action in {entry.original for entry in notes if entry.original is not None}
-        if action.is_editable and (same := counterpart_in(action, own)) is not None
-    }
-    played = {(other.action, other.handle) for other in slots_in({action for action, _ in found})}
-    return [Slot(*key, (), frozenset()) for key in found - played]
+    actions = {entry.original for entry in notes if entry.original is not None and entry.original.is_editable}
+    played = {(other.action, other.handle) for other in slots_in(actions)}
+    found = (in_action(action, slot) for action in actions)
+    return [one for one in found if one is not None and (one.action, one.handle) not in played]
 
 
 def _take_out_doubles(slot: Slot, prefixes: Iterable[str]) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 
 import bpy
@@ -117,6 +117,14 @@ class SlotTransform:
     def has_filled(self, curves: Curves) -> None:
         """Take note of the F-curves that in-betweens are in by now."""
         self.__dict__["filled"] = curves
+
+    def ensure_curve(self, channel: Channel) -> bpy.types.FCurve:
+        """The F-curve of a channel, made where there is none yet."""
+        fcurve = self.curves.get(channel)
+        if fcurve is None:
+            path, index = channel
+            fcurve = self.curves[channel] = self.channelbag.fcurves.new(path, index=index)
+        return fcurve
 
     def read_again(self) -> SlotTransform:
         """The same, with the F-curves that there are by now."""
@@ -302,6 +310,13 @@ def counterpart_in(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> bpy.
     """The slot in a copy of an Action, or in the original, that is the same: by its name, or renamed by its handle."""
     found = action.slots.get(slot.identifier)
     return found or next((one for one in action.slots if one.handle == slot.handle), None)
+
+
+def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
+    """The same slot in a copy of its Action, or in the original. None where it was taken out of it."""
+    own = next(one for one in slot.action.slots if one.handle == slot.handle)
+    found = counterpart_in(action, own)
+    return None if found is None else replace(slot, action=action, handle=found.handle)
 
 
 def strips_of(obj: bpy.types.Object) -> Iterator[bpy.types.NlaStrip]:

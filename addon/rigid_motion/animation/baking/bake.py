@@ -225,9 +225,7 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
             if fcurve is not None and fcurve.mute:
                 # Its keys have had no say, and what there was in their place is baked.
                 fcurves.remove(copy.curves.pop((path, index)))
-                fcurve = None
-            if fcurve is None:
-                fcurve = copy.curves[path, index] = fcurves.new(path, index=index)
+            fcurve = copy.ensure_curve((path, index))
             _bake_channel(fcurve, frames, column)
             if cycles is not None:
                 add_cycles(fcurve, cycles)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 
 import bpy
 
@@ -62,13 +61,6 @@ def in_copy(transform: Transform, place: SlotTransform, changed: bpy.types.Actio
     found = {channel: channelbag.fcurves.find(channel[0], index=channel[1]) for channel in place.curves}
     curves = {channel: fcurve for channel, fcurve in found.items() if fcurve is not None}
     return transforms_with(slot, channelbag, {place.prefix: curves})[0]
-
-
-def in_action(action: bpy.types.Action, slot: Slot) -> Slot | None:
-    """The same slot in a copy of its Action, or in the original. None where it was taken out of it."""
-    own = next(one for one in slot.action.slots if one.handle == slot.handle)
-    found = counterpart_in(action, own)
-    return None if found is None else replace(slot, action=action, handle=found.handle)
 
 
 class Lookup:

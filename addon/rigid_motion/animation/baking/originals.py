@@ -10,7 +10,7 @@ import bpy
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..actions.slots import SlotTransform, places_of
+from ..actions.slots import SlotTransform, in_action, places_of
 from ..transforms import Refused, Transform
 from . import rigs
 from .copies import (
@@ -20,7 +20,6 @@ from .copies import (
     copied,
     entries_in_use,
     exchange,
-    in_action,
     in_copy,
     let_rest,
     note,
@@ -99,7 +98,7 @@ def refuse_without_slot(transform: Transform, kind: str) -> None:
     """Raise `Refused` where an original no longer has the slot that something moved by."""
     for entry in entries_in_use(transform):
         slot, original = used_in(transform.animated, entry.changed), entry.original
-        if entry.kind == kind and slot is not None and original is not None and in_action(original, slot) is None:
+        if entry.kind == kind and original is not None and in_action(original, slot) is None:
             raise Refused(rpt_(WITHOUT_SLOT).format(name=transform.name, action=original.name))
 
 

@@ -257,10 +257,8 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
         entry.frames_after = fewer.rig.frames
         entry.slide_before, entry.slide_after = fewer.rig.slide_before, fewer.rig.slide_after
     fcurves = copy.channelbag.fcurves
-    for (path, index), values in fewer.values.items():
-        fcurve = copy.curves.get((path, index))
-        if fcurve is None:
-            fcurve = copy.curves[path, index] = fcurves.new(path, index=index)
+    for channel, values in fewer.values.items():
+        fcurve = copy.ensure_curve(channel)
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
     if transform.mode_channel in copy.curves:

@@ -215,6 +215,7 @@ def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -
     """The bones of a rig that are other than at the last look: how they are posed, or what moves them.
 
     Along with them those of other rigs that move by slots which this one has left.
+
     Where another frame is shown than then, those do not count that are where the rig's Action has them. Settings, which
     take longest to be asked for, are looked at where something of the rig itself `is_set`, not of its Action alone.
     """
@@ -223,8 +224,8 @@ def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -
     shared = _Shared.of(rig, None if before is None else before[0])
     _rigs[rig.session_uid] = shared, now, frame
     if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
-        left = () if before is None else _users_of({key for key, _ in before[0].moved_by if key not in uses_of(rig)})
-        return [*bones, *(bone for other in left for bone in other.pose.bones)]
+        left = set() if before is None else dict(before[0].moved_by).keys() - dict(shared.moved_by).keys()
+        return [*bones, *(bone for other in _users_of(left) for bone in other.pose.bones)]
     changed = now.changed_from(before[1])
     if changed and before[2] != frame:
         changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)

@@ -260,9 +260,6 @@ def _value(fcurve: bpy.types.FCurve, frame: float) -> int:
 
 
 def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
-    path, index = channel
-    channelbag = place.channelbag
-    fcurve = place.curves[channel] = channelbag.fcurves.new(path, index=index)
-    group = place.users[0].group
+    fcurve, channelbag, group = place.ensure_curve(channel), place.channelbag, place.users[0].group
     fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
     return fcurve
