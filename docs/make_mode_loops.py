@@ -21,8 +21,8 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from rigid_motion import animation
-from rigid_motion.animation.inbetweens.differences import in_betweens
-from rigid_motion.animation.inbetweens.mode_keys import source_of
+from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs, rotate
 from rigid_motion_batch.comparison import palette

@@ -23,8 +23,8 @@ import bpy
 import numpy as np
 
 from rigid_motion import animation
-from rigid_motion.animation.inbetweens.differences import in_betweens
-from rigid_motion.animation.inbetweens.mode_keys import source_of
+from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES, Poses, shell_error
 from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
 from rigid_motion.motion.measures import rms

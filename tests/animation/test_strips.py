@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import bake, key_frames, modes_of, problem_of, refresh, set_mode, unbake
-from rigid_motion.animation.inbetweens.outlets import deltas, sampled
+from rigid_motion.animation.writers import deltas, sampled
 from tests.animation.oracle import Own, curves_of, expected_bases, shown_worlds, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object, new_strip, own_deltas, push_down, tweak
 

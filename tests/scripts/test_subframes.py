@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation.inbetweens.differences import in_betweens
-from rigid_motion.animation.inbetweens.mode_keys import source_of
+from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch import subframes
 from rigid_motion_batch.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure

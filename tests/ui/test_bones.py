@@ -10,15 +10,8 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import constraint_trouble, mend, modes_of, set_mode
-from rigid_motion.animation.inbetweens.outlets.restoring import (
-    CHANGED,
-    MUTED,
-    NOT_FIRST,
-    OTHER_SLOT,
-    REMOVED,
-    WEAK,
-)
 from rigid_motion.animation.transforms import CONSTRAINT, Refused, transform_of
+from rigid_motion.animation.writers.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from rigid_motion.ui import menus
 from rigid_motion.ui.notes import facts_and_notes
 from rigid_motion.ui.targets import (

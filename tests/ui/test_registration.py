@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 import rigid_motion
-from rigid_motion.animation.inbetweens import live
+from rigid_motion.animation.live import live
 from rigid_motion.ui import keymap, menus
 
 

@@ -1,10 +1,18 @@
 """Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
-curves      F-curves in NumPy                           transforms  what is moved, and where differences go
-actions     what is keyed: slots, channels, modes       inbetweens  what happens between the keys
-baking      other keys for the same motion              properties  what is kept in files
+curves      F-curves in NumPy
+transforms  what is moved: objects and pose bones
+actions     what is keyed: slots, channels, modes; read into sources
+compute     from sources to the differences between Blender's in-betweens and those of the modes
+writers     where differences go: sampled F-curves of delta transforms, constraints of bones and their times
+queries     what is asked of motions: keys, segments, problems
+live        following edits: handlers, refresh, keys that are inserted in between
+edits       what is done to motions: choosing modes, putting constraints back
+baking      other keys for the same motion
+properties  what is kept in files
 
-Each room knows only those before it.
+Data flows from Blender through actions, compute and writers back to Blender. Each room imports only those above it;
+`handlers` belongs to none, and imports none.
 """
 
 from . import properties
@@ -23,11 +31,12 @@ from .baking.reducing import (
     total_reduction,
 )
 from .baking.sizes import radius_of
-from .inbetweens import edit_mode, live
-from .inbetweens.live import refresh, set_enabled
-from .inbetweens.mending import constraint_trouble, mend
-from .inbetweens.mode_keys import key_frames, modes_of, set_mode
-from .inbetweens.problems import problem_of
+from .edits.mending import constraint_trouble, mend
+from .edits.mode_keys import set_mode
+from .live import edit_mode, live
+from .live.live import refresh, set_enabled
+from .queries.keyed import key_frames, modes_of
+from .queries.problems import problem_of
 from .transforms import Refused
 
 __all__ = [

@@ -21,7 +21,8 @@ from bpy.props import (
 
 from ..motion import KEYFRAME_MODES
 from .baking.copies import BAKED, REDUCED
-from .inbetweens import live, mode_keys
+from .edits import mode_keys
+from .live import live
 from .transforms import transform_of
 
 OWN_WORDS = "Rigid Motion"

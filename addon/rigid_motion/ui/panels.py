@@ -10,9 +10,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
-from ..animation.inbetweens.describing import SegmentFacts, parts_with_in_betweens
-from ..animation.inbetweens.polls import with_in_betweens
 from ..animation.properties import OWN_WORDS
+from ..animation.queries.describing import SegmentFacts, parts_with_in_betweens
+from ..animation.queries.polls import with_in_betweens
 from ..animation.transforms import ORIGINALS, SCALE, BoneTransform, ObjectTransform, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes

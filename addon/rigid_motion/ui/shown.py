@@ -11,7 +11,7 @@ import logging
 import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
 
-from ..animation.inbetweens.describing import shown_components
+from ..animation.queries.describing import shown_components
 from ..animation.transforms import LOCATION, REST, ROTATION, ROWS, SCALE, Refused
 from .targets import active_target
 

@@ -12,10 +12,10 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..animation import Reduction, WholeRig
-from ..animation.inbetweens.describing import SegmentFacts
-from ..animation.inbetweens.outlets.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
+from ..animation.queries.describing import SegmentFacts
 from ..animation.transforms import BoneTransform, Transform
+from ..animation.writers.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""

@@ -12,7 +12,7 @@ from rigid_motion.animation.actions.records import recorded_mode
 from rigid_motion.animation.actions.refusals import refuse_numbers
 from rigid_motion.animation.actions.slots import SlotTransform, slot_transforms_of
 from rigid_motion.animation.actions.sources import Source
-from rigid_motion.animation.inbetweens.mode_keys import segment_modes
+from rigid_motion.animation.queries.keyed import segment_modes
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.keying.targets import Action, Result

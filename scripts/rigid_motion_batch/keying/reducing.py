@@ -10,7 +10,7 @@ import bpy
 from rigid_motion import animation
 from rigid_motion.animation import NeedsItsKeys, Reduction, Refused
 from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit
-from rigid_motion.animation.inbetweens.polls import with_more_keys_than
+from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.figures import unit_of

@@ -1,5 +1,13 @@
 """Other keys for the same motion, and the way back.
 
-bake        real keys for every frame                   reducing    the few keys that a recording needs
-originals   what there was before either
+copies          Actions that were given other keys, and what they are copies of
+sizes           how large what is moved is, for tolerances
+rigs            all bones of a rig whose Action was copied
+originals       what there was before keys were baked or reduced
+bake            real keys for every frame
+fewer_keys      the few keys that a transform needs
+fewer_rig_keys  those of all bones of a rig together
+reducing        the few keys that a recording needs, and the way back
+
+Each module imports only those above it.
 """

@@ -23,11 +23,11 @@ from ..actions.channels import (
 )
 from ..actions.slots import SlotTransform
 from ..actions.sources import SAME_FRAME, Source
-from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
-from ..inbetweens.channel_values import channel_values
-from ..inbetweens.differences import SMOOTH, in_betweens
-from ..inbetweens.mode_keys import set_mode_in, set_whole
+from ..compute.differences import SMOOTH, in_betweens
+from ..edits.acting import Readings, Target, Targets, act_on, readable, transforms_of
+from ..edits.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of
+from ..writers.channel_values import channel_values
 from .copies import BAKED, Lookup
 from .originals import (
     has_original,

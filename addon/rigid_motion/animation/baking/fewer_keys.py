@@ -16,10 +16,10 @@ from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.best_of import least_errors
 from ..actions.slots import SlotTransform
 from ..actions.sources import MODE_NUMBERS, SAME_FRAME, Source, distinct
+from ..compute.differences import in_betweens
 from ..curves import CODE, CONSTANT, LINEAR, Keys
-from ..inbetweens.channel_values import channel_values
-from ..inbetweens.differences import in_betweens
 from ..transforms import ROWS, SCALE, Channel, Refused, Transform
+from ..writers.channel_values import channel_values
 from .sizes import in_channels
 
 SMALLEST = 1e-6

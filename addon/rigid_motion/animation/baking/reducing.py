@@ -22,8 +22,9 @@ from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.slots import places_of, slots_of, transforms_in
 from ..actions.sources import MODE_NAMES, distinct
-from ..inbetweens.acting import Readings, Target, Targets, act_on, readable, transforms_of
-from ..inbetweens.mode_keys import segment_modes, set_mode_in
+from ..edits.acting import Readings, Target, Targets, act_on, readable, transforms_of
+from ..edits.mode_keys import set_mode_in
+from ..queries.keyed import segment_modes
 from ..transforms import Refused, Transform, is_ours, transform_of
 from .bake import go_back
 from .copies import REDUCED, entries_in_use, entries_of

@@ -1,12 +1,15 @@
 """F-curves in NumPy: what `FCurve.evaluate` returns, for many curves and many frames at once. No user interface.
 
-keys        F-curves as arrays                          reading     from Blender's F-curves to those
-cycles      frames folded back by a Cycles modifier     easings     Robert Penner's equations, as Blender has them
-solvers     Bezier segments as cubics, and their roots  spans       what the value is from each key to the next
-grouping    which curves share their timing             evaluation  the values of curves on frames
+keys        F-curves as arrays
+easings     Robert Penner's equations, as Blender has them
+solvers     Bezier segments as cubics, and their roots
+reading     from Blender's F-curves to arrays
+cycles      frames folded back by a Cycles modifier
+spans       what the value is from each key to the next
+grouping    which curves share their timing
+evaluation  the values of curves on frames
 
-Imports go one way: keys, easings and solvers import none of the others; reading and cycles import keys; spans, grouping
-and evaluation import what is before them.
+Each module imports only those above it.
 
 The rules are those of Blender's own evaluation (source/blender/blenkernel/intern/fcurve.cc, fmodifier.cc), and the
 tests compare with it. It is written again because Blender offers its own in two forms, and neither will do:

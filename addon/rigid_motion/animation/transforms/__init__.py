@@ -1,10 +1,14 @@
 """What is moved: one small interface for whatever has location, rotation and scale, and the two kinds that have it.
 
-components  the rows of arrays                          transform   the interface: channels, and where differences go
-objects     objects, by their delta transforms          bones       pose bones, by a constraint
-
 A transform knows whose Action animates it, on which property its channels are, and where the difference between
 Blender's in-betweens and the wanted ones goes.
+
+components  the rows of arrays
+transform   the interface: channels, and where differences go
+objects     objects, by their delta transforms
+bones       pose bones, by a constraint
+
+Each module imports only those above it.
 """
 
 from __future__ import annotations

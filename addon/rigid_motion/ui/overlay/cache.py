@@ -19,7 +19,7 @@ from bpy.app.handlers import persistent
 from ...animation.actions.slots import SlotTransform
 from ...animation.actions.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
-from ...animation.inbetweens.mode_keys import active_places_of, frames_in, sources_of
+from ...animation.queries.keyed import active_places_of, frames_in, sources_of
 from ...animation.transforms import BoneTransform, Transform, transform_of
 from .bones import axis_length_of_bone, followed
 from .points import Path, axis_length_of, trace

@@ -15,7 +15,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.actions.sources import Source
-from ...animation.inbetweens.differences import in_betweens
+from ...animation.compute.differences import in_betweens
 from ...motion import Poses
 from ...motion.quaternions import rotate
 

@@ -1,0 +1,8 @@
+"""What can be done to motions by hand or by script: the verbs behind operators, for many targets at once.
+
+acting     targets, refusals and one refresh for every verb
+mode_keys  choosing modes
+mending    constraints of bones, put back
+
+Each module imports only those above it.
+"""

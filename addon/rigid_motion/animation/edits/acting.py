@@ -1,0 +1,111 @@
+"""What all that can be done to motions has in common: many targets at once, one look at the slots, one refresh.
+
+Every target says first whether it can be done, before anything is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import TypeVar
+
+import bpy
+
+from ..actions.reading import sources_of_users
+from ..actions.refusals import refuse_numbers
+from ..actions.renaming import follow_renamed
+from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.sources import Source
+from ..live import live
+from ..transforms import Refused, Transform, transform_of
+
+Target = bpy.types.Object | bpy.types.PoseBone | Transform
+"""What to act on."""
+
+Targets = Target | Iterable[Target]
+"""One or several."""
+
+Readings = list[tuple[SlotTransform, Source | Refused]]
+"""The places that move a target, and what is keyed in each of them as it has it; or why that cannot be filled in."""
+
+Plan = TypeVar("Plan")
+Result = TypeVar("Result")
+
+
+def transforms_of(targets: Targets) -> list[Transform]:
+    """The transforms of targets, each once."""
+    single = isinstance(targets, Target)
+    return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
+
+
+def act_on(
+    targets: Targets,
+    plan: Callable[[Transform, Readings], Plan],
+    act: Callable[[Transform, Plan], Result],
+    refused: list[Refused] | None,
+    becomes: Callable[[Source], Source] | None = None,
+    survey: Callable[[Mapping[Transform, Readings]], None] | None = None,
+) -> dict[Transform, Result]:
+    """Do something to each target.
+
+    Parameters
+    ----------
+    targets
+    plan
+        Says for one what there is to do, without doing any of it. May raise `Refused`.
+    act
+        Does it.
+    refused
+        Takes the refusals; without it nothing is done where there is one, and it is raised.
+    becomes
+        What becomes of a source by it, where no F-curve of the animator's is touched: nothing is read again then.
+    survey
+        Is shown all readings before the first plan, where plans depend on one another.
+
+    Returns
+    -------
+    dict
+        What `act` returned for each of those that did not refuse.
+    """
+    transforms = transforms_of(targets)
+    readings: dict[Transform, Readings] = {transform: [] for transform in transforms}
+    places = slot_transforms_of(transforms)
+    follow_renamed(places)
+    of_users = sources_of_users(places)
+    for place, sources in zip(places, of_users, strict=True):
+        for user, source in zip(place.users, sources, strict=True):
+            if user in readings:
+                readings[user].append((place, source))
+    if survey is not None:
+        survey(readings)
+    plans, refusals = [], []
+    for transform, reading in readings.items():
+        try:
+            plans.append((transform, plan(transform, reading)))
+        except Refused as refusal:
+            refusals.append(refusal)
+    if refusals and refused is None:
+        raise refusals[0] if len(refusals) == 1 else Refused("\n".join(map(str, refusals)))
+    if refused is not None:
+        refused.extend(refusals)
+    with live.paused():
+        results = {transform: act(transform, planned) for transform, planned in plans}
+    acted = {transform for transform, _ in plans}
+    if becomes is None:
+        live.refresh(acted)
+    else:
+        read = [
+            (place, [becomes(source) if isinstance(source, Source) else source for source in sources])
+            for place, sources in zip(places, of_users, strict=True)
+            if not acted.isdisjoint(place.users)
+        ]
+        live.refresh_read(read)
+    return results
+
+
+def readable(transform: Transform, readings: Readings) -> list[tuple[SlotTransform, Source]]:
+    """What is keyed of a transform in all of its places. `Refused` where one of them cannot be filled in."""
+    for _, source in readings:
+        if isinstance(source, Refused):
+            raise source
+        refuse_numbers(transform.name, source)
+    return list(readings)

@@ -1,0 +1,88 @@
+"""Constraints of bones that somebody has removed, muted, changed or moved: noticing it, and putting them right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ..actions.refusals import refuse_linked
+from ..actions.slots import Slot, SlotTransform, uses_of
+from ..transforms import BoneTransform, Refused, Transform, transform_of
+from ..writers.restoring import restore, trouble_of
+from .acting import Readings, Targets, act_on
+
+
+def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform) -> str:
+    """Why a bone is not seen where its in-betweens have it.
+
+    Returns
+    -------
+    str
+        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `outlets.restoring`; "" where its
+        constraint is as it was made, where there are no in-betweens, and for objects, which need no constraint.
+    """
+    transform = transform_of(target)
+    return next((trouble for _, trouble in _troubles((transform,))), "")
+
+
+def with_troubles(transforms: Iterable[Transform]) -> Iterator[Transform]:
+    """Those whose constraints are not as they were made. For polls: no channel is looked at."""
+    found = set()
+    for transform, _ in _troubles(transforms):
+        if transform not in found:
+            found.add(transform)
+            yield transform
+
+
+def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+    """Put the constraints of bones back: first in their stack, unmuted, with full influence.
+
+    Parameters
+    ----------
+    targets : bpy.types.PoseBone, or several of them
+        Where nothing is amiss, nothing changes.
+    refused : list, optional
+        Takes the refusals, and all others are mended.
+
+    Raises
+    ------
+    Refused
+        Where something has no in-betweens that a constraint would show, or cannot be edited, and there is no list to
+        take that. Nothing is changed then.
+    """
+
+    def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
+        refuse_linked(transform)
+        places = [place for place, _ in readings if place.filled] if isinstance(transform, BoneTransform) else []
+        if not places:
+            raise Refused(
+                rpt_("{name} has no constraint to restore: choose a mode for keys of a bone first").format(
+                    name=transform.name
+                )
+            )
+        return [place for place in places if trouble_of(transform, place)]
+
+    def act(transform: BoneTransform, places: list[SlotTransform]) -> None:
+        for place in places:
+            restore(transform, place)
+
+    act_on(targets, plan, act, refused)
+
+
+def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]]:
+    """What is amiss with the constraints of each."""
+    rigs: dict[bpy.types.Object, dict[str, Transform]] = {}
+    for transform in transforms:
+        if isinstance(transform, BoneTransform):
+            rigs.setdefault(transform.animated, {})[transform.prefix] = transform
+    for rig, bones in rigs.items():
+        for action, handle, strips in uses_of(rig).values():
+            slot = Slot(action, handle, (rig,), frozenset(strips))
+            for record in action.rigid_motion.slots:
+                if record.handle != handle or not record.digest or (bone := bones.get(record.prefix)) is None:
+                    continue
+                # The constraint alone is looked at, not the channels.
+                if trouble := trouble_of(bone, SlotTransform(slot, bone.prefix, None, (bone,), dict)):
+                    yield bone, trouble

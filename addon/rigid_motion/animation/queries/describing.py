@@ -1,0 +1,194 @@
+"""What there is to tell of an object's motion at one frame, in numbers.
+
+Frames are those of the Action, angles are radians, lengths are Blender's units in the space of the object's channels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...motion.eulers import quaternions_from_extrinsic_eulers
+from ..actions.records import recorded_digest
+from ..actions.slots import places_of
+from ..actions.sources import MODE_NAMES, SAME_FRAME, Source
+from ..compute.on_screen import seen_components
+from ..curves import cycled
+from ..transforms import PART_OF, Transform, transform_of
+from ..writers.table import outlet_of
+from .keyed import active_place
+
+HALF_TURN = np.pi + 1e-3
+"""Half a turn, and what single precision makes of it."""
+
+NEAR = 1e-6
+"""What differs by less is the same."""
+
+SAME_VALUE = 1e-5
+"""Values of properties that differ by less are the same but for single precision."""
+
+MOMENT = 1e-3
+"""A time too short to see, in frames."""
+
+
+@dataclass(frozen=True)
+class SegmentFacts:
+    """One segment, from one key to the next."""
+
+    first: float
+    """The frame it starts on."""
+
+    last: float
+    """The frame it ends on."""
+
+    key: float
+    """The frame of the key that decides its mode: its first one, or what that is a copy of where cycles repeat it."""
+
+    mode: str
+    """The name of its mode."""
+
+    turn: float
+    """The angle from its first pose to its last, 0 to pi."""
+
+    distance: float
+    """From its first position to its last."""
+
+    long_way: bool
+    """Whether Blender's own in-betweens turn by more than half a turn where the modes turn by less."""
+
+    scales_unevenly: bool
+    """Whether it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
+
+
+def frame_in_action(obj: bpy.types.Object, frame: float) -> float:
+    """A frame of the scene, as the keys in the editors have it: in tweak mode those of the strip."""
+    data = obj.animation_data
+    if data is None or not data.use_tweak_mode:
+        return frame
+    return data.nla_tweak_strip_time_to_scene(frame, invert=True)
+
+
+def segment_at(source: Source, frame: float) -> SegmentFacts | None:
+    """The segment that a frame is in, None before the first key and after the last.
+
+    A key is in the segment that it starts; the last one in the segment that it ends.
+    """
+    keys = source.key_frames
+    if len(keys) < 2 or not keys[0] - SAME_FRAME <= frame <= keys[-1] + SAME_FRAME:
+        return None
+    place = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
+    ends = keys[place : place + 2]
+    location, rotation, scale = np.split(_components(source, ends), (3, 7))
+    quaternions = quaternions_from_extrinsic_eulers(rotation[:3].T, source.order) if source.order else rotation.T
+    alike = float(quaternions[0] @ quaternions[1]) / float(np.prod(np.linalg.norm(quaternions, axis=1)) or 1.0)
+    swept = np.abs(np.diff(rotation))
+    return SegmentFacts(
+        first=float(ends[0]),
+        last=float(ends[1]),
+        key=_deciding_key(source, ends[0]),
+        mode=MODE_NAMES[source.modes[place]],
+        turn=2.0 * float(np.arccos(np.clip(abs(alike), 0.0, 1.0))),
+        distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
+        long_way=bool(np.any(swept > HALF_TURN)) if source.order else -1.0 + NEAR < alike < -NEAR,
+        scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(scale)) > NEAR)),
+    )
+
+
+def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
+    """Whether in-betweens are those of the keys as they are, which they need not be while live update is off."""
+    transform = transform_of(target)
+    place = active_place(transform, places_of(transform))
+    return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
+
+
+def shown_components(transform: Transform) -> np.ndarray | None:
+    """Where something is seen on the frame that is shown, in its own channels.
+
+    Returns
+    -------
+    array, shape (10,), or None
+        What its properties would have to be for it to look as it does with its original difference alone: location,
+        rotation as it turns (quaternion or Euler angles), scale. None where no in-betweens are filled in.
+
+    Raises
+    ------
+    Refused
+        Where it turns by axis and angle.
+    """
+    places = [place for place in places_of(transform) if place.filled]
+    if not places:
+        return None
+    seen = transform.components()
+    order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
+    rows = transform.differences.items()
+    parts = [{PART_OF[row] for row, channel in rows if channel in place.filled} for place in places]
+    if not transform.prefix:
+        # All slots of an object share its delta transforms; each of a bone has a constraint of its own.
+        places, parts = places[:1], [set().union(*parts)]
+    for place, own in zip(places, parts, strict=True):
+        difference = outlet_of(place).difference(place, transform, None)
+        seen = seen_components(seen, transform.original(), difference, order, own)
+    return seen
+
+
+def parts_with_in_betweens(transform: Transform) -> set[str]:
+    """Which of location, rotation and scale in-betweens are in. `Refused` where it turns by axis and angle."""
+    filled = {channel for place in places_of(transform) for channel in place.filled}
+    return {PART_OF[row] for row, channel in transform.differences.items() if channel in filled}
+
+
+def is_blended(transform: Transform) -> bool:
+    """Whether in-betweens of a bone are in an Action that strips fade in or out, or mix with what is below.
+
+    Blender blends the keys, and the time of the constraint beside them: that is not the blend of the poses.
+    """
+    data = transform.animated.animation_data
+    if not transform.prefix or data is None or not len(data.nla_tracks):
+        return False
+    own = {(place.slot.action, place.slot.handle) for place in places_of(transform) if recorded_digest(place)}
+    if (data.action, data.action_slot_handle) in own:
+        below = any(track.strips for track in data.nla_tracks)
+        if below and (data.action_influence < 1.0 or data.action_blend_type != "REPLACE"):
+            return True
+    strips = [strip for track in data.nla_tracks if not track.mute for strip in track.strips if not strip.mute]
+    return any(
+        strip.blend_in or strip.blend_out or strip.use_animated_influence or strip.blend_type != "REPLACE"
+        for strip in strips
+        if (strip.action, strip.action_slot_handle) in own
+    ) or bool(own and any(strip.type == "TRANSITION" for strip in strips))
+
+
+def has_edited_differences(transform: Transform, frame: float) -> bool:
+    """Whether something has another difference than its in-betweens on this frame of its Action.
+
+    So it is once somebody has edited what they are in, until the frame changes.
+    """
+    if transform.prefix:
+        # What a constraint adds cannot be edited.
+        return False
+    place = active_place(transform, places_of(transform))
+    if place is None or place.slot.in_nla:
+        # Strips are blended with one another.
+        return False
+    return any(
+        abs(transform.animated.path_resolve(path)[index] - fcurve.evaluate(frame)) > SAME_VALUE
+        for (path, index), fcurve in place.filled.items()
+        if not fcurve.mute
+    )
+
+
+def _components(source: Source, ends: np.ndarray) -> np.ndarray:
+    """What the channels have at both ends of a segment, shape (10, 2), as seen from within it where cycles jump."""
+    return source.values_at(ends if source.cyclic is None else ends + np.array((MOMENT, -MOMENT)))
+
+
+def _deciding_key(source: Source, start: float) -> float:
+    """The key that a segment's mode hangs on."""
+    cyclic = source.cyclic
+    if cyclic is None:
+        return float(start)
+    moment = cycled(cyclic, np.array([start + SAME_FRAME]))[0][0]
+    keys = source.keyed_frames
+    return float(keys[max(np.searchsorted(keys, moment, side="right") - 1, 0)])

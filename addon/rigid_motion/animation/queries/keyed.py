@@ -1,0 +1,120 @@
+"""What is keyed in the slot whose keys the editors show: its frames, and the modes of the segments between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import bpy
+import numpy as np
+
+from ..actions.reading import keyed_in, read
+from ..actions.records import recorded_mode
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import SlotTransform, places_of, slot_transforms_of
+from ..actions.sources import MODE_NAMES, SAME_FRAME, UNKNOWN, Source, distinct
+from ..transforms import WIDTHS, Refused, Transform, transform_of
+
+
+def active_place(transform: Transform, places: Iterable[SlotTransform] | None = None) -> SlotTransform | None:
+    """The slot whose keys the editors show: that of the Action, in tweak mode that of the strip.
+
+    `places` are those that are known already, else all of the transform's are looked up.
+    """
+    data = transform.animated.animation_data
+    if data is None or data.action is None:
+        return None
+    active = (data.action, data.action_slot_handle)
+    places = slot_transforms_of([transform]) if places is None else places
+    return next(
+        (place for place in places if (place.slot.action, place.slot.handle) == active and transform in place.users),
+        None,
+    )
+
+
+def active_places_of(transforms: Sequence[Transform]) -> dict[Transform, SlotTransform]:
+    """`active_place` of each that has one, by a single look."""
+    wanted, found = set(transforms), {}
+    for place in slot_transforms_of(transforms):
+        for user in place.users:
+            data = user.animated.animation_data
+            if user in wanted and (data.action, data.action_slot_handle) == (place.slot.action, place.slot.handle):
+                found[user] = place
+    return found
+
+
+def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
+    """What is keyed in the Action, None where nothing is. `Refused` where rigid motion cannot act on it."""
+    place = active_place(transform_of(carrier))
+    source = None if place is None else read(place)
+    return source if source and source.channels else None
+
+
+def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
+    """What is keyed in each of these, None where nothing is or rigid motion cannot act on it."""
+    found: list[Source | None] = []
+    for place, source in zip(places, keyed_in(places), strict=True):
+        try:
+            if isinstance(source, Source):
+                refuse_numbers(place.name, source)
+            found.append(source if isinstance(source, Source) and source.channels else None)
+        except Refused:
+            found.append(None)
+    return found
+
+
+def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
+    """The frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
+
+    Keys of the mode channel count among the selected ones.
+    """
+    transform = transform_of(carrier)
+    place = active_place(transform, places_of(transform))
+    return np.empty(0) if place is None else frames_in(place, selected=selected)
+
+
+def modes_of(carrier: bpy.types.Object | Transform, frames: np.ndarray) -> list[str]:
+    """The modes of the segments at these frames. Without an Action, the mode that is awaited."""
+    transform = transform_of(carrier)
+    place = active_place(transform, places_of(transform))
+    if place is None:
+        return [transform.motion.mode or "BLENDER"] * len(frames)
+    return [MODE_NAMES[number] for number in modes_in(place, np.asarray(frames, dtype=np.float64))]
+
+
+def segment_modes(place: SlotTransform) -> list[str]:
+    """The modes of the segments between the keys of a slot, one after the other."""
+    return [MODE_NAMES[number] for number in modes_in(place, frames_in(place)[:-1])]
+
+
+def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
+    """`key_frames` in a slot."""
+    found = []
+    transform = place.users[0]
+    for channel, fcurve in place.curves.items():
+        path = channel[0].removeprefix(place.prefix)
+        if path in WIDTHS or (selected and channel == transform.mode_channel):
+            keys = fcurve.keyframe_points
+            points, chosen = np.empty(2 * len(keys), np.float32), np.ones(len(keys), dtype=bool)
+            keys.foreach_get("co", points)
+            if selected:
+                keys.foreach_get("select_control_point", chosen)
+            found.append(points[::2][chosen])
+    frames = np.unique(np.concatenate(found)).astype(np.float64) if found else np.empty(0)
+    return distinct(frames)
+
+
+def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
+    """The numbers of the modes at these frames; Blender's own where there is what is no mode."""
+    fcurve = place.curves.get(place.users[0].mode_channel)
+    if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
+        modes = [recorded_mode(place)] * len(frames)
+    else:
+        modes = [_mode_at(fcurve, frame) for frame in frames.tolist()]
+    return [mode if mode in MODE_NAMES else 0 for mode in modes]
+
+
+def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:
+    """The mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
+    value = fcurve.evaluate(frame + 0.5 * SAME_FRAME)
+    return round(value) if math.isfinite(value) else UNKNOWN

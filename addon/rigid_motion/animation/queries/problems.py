@@ -1,0 +1,53 @@
+"""Why something does not move as its mode says, in words, and the way out."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ..actions.reading import differing_users, sources_of_users
+from ..actions.refusals import refuse_numbers
+from ..actions.slots import SlotTransform, slot_transforms_of
+from ..actions.sources import Source
+from ..compute.differences import differences
+from ..transforms import Refused, Transform, transform_of
+
+DIFFERING = n_(
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode or delta transform; the "
+    "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+)
+DIFFERING_BONE = n_(
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode or Local Location; the "
+    "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+)
+
+
+def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
+    """Why something does not move as its mode says, and the way out; "" where nothing is amiss."""
+    transform = transform_of(target)
+    places = slot_transforms_of([transform])
+    try:
+        for place, sources in zip(places, sources_of_users(places), strict=True):
+            source = sources[place.users.index(transform)]
+            if isinstance(source, Refused):
+                raise source
+            refuse_numbers(transform.name, source)
+            if source.is_live:
+                differences([source])
+                _refuse_differing(transform, place, sources)
+    except Refused as problem:
+        return str(problem)
+    except ValueError as problem:
+        return rpt_("{name} has keys too large to compute with ({problem}): delete them (Dope Sheet, X)").format(
+            name=transform.name, problem=problem
+        )
+    return ""
+
+
+def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[Source | Refused]) -> None:
+    """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
+    if transform in (differing := differing_users(place, sources)):
+        leader = next(user for user in place.users if user not in differing)
+        text = DIFFERING_BONE if transform.prefix else DIFFERING
+        raise Refused(rpt_(text).format(name=transform.name, leader=leader.name))

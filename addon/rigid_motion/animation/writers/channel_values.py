@@ -1,0 +1,55 @@
+"""From wanted poses back to the values of channels: what keys have to have for the same motion without in-betweens."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...motion.eulers import extrinsic_eulers_from_quaternions
+from ...motion.quaternions import align_signs, conjugate, multiply
+from ..actions.sources import SAME_FRAME, Source
+from ..compute.differences import InBetweens
+from ..transforms import LOCATION, ROTATION, ROWS, Transform
+
+
+def channel_values(transform: Transform, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
+    """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
+    own, poses, channels = source.original, motion.wanted, {}
+    first = source.values_at(motion.frames[:1])[:, 0]
+    if LOCATION in source.keyed:
+        axes = source.location_axes
+        channels["location"] = (poses.positions if axes is None else poses.positions @ axes) - own[:3]
+    if ROTATION in source.keyed:
+        # In the sign and the turn that the animator's first key has.
+        quaternions = align_signs(multiply(conjugate(own[3:7]), poses.quaternions))
+        if source.order is None:
+            channels[transform.rotation] = quaternions * (-1.0 if first[3:7] @ quaternions[0] < 0.0 else 1.0)
+        else:
+            angles = extrinsic_eulers_from_quaternions(quaternions, source.order)
+            channels[transform.rotation] = _beginning_near(first[3:6], angles, source.order)
+    if poses.scales is not None and own[7:].mean() != 0.0:
+        # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
+        segments = np.searchsorted(source.key_frames, motion.frames, side="right") - 1
+        is_even = source.modes[np.clip(segments, 0, len(source.modes) - 1)] > 0
+        native = source.values_at(motion.frames)[7:].T
+        channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / own[7:].mean(), native)
+    # What is left alone before and behind goes on from the animator's values, whatever sign or turn they are in.
+    keys, ends = source.keyed_frames, source.values_at(motion.frames[[0, -1]]).T
+    for place, goes_on in (
+        (0, keys[0] < motion.frames[0] - SAME_FRAME),
+        (-1, keys[-1] > motion.frames[-1] + SAME_FRAME),
+    ):
+        if goes_on:
+            for name, prop in transform.properties.items():
+                if prop in channels:
+                    channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
+    return {transform.prefix + prop: values for prop, values in channels.items()}
+
+
+def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:
+    """The same turns as these Euler angles (m, 3), of which the first are as near to `first` (3,) as may be."""
+    # Half a turn more about the outer axes, and the middle one from the other side, turn alike.
+    middle = "XYZ".index(order[1])
+    others = angles + np.pi
+    others[:, middle] = np.pi - angles[:, middle]
+    near = [turned + 2.0 * np.pi * np.rint((first - turned[0]) / (2.0 * np.pi)) for turned in (angles, others)]
+    return min(near, key=lambda turned: float(np.abs(turned[0] - first).sum()))

@@ -1,0 +1,223 @@
+"""Pose bones: differences are put on top of a bone by an Action constraint, first in its stack.
+
+The differences are in a second slot of the Action that has the keys. Nothing but constraints uses it. Which frame of it
+a constraint takes, its evaluation time says, see `times`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterable, Sequence
+
+import bpy
+import numpy as np
+from mathutils import Euler, Quaternion
+
+from ..actions.records import record_constraint, recorded_digest
+from ..actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, uses_of
+from ..actions.sources import Source
+from ..transforms import (
+    CONSTRAINT,
+    LOCATION,
+    REST,
+    ROTATION,
+    ROWS,
+    SCALE,
+    WIDTHS,
+    Channel,
+    Transform,
+    bone_name,
+    is_ours,
+    prefix_of,
+    split_path,
+)
+from .layout import Layout
+from .mounting import constraint_of, dismount, has_stale, is_mounted, mount, slot_of_differences
+from .outlet import Outlet
+from .sampled import remove_if_empty, replace_samples
+from .times import (
+    constraint_path,
+    held_by,
+    is_line,
+    is_same,
+    name_of,
+    remove_time,
+    says,
+    time_of,
+    write_line,
+    write_time,
+)
+
+
+class Constraints(Outlet):
+    def layout(self, source: Source) -> Layout:
+        return Layout.apart(source)
+
+    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
+        present = place.filled
+        if points:
+            _avoid_names(place)
+            curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            place.has_filled(curves)
+            write_time(place, layout)
+            for user in place.users:
+                if user.animated.is_editable and not is_mounted(user, place):
+                    mount(user, place)
+        elif present:
+            remove_time(place)
+            replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
+            place.has_filled({})
+            _remove_slot_if_empty(place.slot)
+
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
+        if not channels:
+            return True
+        time = time_of(place)
+        return time is not None and says(time, layout) and all(is_mounted(user, place) for user in place.users)
+
+    def show(self, place: SlotTransform) -> None:
+        for user in place.users:
+            if user.animated.is_editable:
+                if place.filled and not is_mounted(user, place):
+                    mount(user, place)
+                if has_stale(user, place):
+                    self.release([user])
+
+    def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
+        difference = REST.copy()
+        if user.rotation == "rotation_euler":
+            difference[ROWS[ROTATION]] = 0.0
+        filled, constraint = place.filled, constraint_of(user, place)
+        if not filled or constraint is None or not constraint.enabled:
+            return difference
+        time = constraint.eval_time
+        if frame is not None and (fcurve := time_of(place)) is not None:
+            time = min(max(fcurve.evaluate(frame), 0.0), 1.0)
+        at = constraint.frame_start + time * (constraint.frame_end - constraint.frame_start)
+        for row, channel in user.differences.items():
+            if (fcurve := filled.get(channel)) is not None:
+                difference[row] = fcurve.evaluate(at)
+        return _weighted(difference, constraint.influence, user)
+
+    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+        held = held_by(place, beside)
+        # An influence that has keys is the animator's.
+        present = {
+            channel: fcurve
+            for channel, fcurve in place.curves.items()
+            if channel[0].startswith(constraint_path(place, CONSTRAINT)[:-2])
+            and fcurve != time_of(place)
+            and not fcurve.keyframe_points
+        }
+        for channel, fcurve in present.items():
+            if channel not in held or not is_line(fcurve, held[channel]):
+                place.channelbag.fcurves.remove(place.curves.pop(channel))
+        missing = [channel for channel in held if channel not in place.curves]
+        for path, index in missing:
+            write_line(place, path, held[path, index])
+        if len(present) > len(held):
+            remove_if_empty(place.channelbag, bone_name(place.prefix))
+        return bool(missing) or len(present) > len(held)
+
+    def release(self, transforms: Iterable[Transform]) -> None:
+        bones = [bone for bone in transforms if bone.motion.mounted or any(map(is_ours, bone.carrier.constraints))]
+        if not bones:
+            return
+        shown: dict[Transform, set[tuple[bpy.types.Action, int]]] = {}
+        for place in slot_transforms_of(bones):
+            if place.filled:
+                for user in place.users:
+                    shown.setdefault(user, set()).add(slot_of_differences(place))
+        for bone in bones:
+            if bone.animated.is_editable:
+                dismount(bone, shown.get(bone, set()))
+
+
+def remove_orphans(slot: Slot) -> None:
+    """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
+
+    So it is left of a bone that was renamed. What was deleted, keys and all, may come back.
+    """
+    action, channelbag, differences = slot.action, slot.channelbag, slot.bones_channelbag
+    records = action.rigid_motion.slots
+    prefixes = {record.prefix for record in records if record.handle == slot.handle and record.prefix}
+    groups = () if differences is None else differences.groups
+    prefixes |= {prefix_of(group.name) for group in groups}
+    gone = {
+        prefix
+        for prefix in prefixes
+        if all(user.pose is None or bone_name(prefix) not in user.pose.bones for user in slot.users)
+    }
+    if gone and channelbag is not None:
+        gone -= {prefix for prefix, prop in (split_path(one.data_path) for one in channelbag.fcurves) if prop in WIDTHS}
+    if not gone:
+        return
+    for bag in (channelbag, differences):
+        for fcurve in list(bag.fcurves) if bag is not None else ():
+            prefix, prop = split_path(fcurve.data_path)
+            if prefix in gone and (bag is differences or prop.startswith(f'constraints["{CONSTRAINT}')):
+                bag.fcurves.remove(fcurve)
+    for number, record in reversed(list(enumerate(records))):
+        if record.handle == slot.handle and record.prefix in gone:
+            records.remove(number)
+    for group in [group for group in groups if not group.channels]:
+        differences.groups.remove(group)
+    _remove_slot_if_empty(slot)
+
+
+def _avoid_names(place: SlotTransform) -> None:
+    """Give the constraint of a slot a name that no other constraint of its users has."""
+    taken = {
+        constraint.name for user in place.users for constraint in user.carrier.constraints if not is_ours(constraint)
+    }
+    # Where it is all that moves them, nothing else can have the name.
+    tracked = [
+        user for user in place.users if len(user.animated.animation_data.nla_tracks) and len(uses_of(user.animated)) > 1
+    ]
+    others = (other for user in tracked for other in places_of(user) if not is_same(other, place))
+    taken |= {name_of(other) for other in others if recorded_digest(other)}
+    if name_of(place) in taken:
+        remove_time(place)
+        numbered = (f"{CONSTRAINT}.{number:03d}" for number in itertools.count(1))
+        name = next(name for name in itertools.chain((CONSTRAINT,), numbered) if name not in taken)
+        record_constraint(place, name)
+
+
+def _channelbag(place: SlotTransform) -> bpy.types.ActionChannelbag:
+    """Where the differences of the bones of a slot are; made where there is none yet."""
+    found = place.slot.bones_channelbag
+    if found is not None:
+        return found
+    action = place.slot.action
+    pairs = action.rigid_motion.bone_slots
+    pair = next((pair for pair in pairs if pair.handle == place.slot.handle), None) or pairs.add()
+    slot = next((slot for slot in action.slots if slot.handle == pair.differences), None)
+    slot = slot or action.slots.new("OBJECT", CONSTRAINT)
+    pair.handle, pair.differences = place.slot.handle, slot.handle
+    return action.layers[0].strips[0].channelbag(slot, ensure=True)
+
+
+def _remove_slot_if_empty(slot: Slot) -> None:
+    channelbag = slot.bones_channelbag
+    if channelbag is not None and not len(channelbag.fcurves):
+        pairs = slot.action.rigid_motion.bone_slots
+        number, pair = next((number, pair) for number, pair in enumerate(pairs) if pair.handle == slot.handle)
+        slot.action.slots.remove(next(one for one in slot.action.slots if one.handle == pair.differences))
+        pairs.remove(number)
+
+
+def _weighted(difference: np.ndarray, influence: float, user: Transform) -> np.ndarray:
+    """A difference as the influence of a constraint lets it through."""
+    if influence == 1.0:
+        return difference
+    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
+    difference[location] *= influence
+    difference[scale] = 1.0 + influence * (difference[scale] - 1.0)
+    none = Quaternion()
+    if user.rotation == "rotation_quaternion":
+        difference[rotation] = none.slerp(Quaternion(difference[rotation]).normalized(), influence)
+    else:
+        order = user.carrier.rotation_mode
+        turned = none.slerp(Euler(difference[3:6], order).to_quaternion(), influence)
+        difference[3:6] = turned.to_euler(order)
+    return difference

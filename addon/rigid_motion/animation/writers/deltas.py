@@ -1,0 +1,128 @@
+"""Objects: differences are the delta transforms, animated in the slot that has the keys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Sequence
+
+import bpy
+import numpy as np
+
+from ..actions.records import recorded_digest
+from ..actions.slots import SlotTransform, is_filled_in, is_replacing, slot_transforms_of
+from ..actions.sources import Source
+from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
+from .layout import Layout
+from .outlet import Outlet
+from .sampled import hold_constants, replace_samples
+
+
+class Deltas(Outlet):
+    def layout(self, source: Source) -> Layout:
+        return Layout.of(source)
+
+    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
+        for user in place.users:
+            user.note_original(points)
+        curves, gone = replace_samples(place.channelbag, GROUP, place.filled, points, layout)
+        for channel in gone:
+            del place.curves[channel]
+        place.curves.update(curves)
+        place.has_filled(curves)
+        if gone and points:
+            self.release(place.users)
+
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
+        return all(user.is_noted(channels) for user in place.users)
+
+    def prepare(self, place: SlotTransform) -> None:
+        filled = place.filled
+        for user in place.users:
+            user.note_original(filled)
+
+    def show(self, place: SlotTransform) -> None:
+        filled = place.filled
+        for user in place.users if filled else ():
+            if not user.animated.is_editable:
+                continue
+            if not user.is_noted(filled):
+                user.note_original(filled, overwritten=_is_overwritten(user, filled))
+            if user.is_more_noted(filled):  # An Action that it had before may have moved more of it.
+                self.release([user])
+
+    def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
+        difference, filled = np.zeros(10), {} if frame is None else place.filled
+        for row, channel in user.differences.items():
+            path, index = channel
+            fcurve = filled.get(channel)
+            difference[row] = user.animated.path_resolve(path)[index] if fcurve is None else fcurve.evaluate(frame)
+        return difference
+
+    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+        """While a strip plays whose Action lacks a channel that another strip's has, Blender puts it to its default:
+        a slot without in-betweens holds its users' original differences for them."""
+        if recorded_digest(place):
+            return False
+        held, before = _held(place, beside), place.filled
+        for user in place.users:
+            user.note_original(held)
+        is_new = hold_constants(place, GROUP, before, held)
+        if is_new and before.keys() - held.keys():
+            self.release(place.users)
+        return is_new
+
+    def release(self, transforms: Iterable[Transform]) -> None:
+        noted = [transform for transform in transforms if any(transform.motion.filled)]
+        if not noted:
+            return
+        places = slot_transforms_of(noted)
+        for transform in noted:
+            filled = [channel for place in places if transform in place.users for channel in place.curves]
+            transform.restore_original(filled)
+
+
+def _is_overwritten(user: ObjectTransform, filled: dict[Channel, bpy.types.FCurve]) -> bool:
+    """Whether what a user has for a difference is what in-betweens are on the frame that is shown."""
+    frame = bpy.context.scene.frame_current_final
+    return all(
+        abs(user.animated.path_resolve(path)[index] - fcurve.evaluate(frame)) < 1e-6
+        for (path, index), fcurve in filled.items()
+    )
+
+
+def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
+    """The channels that a slot which is not filled in has to have, and what they hold."""
+    in_nla = [user for user in place.users if len(user.animated.animation_data.nla_tracks)]
+    first, *others = [_held_for(user, place, beside) for user in in_nla] or [{}]
+    if any(held != first for held in others) or any(
+        user.original_values(path)[index] != value
+        for user in place.users
+        if user not in in_nla
+        for (path, index), value in first.items()
+    ):
+        return {}
+    # What it does not key may be another strip's to move, below it, and then so are the differences of that.
+    animated = {path for (path, _), fcurve in place.curves.items() if not is_filled_in(fcurve)}
+    return {
+        (path, index): value
+        for (path, index), value in first.items()
+        if path not in animated and path.removeprefix("delta_") in animated
+    }
+
+
+def _held_for(user: ObjectTransform, place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
+    originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
+    originals = {
+        path: values
+        for path, values in originals.items()
+        if all(map(math.isfinite, values)) and values != default_of(path)
+    }
+    if not (originals and is_replacing(user.animated, place.slot)):
+        return {}
+    filled = {path for other in beside if user in other.users and recorded_digest(other) for path, _ in other.filled}
+    return {
+        (path, index): value
+        for path, values in originals.items()
+        if path in filled
+        for index, value in enumerate(values)
+    }

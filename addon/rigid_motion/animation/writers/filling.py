@@ -1,0 +1,198 @@
+"""Writing in-betweens: differences as sampled F-curves, in the Action that has the keys.
+
+A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
+nothing of it. There are samples only where a mode counts, and only of components that it changes; which F-curves these
+are is up to the outlet. Where some have to lie outside of the keys, a manual frame range keeps the Action, its strips
+and exports from being longer for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
+from ..actions.slots import SlotTransform, is_filled_in, is_time
+from ..actions.sources import FULL_TURN, Source
+from ..compute.differences import NOTHING, differences
+from ..compute.known_sources import changed_range, recall
+from ..transforms import PART_OF, ROTATION, Channel
+from .table import outlet_of, release
+
+SAME_ROTATION = 1e-4
+"""Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
+
+
+def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
+    """Compute and write the in-betweens of these; of those that are there already, what has changed."""
+    changed, anew = [], []
+    for place, source in readings:
+        span = _changed_range(place, source)
+        if span is None:
+            anew.append((place, source))
+        else:
+            changed.append((place, source, span))
+    anew += _fill_in_changed(changed)
+    # However far cycles are seen, one round is all that is written where it repeats.
+    rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
+    longer, emptied = set(), []
+    for (place, source), samples in zip(anew, differences(rounds), strict=True):
+        outlet = outlet_of(place)
+        layout, channels = outlet.layout(source), _channels(place, source)
+        outlet.write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
+        _tag(place)
+        record_in_betweens(place, source.digest, samples)
+        if not samples:
+            emptied += place.users
+        if layout.outermost[0] < source.keyed_range[0] or layout.outermost[1] > source.keyed_range[1]:
+            longer.add(place.slot.action)
+    release(emptied)
+    _limit_ranges({place.slot.action for place, _ in readings}, longer)
+
+
+def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
+    """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
+    old = recall(recorded_digest(place))
+    if old is None or old is source or outlet_of(place).layout(source).is_ring or not is_complete(place, source):
+        return None
+    return changed_range(old, source)
+
+
+def _fill_in_changed(
+    readings: Sequence[tuple[SlotTransform, Source, tuple[int, int]]],
+) -> list[tuple[SlotTransform, Source]]:
+    """Fill in a range of frames of each. Those for which that will not do are returned, and left as they are."""
+    others = []
+    found = differences([source for _, source, _ in readings], [span for *_, span in readings])
+    for (place, source, (first, last)), samples in zip(readings, found, strict=True):
+        channels, rows, curves = _channels(place, source), recorded_rows(place), place.filled
+        begin = source.frame_range[0]
+        part = slice(2 * (first - begin) + 1, 2 * (last - begin) + 2, 2)
+        written = {}
+        for row in rows:
+            points = curves[channels[row]].sampled_points
+            written[row] = np.empty(2 * len(points), np.float32)
+            points.foreach_get("co", written[row])
+        values = {row: points[1::2] for row, points in samples.items()}
+        before = {row: points[part] for row, points in written.items()}
+        if not (_is_covered(values, rows) and _continue(values, before, source)):
+            others.append((place, source))
+            continue
+        for row, points in written.items():
+            points[part] = values[row]
+            curves[channels[row]].sampled_points.foreach_set("co", points)
+        record_in_betweens(place, source.digest, rows)
+        _tag(place)
+    return others
+
+
+def _is_covered(values: dict[int, np.ndarray], rows: Sequence[int]) -> bool:
+    """Whether there are F-curves for all components that differ in these frames."""
+    return all(row in rows or np.ptp(part) < NOTHING for row, part in values.items()) and all(
+        row in values for row in rows
+    )
+
+
+def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], source: Source) -> bool:
+    """Have rotations go on from those on the first frame, in the sign and in the turn that they have; in place.
+
+    False where they do not arrive in those of the last frame, on from where all stays as it is.
+    """
+    rows = [row for row in before if PART_OF[row] == ROTATION]
+    if not rows:
+        return True
+    new, old = np.stack([values[row] for row in rows]), np.stack([before[row] for row in rows])
+    if source.order is None:
+        new *= -1.0 if new[:, 0] @ old[:, 0] < 0.0 else 1.0
+    else:
+        new += (FULL_TURN * np.rint((old[:, 0] - new[:, 0]) / FULL_TURN))[:, None]
+    values.update(zip(rows, new, strict=True))
+    return bool(np.abs(new[:, [0, -1]] - old[:, [0, -1]]).max() < SAME_ROTATION)
+
+
+def is_complete(place: SlotTransform, source: Source) -> bool:
+    """Whether all F-curves are as they were written for a source."""
+    outlet, channels, curves = outlet_of(place), _channels(place, source), place.filled
+    layout, written = outlet.layout(source), [channels.get(row) for row in recorded_rows(place)]
+    return (
+        all(channel in curves and layout.fits(curves[channel]) for channel in written)
+        and len(curves) == len(written)
+        and outlet.is_shown(place, layout, written)
+    )
+
+
+def clear(places: Sequence[SlotTransform]) -> None:
+    """Take the in-betweens out of slots, and give their users their original differences back."""
+    for place in places:
+        outlet_of(place).write(place, {}, None)
+        _tag(place)
+        record_in_betweens(place, "", ())
+    release(user for place in places for user in place.users)
+    _limit_ranges({place.slot.action for place in places}, set())
+
+
+def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
+    """Have the manual frame ranges that were set for samples follow the keys of Actions that were edited."""
+    _limit_ranges(actions, set())
+
+
+def hold(place: SlotTransform, beside: Sequence[SlotTransform]) -> None:
+    """Have a slot hold what the NLA needs of it beside others that are filled in, which are among these."""
+    if outlet_of(place).hold(place, beside):
+        _tag(place)
+
+
+def _tag(place: SlotTransform) -> None:
+    for user in place.users:
+        user.animated.update_tag(refresh={"TIME"})
+
+
+def _channels(place: SlotTransform, source: Source) -> dict[int, Channel]:
+    """The channels that the differences of a source go into, by their rows."""
+    rotation = "rotation_quaternion" if source.order is None else "rotation_euler"
+    return place.users[0].differences_for(rotation)
+
+
+def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.types.Action]) -> None:
+    """Have Actions begin and end with their keys where samples lie outside of these, by a manual frame range.
+
+    `longer` are those in which samples were just written there. A range that the animator has set stays.
+    """
+    for action in actions:
+        motion = action.rigid_motion
+        if action in longer and not motion.has_longer:
+            motion.has_longer = True
+        is_ours = motion.range_is_ours
+        if (action.use_frame_range and not is_ours) or not (is_ours or motion.has_longer):
+            continue
+        bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+        of_bones = {pair.differences for pair in motion.bone_slots}
+        samples, keyed = [], []
+        for bag in bags:
+            for fcurve in bag.fcurves:
+                # A modifier alone makes no range, be it the time of a constraint.
+                if len(fcurve.keyframe_points) or len(fcurve.sampled_points):
+                    ours = bag.slot_handle in of_bones or is_filled_in(fcurve) or is_time(fcurve)
+                    (samples if ours else keyed).append(fcurve.range())
+        if keyed and samples and not _is_within(samples, keyed):
+            begin, end = _union(keyed)
+            if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
+                action.use_frame_range = True
+                action.frame_start, action.frame_end = begin, end
+            motion.range_is_ours = True
+        elif is_ours:
+            action.use_frame_range = motion.range_is_ours = False
+        if not samples and motion.has_longer:
+            motion.has_longer = False
+
+
+def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    return min(begin for begin, _ in ranges), max(end for _, end in ranges)
+
+
+def _is_within(inner: Sequence[tuple[float, float]], outer: Sequence[tuple[float, float]]) -> bool:
+    (first, last), (begin, end) = _union(inner), _union(outer)
+    return begin <= first and last <= end

@@ -1,0 +1,179 @@
+"""Constraints on bones: each shows the differences of one slot, and who takes one off does so on purpose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+
+from ..actions.slots import SlotTransform, uses_of
+from ..transforms import BoneTransform, Transform, is_ours
+from .times import constraint_path, name_of, span_of
+
+SETTINGS = {
+    "use_eval_time": True,
+    "mix_mode": "BEFORE_SPLIT",
+    "owner_space": "LOCAL",
+    "target_space": "LOCAL",
+}
+"""How the constraint mixes: location added, rotation from the left, scale multiplied, and transforms by hand see it."""
+
+
+def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
+    """The constraint that shows the differences of a slot on a bone."""
+    wanted = slot_of_differences(place)
+    return next((one for one in user.carrier.constraints if is_ours(one) and shown_by(one) == wanted), None)
+
+
+def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
+    """The Action and the handle of the slot in it that a constraint shows, or will when its rig leaves Edit Mode."""
+    handle = constraint.action_slot_handle
+    if not handle and constraint.id_data.mode == "EDIT" and (slot := _last_slot(constraint)) is not None:
+        handle = slot.handle
+    return constraint.action, handle
+
+
+def lay_aside(rig: bpy.types.Object) -> None:
+    """Have the constraints of a rig show no slot for now, which they remember by its name.
+
+    Blender's Symmetrize mirrors the keys of what Action constraints show, and crashes on F-curves that have none.
+    """
+    for constraint in _constraints_on(rig):
+        if constraint.action_slot_handle:
+            constraint.action_slot = None
+
+
+def take_up(rig: bpy.types.Object) -> None:
+    """Have the constraints of a rig that were laid aside show their slots again."""
+    for constraint in _constraints_on(rig):
+        if not constraint.action_slot_handle and (slot := _last_slot(constraint)) is not None:
+            constraint.action_slot = slot
+
+
+def _constraints_on(rig: bpy.types.Object) -> Iterator[bpy.types.ActionConstraint]:
+    return (constraint for bone in rig.pose.bones for constraint in bone.constraints if is_ours(constraint))
+
+
+def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot | None:
+    action = constraint.action
+    return None if action is None else action.slots.get(constraint.last_slot_identifier)
+
+
+def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
+    """The Action and the handle of the slot in it that the differences are in, 0 where there is none yet."""
+    pairs = place.slot.action.rigid_motion.bone_slots
+    handle = next((pair.differences for pair in pairs if pair.handle == place.slot.handle), 0)
+    return place.slot.action, handle
+
+
+def is_mounted(user: Transform, place: SlotTransform) -> bool:
+    """Whether a bone has its constraint as it has to be, or somebody took it off."""
+    constraint = constraint_of(user, place)
+    if constraint is None:
+        return not _is_free_to_mount(user, place)
+    return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(place), *span_of(place))
+
+
+def has_stale(user: BoneTransform, place: SlotTransform) -> bool:
+    """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
+    shown = [shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
+    if not shown or shown == [slot_of_differences(place)]:
+        return False
+    return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
+
+
+def _is_free_to_mount(user: Transform, place: SlotTransform) -> bool:
+    """Whether a bone lacks a constraint that nobody took off it."""
+    name = name_of(place)
+    present = user.carrier.constraints.get(name)
+    return name not in user.motion.mounted.split("\n") or (present is not None and is_ours(present))
+
+
+def mount(user: BoneTransform, place: SlotTransform) -> None:
+    """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
+    constraints, name = user.carrier.constraints, name_of(place)
+    constraint = constraint_of(user, place) or constraints.get(name)
+    if constraint is not None and not (is_ours(constraint) and _is_to_be_had(constraint, user, place)):
+        # This slot gets a constraint of another name when it is written.
+        return
+    if constraint is None:
+        constraint = _new(user, 0, name)
+    names = [one for one in user.motion.mounted.split("\n") if one not in ("", name, constraint.name)]
+    if constraint.name != name:
+        constraint = _renamed(constraint, name, user, place)
+    action, handle = slot_of_differences(place)
+    if shown_by(constraint) != (action, handle):
+        constraint.action = action
+        constraint.action_slot = next(slot for slot in action.slots if slot.handle == handle)
+    constraint.frame_start, constraint.frame_end = span_of(place)
+    if (mounted := "\n".join((*names, name))) != user.motion.mounted:
+        user.motion.mounted = mounted
+    if not user.animated.rigid_motion.has_bones:
+        user.animated.rigid_motion.has_bones = True
+
+
+def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstraint:
+    """A constraint of this name, at a place in the stack of a bone."""
+    constraints = user.carrier.constraints
+    constraint = constraints.new("ACTION")
+    constraint.name = name
+    for setting, value in SETTINGS.items():
+        setattr(constraint, setting, value)
+    constraints.move(len(constraints) - 1, index)
+    constraint = constraints[index]
+    constraint.show_expanded = False
+    return constraint
+
+
+def _renamed(
+    constraint: bpy.types.ActionConstraint, name: str, user: BoneTransform, place: SlotTransform
+) -> bpy.types.ActionConstraint:
+    """A constraint of another name in place of one, and channels of it in its slot.
+
+    Where one is renamed, Blender renames channels of the same name as well that other slots of the rig have for
+    constraints of their own, of all bones that lack them yet.
+    """
+    constraints = user.carrier.constraints
+    before = constraint.name
+    settings = {setting: getattr(constraint, setting) for setting in ("influence", "mute", "show_expanded")}
+    index = constraints.find(before)
+    constraints.remove(constraint)
+    constraint = _new(user, index, name)
+    for setting, value in settings.items():
+        setattr(constraint, setting, value)
+    keyed = place.curves.pop((f"{constraint_path(place, before)}.influence", 0), None)
+    if keyed is not None:
+        keyed.data_path = f"{constraint_path(place, name)}.influence"
+        place.curves[keyed.data_path, 0] = keyed
+    return constraint
+
+
+def _is_to_be_had(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
+    """Whether a constraint shows a slot already, or one that does not move the rig any more."""
+    shown = shown_by(constraint)
+    return shown == slot_of_differences(place) or shown not in _in_use(user.animated)
+
+
+def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
+    """The Actions of a rig, and the handles of the slots in them that differences of its bones are in."""
+    return {
+        (action, pair.differences)
+        for action, handle, _ in uses_of(rig).values()
+        for pair in action.rigid_motion.bone_slots
+        if pair.handle == handle
+    }
+
+
+def dismount(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
+    """Take the constraints off a bone that show something else than these."""
+    constraints, names, left = user.carrier.constraints, [], set(shown)
+    for constraint in [one for one in constraints if is_ours(one)]:
+        if (what := shown_by(constraint)) in left:
+            left.remove(what)
+            names.append(constraint.name)
+        else:
+            constraints.remove(constraint)
+    taken_off = [name for name in user.motion.mounted.split("\n") if name and name not in names] if shown else []
+    mounted = "\n".join((*names, *taken_off))
+    if user.motion.mounted != mounted:
+        user.motion.mounted = mounted

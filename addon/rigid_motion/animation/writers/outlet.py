@@ -1,0 +1,58 @@
+"""Where differences go, and how Blender puts them on top of its own in-betweens: the interface of both ways."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Iterable, Sequence
+
+import numpy as np
+
+from ..actions.slots import SlotTransform
+from ..actions.sources import Source
+from ..transforms import Channel, Transform
+from .layout import Layout
+
+
+class Outlet(ABC):
+    """One way, for one kind of transform. It keeps nothing itself: all there is to it is in the file."""
+
+    @abstractmethod
+    def layout(self, source: Source) -> Layout:
+        """How the samples of a source lie in F-curves."""
+
+    @abstractmethod
+    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
+        """Replace the in-betweens of a transform by these samples, frame and value of each by turns.
+
+        Channels that have none are taken out; without any, its users are to be released.
+        """
+
+    @abstractmethod
+    def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
+        """Whether what is written in these channels, lying so, is to be seen on all users."""
+
+    def prepare(self, place: SlotTransform) -> None:
+        """Get users ready that were edited, before Blender evaluates them with what is written."""
+        return
+
+    @abstractmethod
+    def show(self, place: SlotTransform) -> None:
+        """Have users see what is written that came to the slot after it was."""
+
+    @abstractmethod
+    def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
+        """What is on top of a user on a frame of the Action, or as it is shown now.
+
+        As components (10,): the rotation as the properties have it.
+        """
+
+    @abstractmethod
+    def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
+        """Have a slot hold what the NLA needs of it beside others that are filled in. Whether that was new to it.
+
+        `beside` is what moves the same users in the NLA, the place itself among it.
+        """
+
+    @abstractmethod
+    def release(self, transforms: Iterable[Transform]) -> None:
+        """Take off these what was put on them for slots that do not move them any more."""

@@ -1,0 +1,66 @@
+"""What may be amiss with the constraint of a bone, which an animator can mute, move or remove; and putting it right."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..actions.slots import SlotTransform
+from ..transforms import BoneTransform, Transform, is_ours
+from .mounting import SETTINGS, constraint_of, mount, shown_by, slot_of_differences
+from .times import name_of
+
+REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
+"""What may keep a bone from being seen where its in-betweens have it: the constraint is gone, shows another slot, is
+muted, has other settings, comes behind another constraint, or has an influence below 1."""
+
+
+def trouble_of(user: Transform, place: SlotTransform) -> str:
+    """What is amiss with the constraint by which a bone shows the differences of a slot, "" where nothing is.
+
+    An influence that is animated or driven is meant so.
+    """
+    wanted, name, is_behind = slot_of_differences(place), name_of(place), False
+    for constraint in user.carrier.constraints:
+        if not is_ours(constraint):
+            is_behind |= constraint.enabled and constraint.influence > 0.0
+        elif shown_by(constraint) == wanted:
+            return _trouble_with(constraint, user, place, is_behind=is_behind)
+    present = user.carrier.constraints.get(name)
+    return OTHER_SLOT if present is not None and is_ours(present) else REMOVED
+
+
+def _trouble_with(
+    constraint: bpy.types.ActionConstraint, user: Transform, place: SlotTransform, *, is_behind: bool
+) -> str:
+    if not constraint.enabled:
+        return MUTED
+    if any(getattr(constraint, setting) != value for setting, value in SETTINGS.items()):
+        return CHANGED
+    if is_behind:
+        return NOT_FIRST
+    return WEAK if constraint.influence < 1.0 and not _is_influence_animated(constraint, user, place) else ""
+
+
+def _is_influence_animated(constraint: bpy.types.ActionConstraint, user: Transform, place: SlotTransform) -> bool:
+    path = f'{place.prefix}constraints["{bpy.utils.escape_identifier(constraint.name)}"].influence'
+    channelbag, drivers = place.slot.channelbag, user.animated.animation_data.drivers
+    return (channelbag is not None and channelbag.fcurves.find(path) is not None) or drivers.find(path) is not None
+
+
+def restore(user: BoneTransform, place: SlotTransform) -> None:
+    """Have a bone show the differences of a slot in full: by its constraint as it was made, or by a new one."""
+    constraints, wanted, name = user.carrier.constraints, slot_of_differences(place), name_of(place)
+    if constraint_of(user, place) is None:
+        # One that was given another name, or frames by a target, still shows them.
+        for one in constraints:
+            if one.type == "ACTION" and shown_by(one) == wanted:
+                one.name, one.use_eval_time = name, True
+                break
+    mount(user, place)
+    constraint = constraint_of(user, place)
+    for setting, value in SETTINGS.items():
+        setattr(constraint, setting, value)
+    constraint.enabled = True
+    if not _is_influence_animated(constraint, user, place):
+        constraint.influence = 1.0
+    constraints.move(list(constraints).index(constraint), 0)

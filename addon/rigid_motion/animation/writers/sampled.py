@@ -1,0 +1,118 @@
+"""Sampled F-curves: values on whole frames and no keys, out of the animator's way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import bpy
+import numpy as np
+
+from ..actions.records import recorded_rows
+from ..actions.slots import Curves, SlotTransform
+from ..transforms import Channel
+from .layout import Layout
+
+FARTHEST = 1_000_000
+"""Frames from 0 up to which Blender can show any."""
+
+
+def replace_samples(
+    channelbag: bpy.types.ActionChannelbag,
+    group: str,
+    present: Mapping[Channel, bpy.types.FCurve],
+    points: Mapping[Channel, np.ndarray],
+    layout: Layout | None,
+) -> tuple[Curves, list[Channel]]:
+    """Have sampled F-curves of a group hold these samples, frame and value of each by turns, and no others.
+
+    Parameters
+    ----------
+    channelbag, group
+        Where they are, or are to be.
+    present
+        Those that there are.
+    points
+        The samples of each channel.
+    layout
+        How they lie, None where there are none.
+
+    Returns
+    -------
+    curves, gone
+        The F-curves by now, and the channels of those that were taken out.
+    """
+    curves: Curves = {}
+    for channel, samples in points.items():
+        fcurve = present.get(channel)
+        if fcurve is not None and len(fcurve.sampled_points) != layout.count:
+            channelbag.fcurves.remove(fcurve)
+            fcurve = None
+        if fcurve is None:
+            fcurve = _new(channelbag, group, channel, layout.count)
+        fcurve.sampled_points.foreach_set("co", samples)
+        layout.modify(fcurve)
+        curves[channel] = fcurve
+    gone = [channel for channel in present if channel not in points]
+    for channel in gone:
+        channelbag.fcurves.remove(present[channel])
+    if gone:
+        remove_if_empty(channelbag, group)
+    return curves, gone
+
+
+def hold_constants(place: SlotTransform, group: str, present: Curves, held: Mapping[Channel, float]) -> bool:
+    """Have sampled F-curves of a group in a slot hold these values, and no others. Whether they did not already."""
+    if held == {channel: _constant(fcurve) for channel, fcurve in present.items()}:
+        return False
+    # Where its own keys begin, for the Action to be no longer than it was. A damaged file may have them anywhere.
+    starts = [start for fcurve in place.curves.values() if abs(start := fcurve.range()[0]) < FARTHEST]
+    first = math.floor(min(starts, default=0.0))
+    points = {channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()}
+    for channel in present:
+        place.curves.pop(channel, None)
+    curves, _ = replace_samples(place.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)))
+    place.curves.update(curves)
+    place.has_filled(curves)
+    return True
+
+
+def _constant(fcurve: bpy.types.FCurve) -> float | None:
+    return next((point.co[1] for point in fcurve.sampled_points), None)
+
+
+def put_away(channelbag: bpy.types.ActionChannelbag, group: str, fcurve: bpy.types.FCurve) -> None:
+    """Take an F-curve out of the animator's way: into a group, locked, and hidden in the Graph Editor."""
+    fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
+    fcurve.lock = fcurve.hide = True
+    fcurve.select = False
+
+
+def regroup(place: SlotTransform) -> None:
+    """Take F-curves with in-betweens back that have been put into another group, or into none."""
+    rows, (channelbag, group) = recorded_rows(place), place.home
+    if channelbag is None or len(place.filled) >= len(rows):
+        return
+    rotations = ("rotation_quaternion", "rotation_euler")
+    channels = [place.users[0].differences_for(rotation) for rotation in rotations]
+    for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
+        fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
+        if fcurve is not None and channel not in place.filled and not fcurve.keyframe_points:
+            put_away(channelbag, group, fcurve)
+            place.has_filled({**place.filled, channel: fcurve})
+
+
+def remove_if_empty(channelbag: bpy.types.ActionChannelbag, group: str) -> None:
+    """Take out a group that nothing is left in."""
+    found = channelbag.groups.get(group)
+    if found is not None and not found.channels:
+        channelbag.groups.remove(found)
+
+
+def _new(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, count: int) -> bpy.types.FCurve:
+    path, index = channel
+    fcurve = channelbag.fcurves.new(path, index=index)
+    put_away(channelbag, group, fcurve)
+    fcurve.keyframe_points.add(1)
+    fcurve.convert_to_samples(0, count)
+    return fcurve

@@ -1,0 +1,202 @@
+"""Evaluation times: at which frame of the differences a constraint is, animated beside the bone's own channels.
+
+A time goes from 0 for frame 0, which no sample is before, to 1 for a power of two: so Blender comes to whole frames
+again without an error, in single precision. It is an F-curve without keys, a line, and goes through strips as keys do.
+
+Where several Actions of a rig fill in the same bone, in strips of the NLA, each has a constraint of its own, of another
+name, that has no influence while another Action plays. From one strip to the next both influences blend, as Blender
+blends what is keyed, and so that the times do not, each Action has the time of the others as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ..actions.channels import add_cycles, replace_keys
+from ..actions.records import recorded
+from ..actions.slots import Slot, SlotTransform, strips_of
+from ..curves import Cycles
+from ..transforms import CONSTRAINT, WIDTHS, Channel, bone_name
+from .layout import Layout
+from .sampled import put_away, remove_if_empty
+
+MOST_FRAMES = 1_048_574
+"""The last frame that Blender lets a constraint have."""
+
+Line = tuple[float, float]
+"""What a channel is at frame 0, and by how much it grows in a frame."""
+
+
+def name_of(place: SlotTransform) -> str:
+    """What the constraint of a slot is called."""
+    return recorded(place).constraint or CONSTRAINT
+
+
+def constraint_path(place: SlotTransform, name: str) -> str:
+    """The data path of a constraint of this name."""
+    return f'{place.prefix}constraints["{name}"]'
+
+
+def time_path(place: SlotTransform) -> str:
+    """Where the evaluation time of a slot's constraint is."""
+    return f"{constraint_path(place, name_of(place))}.eval_time"
+
+
+def influence_path(place: SlotTransform) -> str:
+    """Where its influence is."""
+    return f"{constraint_path(place, name_of(place))}.influence"
+
+
+def time_of(place: SlotTransform) -> bpy.types.FCurve | None:
+    """The channel of its own constraint's evaluation time."""
+    return place.curves.get((time_path(place), 0)) if place.filled else None
+
+
+def span_of(place: SlotTransform) -> tuple[int, int]:
+    """The frames that an evaluation time of 0 and one of 1 stand for."""
+    points = next(iter(place.filled.values())).sampled_points
+    return 0, _duration(math.ceil(points[len(points) - 1].co[0]))
+
+
+def _duration(last: int) -> int:
+    """The power of two that this frame of the samples is not behind."""
+    return min(1 << max(last - 1, 0).bit_length(), MOST_FRAMES)
+
+
+def held_by(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, Line]:
+    """What an Action has of constraints in the NLA of a rig: of its own the influence, of the others the time too.
+
+    The others are among what is `beside` it there.
+    """
+    held: dict[Channel, Line] = {}
+    for user in place.users if _moves_bone(place) else ():
+        if not len(user.animated.animation_data.nla_tracks):
+            continue
+        others = [other for other in beside if user in other.users and not is_same(other, place) and _moves_bone(other)]
+        for other in others:
+            if other.filled:
+                held[influence_path(other), 0] = (0.0, 0.0)
+                held[time_path(other), 0] = _time_seen_from(place, other, user.animated)
+        if others and place.filled:
+            held[influence_path(place), 0] = (1.0, 0.0)
+    return held
+
+
+def _moves_bone(place: SlotTransform) -> bool:
+    return any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves)
+
+
+def _time_seen_from(place: SlotTransform, other: SlotTransform, rig: bpy.types.Object) -> Line:
+    """The time of another Action's constraint at frames of this one; of its first frame, where there is no one time."""
+    line = next((_line_of(fcurve) for fcurve in (time_of(other),) if fcurve is not None), None)
+    own, others = (_frames_of(rig, one.slot) for one in (place, other))
+    if line is None or own is None or others is None:
+        return 0.0, 0.0
+    # From this Action's frames to the scene's, on to the other's, and on to its time.
+    (begin, speed), (other_begin, other_speed), (time, rate) = own, others, line
+    return (
+        time + rate * (begin - other_begin) / other_speed,
+        rate * speed / other_speed,
+    )
+
+
+def _frames_of(rig: bpy.types.Object, slot: Slot) -> Line | None:
+    """The scene's frames by those of an Action, where it plays once."""
+    data = rig.animation_data
+    lines: list[Line | None] = []
+    if (data.action, data.action_slot_handle) == (slot.action, slot.handle):
+        lines.append((0.0, 1.0))
+    for strip in strips_of(rig):
+        if (strip.action, strip.action_slot_handle) == (slot.action, slot.handle) and not strip.mute:
+            if strip.repeat > 1.0 or strip.use_animated_time:
+                lines.append(None)
+            elif strip.use_reverse:
+                lines.append((strip.frame_start + strip.action_frame_end * strip.scale, -strip.scale))
+            else:
+                lines.append((strip.frame_start - strip.action_frame_start * strip.scale, strip.scale))
+    return lines[0] if len(lines) == 1 else None
+
+
+def write_time(place: SlotTransform, layout: Layout) -> None:
+    if (present := time_of(place)) is not None:
+        if says(present, layout):
+            return
+        remove_time(place)
+    path = time_path(place)
+    if layout.cycles is None:
+        write_line(place, path, _line(layout))
+        return
+    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+    frames, times = np.array(_seams(layout)).T
+    replace_keys(fcurve, frames, times)
+    add_cycles(fcurve, _without_offset(layout.cycles))
+    put_away(place.channelbag, bone_name(place.prefix), fcurve)
+
+
+def write_line(place: SlotTransform, path: str, line: Line) -> None:
+    """An F-curve that is a line, without keys."""
+    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+    generator = fcurve.modifiers.new("GENERATOR")
+    generator.poly_order = 1
+    generator.coefficients = line
+    put_away(place.channelbag, bone_name(place.prefix), fcurve)
+
+
+def says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
+    """Whether an evaluation time goes through the samples as they lie."""
+    if layout.cycles is None:
+        return is_line(fcurve, _line(layout))
+    modifiers = list(fcurve.modifiers)
+    if fcurve.mute or [modifier.type for modifier in modifiers] != ["CYCLES"]:
+        return False
+    (modifier,) = modifiers
+    cycles = Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
+    return cycles == _without_offset(layout.cycles) and np.array_equal(
+        [key.co for key in fcurve.keyframe_points], np.float32(_seams(layout))
+    )
+
+
+def is_line(fcurve: bpy.types.FCurve, line: Line) -> bool:
+    return _line_of(fcurve) == tuple(np.float32(line).tolist())
+
+
+def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
+    """The line that an F-curve is, None where it is none, or has been changed."""
+    modifiers = list(fcurve.modifiers)
+    plain = len(modifiers) == 1 and not (fcurve.mute or len(fcurve.keyframe_points) or len(fcurve.sampled_points))
+    if not plain or modifiers[0].type != "GENERATOR" or modifiers[0].mute or modifiers[0].poly_order != 1:
+        return None
+    return tuple(modifiers[0].coefficients)
+
+
+def _line(layout: Layout) -> Line:
+    """From frames to the evaluation times of their samples."""
+    duration = _duration(layout.last + layout.shift)
+    return layout.shift / duration, 1.0 / duration
+
+
+def _seams(layout: Layout) -> list[tuple[float, float]]:
+    """The outermost frames, and the evaluation times of their samples."""
+    start, step = _line(layout)
+    return [(frame, start + step * frame) for frame in (layout.first, layout.last)]
+
+
+def _without_offset(cycles: Cycles) -> Cycles:
+    """The difference repeats as it is also where the channels go on from where they have come."""
+    before, after = (mode.removesuffix("_OFFSET") for mode in (cycles.before, cycles.after))
+    return Cycles(before, after, cycles.before_count, cycles.after_count)
+
+
+def remove_time(place: SlotTransform) -> None:
+    fcurve = place.curves.pop((time_path(place), 0), None)
+    if fcurve is not None:
+        place.channelbag.fcurves.remove(fcurve)
+        remove_if_empty(place.channelbag, bone_name(place.prefix))
+
+
+def is_same(one: SlotTransform, other: SlotTransform) -> bool:
+    return (one.slot.action, one.slot.handle) == (other.slot.action, other.slot.handle)

@@ -1,0 +1,209 @@
+"""Which bones an edit was about, at a quick look at their rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import bpy
+import pytest
+
+from rigid_motion.animation import set_enabled, set_mode
+from rigid_motion.animation.actions.slots import Slot, slots_in
+from rigid_motion.animation.live import glances
+from tests.animation.bones.rigs import key_all, key_bone, new_rig, with_edit_bones
+from tests.animation.oracle import curves_of
+
+EVERYTHING = {"", "Body", "Upper", "Lower", "Hand"}
+
+
+@pytest.fixture
+def rig(live_file) -> Iterator[bpy.types.Object]:
+    """A rig with keys on all bones, one of which has a single key; looked at once, and by nobody else."""
+    set_enabled(False)
+    glances.forget_all()
+    rig = new_rig()
+    key_all(rig)
+    for path in ("location", "rotation_quaternion"):
+        for frame in (11, 24, 40):
+            rig.pose.bones["Hand"].keyframe_delete(path, frame=frame)
+    assert edited(rig) == EVERYTHING
+    yield rig
+    set_enabled(True)
+
+
+def slot_of(rig: bpy.types.Object) -> Slot:
+    (slot,) = slots_in([rig.animation_data.action])
+    return slot
+
+
+def edited(rig: bpy.types.Object) -> set[str]:
+    """The names of bones that were edited since the last look, "" for the rig itself; all their F-curves are found."""
+    found = glances.edited_in(slot_of(rig))
+    for place in found:
+        if place.prefix:
+            there = {(place.prefix + path, index) for path, index in curves_of(place.users[0].carrier)}
+            assert place.curves.keys() == there
+    return {place.prefix.removeprefix('pose.bones["').removesuffix('"].') for place in found}
+
+
+def location(rig: bpy.types.Object, bone: str, index: int = 1) -> bpy.types.FCurve:
+    return curves_of(rig.pose.bones[bone])["location", index]
+
+
+def change_a_handle(rig: bpy.types.Object) -> None:
+    location(rig, "Lower").keyframe_points[1].handle_right.y += 1.0
+
+
+def change_an_easing(rig: bpy.types.Object) -> None:
+    location(rig, "Lower").keyframe_points[2].interpolation = "ELASTIC"
+
+
+def change_a_value(rig: bpy.types.Object) -> None:
+    location(rig, "Lower", 2).keyframe_points[-1].co_ui.y += 1e-3
+
+
+def insert_a_key(rig: bpy.types.Object) -> None:
+    location(rig, "Lower").keyframe_points.insert(17.5, 0.3)
+
+
+def replace_a_key(rig: bpy.types.Object) -> None:
+    fcurve = location(rig, "Lower")
+    fcurve.keyframe_points.remove(fcurve.keyframe_points[1])
+    fcurve.keyframe_points.insert(12.0, 0.3)
+
+
+def mute(rig: bpy.types.Object) -> None:
+    location(rig, "Lower").mute = True
+
+
+def go_on_at_the_slope(rig: bpy.types.Object) -> None:
+    location(rig, "Lower").extrapolation = "LINEAR"
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [change_a_handle, change_an_easing, change_a_value, insert_a_key, replace_a_key, mute, go_on_at_the_slope],
+    ids=lambda edit: edit.__name__,
+)
+def test_a_bone_that_was_edited_is_found_alone_and_once(rig, edit: Callable[[bpy.types.Object], None]):
+    assert edited(rig) == set()
+    edit(rig)
+    assert edited(rig) == {"Lower"}
+    assert edited(rig) == set()
+
+
+def test_bones_that_were_edited_together_are_all_found(rig):
+    insert_a_key(rig)
+    location(rig, "Body").keyframe_points[0].co_ui.y += 1.0
+    location(rig, "Hand").keyframe_points[0].co_ui.y += 1.0
+    assert edited(rig) == {"Body", "Lower", "Hand"}
+
+
+def test_a_bone_with_a_single_key_is_found_when_that_is_edited(rig):
+    assert edited(rig) == set()
+    location(rig, "Hand").keyframe_points[0].co_ui.y += 1.0
+    assert edited(rig) == {"Hand"}
+
+
+def test_a_bone_with_a_modifier_counts_as_edited_until_that_is_gone(rig):
+    modifier = location(rig, "Upper").modifiers.new("LIMITS")
+    assert edited(rig) == {"Upper"}
+    assert edited(rig) == {"Upper"}
+    location(rig, "Upper").modifiers.remove(modifier)
+    assert edited(rig) == {"Upper"}
+    assert edited(rig) == set()
+
+
+def rename(rig: bpy.types.Object) -> None:
+    rig.pose.bones["Lower"].name = "Forearm"
+
+
+def key_another_property(rig: bpy.types.Object) -> None:
+    rig.pose.bones["Lower"].keyframe_insert("scale", frame=1)
+
+
+@pytest.mark.parametrize("edit", [rename, key_another_property], ids=lambda edit: edit.__name__)
+def test_everything_counts_as_edited_where_other_channels_are_there(rig, edit: Callable[[bpy.types.Object], None]):
+    edit(rig)
+    assert edited(rig) - {"Forearm"} >= EVERYTHING - {"Lower"}
+    assert edited(rig) == set()
+
+
+def test_a_channel_that_was_made_anew_is_found_wherever_it_is_in_memory(rig):
+    fcurves = rig.animation_data.action.layers[0].strips[0].channelbag(rig.animation_data.action_slot).fcurves
+    fcurve = curves_of(rig.pose.bones["Hand"])["rotation_quaternion", 3]
+    path, index = fcurve.data_path, fcurve.array_index
+    fcurves.remove(fcurve)
+    fcurves.new(path, index=index).keyframe_points.insert(1.0, 0.5)
+    assert "Hand" in edited(rig)
+    assert edited(rig) == set()
+
+
+def test_bones_are_noticed_that_are_posed_or_turn_otherwise(rig):
+    assert glances.changed_bones(rig, 1.0) == list(rig.pose.bones)
+    assert glances.changed_bones(rig, 1.0) == []
+    rig.pose.bones["Body"].location.x += 1e-3
+    rig.pose.bones["Hand"].rotation_mode = "ZYX"
+    assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Body", "Hand"]
+    assert glances.changed_bones(rig, 1.0) == []
+
+
+def test_bones_that_another_frame_has_moved_are_not_taken_for_posed(rig):
+    bpy.context.scene.frame_set(5)
+    glances.changed_bones(rig, 5.0)
+    bpy.context.scene.frame_set(17)
+    rig.pose.bones["Body"].location.x += 1e-3
+    rig.pose.bones["Lower"].scale.x = 1.5
+    rig.pose.bones["Hand"].rotation_mode = "ZYX"
+    assert [bone.name for bone in glances.changed_bones(rig, 17.0)] == ["Body", "Lower", "Hand"]
+    assert glances.changed_bones(rig, 17.0) == []
+
+
+def test_where_a_channel_is_muted_what_another_frame_shows_is_a_pose(rig):
+    location(rig, "Upper").mute = True
+    bpy.context.scene.frame_set(5)
+    glances.changed_bones(rig, 5.0)
+    rig.pose.bones["Upper"].location.y = location(rig, "Upper").evaluate(17.0)
+    bpy.context.scene.frame_set(17)
+    assert [bone.name for bone in glances.changed_bones(rig, 17.0)] == ["Upper"]
+
+
+def test_a_constraint_that_is_switched_off_is_noticed(rig):
+    constraint = rig.pose.bones["Upper"].constraints.new("ACTION")
+    constraint.name, constraint.use_eval_time = "Rigid Motion", True
+    glances.changed_bones(rig, 1.0)
+    constraint.mute = True
+    assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Upper"]
+
+
+def test_settings_are_looked_at_where_something_of_the_rig_was_set(rig):
+    upper = rig.pose.bones["Upper"]
+    glances.changed_bones(rig, 1.0)
+    upper.rigid_motion.awaited, upper.location.x = "pga_slerp", 2.0
+    assert glances.changed_bones(rig, 1.0, is_set=False) == [upper]
+    assert glances.changed_bones(rig, 1.0, is_set=False) == []
+    assert glances.changed_bones(rig, 1.0) == [upper]
+
+
+def test_a_constraint_that_is_switched_off_together_with_an_edit_of_a_key_is_noticed(rig, monkeypatch):
+    set_enabled(True)
+    set_mode(rig.pose.bones, "dq_sclerp")
+    bpy.context.view_layer.update()
+    look, seen = glances.changed_bones, []
+    monkeypatch.setattr(glances, "changed_bones", lambda *rig, **how: seen.append((look(*rig, **how), how)) or [])
+    edited = location(rig, "Body").keyframe_points[1]
+    upper = rig.pose.bones["Upper"]
+    for together, found in ((False, []), (True, [upper])):
+        edited.co_ui.y += 0.1
+        if together:
+            upper.constraints[0].mute = True
+        bpy.context.view_layer.update()
+        assert seen == [(found, {"is_set": together})]
+        seen.clear()
+
+
+def test_all_bones_count_as_other_after_one_was_made(rig):
+    glances.changed_bones(rig, 1.0)
+    with_edit_bones(rig, lambda bones: setattr(bones.new("Finger"), "tail", (0.0, 0.0, 1.0)))
+    key_bone(rig.pose.bones["Finger"])
+    assert glances.changed_bones(rig, 1.0) == list(rig.pose.bones)

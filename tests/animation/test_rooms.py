@@ -1,0 +1,62 @@
+"""Rooms of `rigid_motion.animation`, and modules in them, import only what their docstrings list above them."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from rigid_motion import animation
+
+HOUSE = Path(animation.__file__).parent
+OUTSIDE = {"handlers"}
+"""What belongs to no room."""
+
+
+def docstring_of(folder: Path) -> str:
+    return ast.get_docstring(ast.parse((folder / "__init__.py").read_text(encoding="utf-8")))
+
+
+def names_in(folder: Path) -> set[str]:
+    """The modules and packages in a folder, and not the folder's own file."""
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    return modules | {path.parent.name for path in folder.glob("*/__init__.py")}
+
+
+def listed(folder: Path) -> list[str]:
+    """The names in the order of the table in the docstring of a folder."""
+    first_words = (line.split("  ")[0] for line in docstring_of(folder).splitlines() if "  " in line)
+    return [word for word in first_words if word]
+
+
+def imports_of(path: Path, level: int) -> set[str]:
+    """What a file imports from so many folders up, by the first name below that folder."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level == level:
+            found |= {node.module.split(".")[0]} if node.module else {alias.name for alias in node.names}
+    return found
+
+
+FOLDERS = [HOUSE, *sorted(path.parent for path in HOUSE.glob("*/__init__.py"))]
+FILES = [path for folder in FOLDERS[1:] for path in sorted(folder.glob("*.py"))]
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_the_docstring_of_a_folder_lists_all_that_is_in_it(folder):
+    expected = names_in(folder) - (OUTSIDE if folder == HOUSE else set())
+    assert sorted(listed(folder)) == sorted(expected)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_module_imports_only_rooms_and_modules_above_it(path):
+    rooms, modules = listed(HOUSE), listed(path.parent)
+    assert imports_of(path, 2) <= {*rooms[: rooms.index(path.parent.name)], *OUTSIDE}
+    if path.stem != "__init__":
+        assert imports_of(path, 1) <= set(modules[: modules.index(path.stem)])
+
+
+@pytest.mark.parametrize("name", sorted(OUTSIDE))
+def test_what_belongs_to_no_room_imports_none(name):
+    assert not imports_of(HOUSE / f"{name}.py", 1)
