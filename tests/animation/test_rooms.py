@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,21 @@ from rigid_motion import animation
 HOUSE = Path(animation.__file__).parent
 OUTSIDE = {"handlers"}
 """What belongs to no room."""
+
+OF_NUMBERS = ("curves", "compute")
+"""The rooms that need no Blender."""
+
+WITHOUT_BLENDER = """
+import importlib, sys, types
+for name in ("bpy", "bpy_extras", "mathutils"):
+    sys.modules[name] = None
+house = types.ModuleType("rigid_motion.animation")
+house.__path__ = [sys.argv[1]]
+sys.modules[house.__name__] = house
+for module in sys.argv[2:]:
+    importlib.import_module(f"rigid_motion.animation.{module}")
+"""
+"""Imports modules past the `__init__` of the house, which needs Blender."""
 
 
 def docstring_of(folder: Path) -> str:
@@ -60,3 +77,17 @@ def test_a_module_imports_only_rooms_and_modules_above_it(path):
 @pytest.mark.parametrize("name", sorted(OUTSIDE))
 def test_what_belongs_to_no_room_imports_none(name):
     assert not imports_of(HOUSE / f"{name}.py", 1)
+
+
+@pytest.mark.parametrize("room", OF_NUMBERS)
+def test_rooms_of_numbers_need_no_blender(room):
+    modules = [f"{room}.{module}" for module in listed(HOUSE / room)]
+    command = [sys.executable, "-c", WITHOUT_BLENDER, str(HOUSE), *modules]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_other_rooms_need_blender():
+    command = [sys.executable, "-c", WITHOUT_BLENDER, str(HOUSE), "actions.slots"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert "ModuleNotFoundError: import of bpy halted" in done.stderr

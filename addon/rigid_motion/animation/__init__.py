@@ -1,9 +1,9 @@
 """Blender's side of a motion: Actions, slots, channels, keys, and the in-betweens that go into them. No user interface.
 
-curves      F-curves in NumPy
+curves      F-curves as arrays, evaluated; NumPy alone
+compute     sources, which are what is keyed as arrays, and from them to differences; NumPy alone
 transforms  what is moved: objects and pose bones
 actions     what is keyed: slots, channels, modes; read into sources
-compute     from sources to the differences between Blender's in-betweens and those of the modes
 writers     where differences go: sampled F-curves of delta transforms, constraints of bones and their times
 queries     what is asked of motions: keys, segments, problems
 live        following edits: handlers, refresh, keys that are inserted in between
@@ -17,7 +17,6 @@ Data flows from Blender through actions, compute and writers back to Blender. Ea
 
 from . import properties
 from .actions.channels import channelbag_of, read_poses, write_channel
-from .actions.sources import MODE_IDS
 from .baking.bake import bake, bake_poses, is_baked, unbake
 from .baking.fewer_keys import NeedsItsKeys
 from .baking.reducing import (
@@ -31,6 +30,7 @@ from .baking.reducing import (
     total_reduction,
 )
 from .baking.sizes import radius_of
+from .compute.sources import MODE_IDS
 from .edits.mending import constraint_trouble, mend
 from .edits.mode_keys import set_mode
 from .live import edit_mode, live

@@ -7,7 +7,7 @@ import bpy
 from .. import animation
 from ..animation.actions.records import recorded_digest
 from ..animation.actions.slots import places_of
-from ..animation.actions.sources import Source
+from ..animation.compute.sources import Source
 from ..animation.queries.describing import (
     SegmentFacts,
     frame_in_action,

@@ -10,10 +10,11 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
+from ..animation.compute.components import SCALE
 from ..animation.properties import OWN_WORDS
 from ..animation.queries.describing import SegmentFacts, parts_with_in_betweens
 from ..animation.queries.polls import with_in_betweens
-from ..animation.transforms import ORIGINALS, SCALE, BoneTransform, ObjectTransform, Refused, Transform
+from ..animation.transforms import ORIGINALS, BoneTransform, ObjectTransform, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled

@@ -11,8 +11,9 @@ import logging
 import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
 
+from ..animation.compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..animation.queries.describing import shown_components
-from ..animation.transforms import LOCATION, REST, ROTATION, ROWS, SCALE, Refused
+from ..animation.transforms import Refused
 from .targets import active_target
 
 log = logging.getLogger(__package__)

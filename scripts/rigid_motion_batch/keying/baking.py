@@ -11,7 +11,7 @@ from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.records import recorded_mode
 from rigid_motion.animation.actions.refusals import refuse_numbers
 from rigid_motion.animation.actions.slots import SlotTransform, slot_transforms_of
-from rigid_motion.animation.actions.sources import Source
+from rigid_motion.animation.compute.sources import Source
 from rigid_motion.animation.queries.keyed import segment_modes
 from rigid_motion.animation.transforms import Transform
 from rigid_motion.motion import KEYFRAME_MODES

@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 from hypothesis import strategies as st
 
-from rigid_motion.animation.curves import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys, evaluate, read_keys
+from rigid_motion.animation.actions.key_reading import read_keys
+from rigid_motion.animation.curves import EASINGS, ELASTIC, INTERPOLATIONS, Cycles, Keys, evaluate
 
 CODES = {name: code for code, name in INTERPOLATIONS.items()}
 MODES = ("NONE", "REPEAT", "REPEAT_OFFSET", "MIRROR")

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation.curves import BEZIER, CONSTANT, ELASTIC, INTERPOLATIONS, LINEAR, Cycles, evaluate
+from rigid_motion.animation.curves import BEZIER, CONSTANT, EASINGS, ELASTIC, INTERPOLATIONS, LINEAR, Cycles, evaluate
 from tests.animation.curves.examples import as_fcurve, evaluate_one, joined, keys_of, read_one
 
 EDITS: dict[str, Callable[[bpy.types.FCurve], None]] = {
@@ -58,3 +58,9 @@ def test_the_keys_of_some_channels_have_the_values_that_those_had():
     for rows in ([0], [2, 0], [1, 2]):
         (found,) = evaluate([joined(channels).only(rows)], [frames])
         np.testing.assert_array_equal(found, [evaluate_one(channels[row], frames) for row in rows])
+
+
+@pytest.mark.parametrize(("name", "codes"), [("interpolation", INTERPOLATIONS), ("easing", EASINGS)])
+def test_codes_are_those_of_blender(name, codes):
+    items = bpy.types.Keyframe.bl_rna.properties[name].enum_items
+    assert codes == {item.value: item.identifier for item in items}

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import MODE_IDS, set_mode
+from rigid_motion.animation.compute.components import ROWS
 from rigid_motion.animation.queries.keyed import source_of
-from rigid_motion.animation.transforms import ROWS
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.ui.overlay.cache import path_of
 from rigid_motion.ui.overlay.points import (

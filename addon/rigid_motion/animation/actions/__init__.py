@@ -1,6 +1,6 @@
 """What Actions hold: slots, channels, keys, modes; read into sources, which are arrays with a digest.
 
-sources        what is keyed, as arrays
+key_reading    keys of F-curves as arrays
 channels       the F-curves of a slot, written and read as arrays
 slots          what moves something, by which F-curves
 records        what an Action keeps: mode and digest

@@ -11,11 +11,11 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ..compute.sources import MODE_NUMBERS
 from ..transforms import Refused
 from .reading import read
 from .records import has_mode, recorded_digest
 from .slots import SlotTransform, is_time
-from .sources import MODE_NUMBERS
 
 
 def original_of(place: SlotTransform) -> SlotTransform | None:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from ..compute.sources import MODE_NAMES, MODE_NUMBERS
 from ..transforms import Transform
 from .duplicates import mode_before_move, original_of
 from .records import NOTHING_RECORDED, has_in_betweens, has_mode, record_mode, recorded, recorded_mode
 from .slots import SlotTransform
-from .sources import MODE_NAMES, MODE_NUMBERS
 
 
 def await_mode(transform: Transform, mode: str) -> None:

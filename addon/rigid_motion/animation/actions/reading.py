@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ..curves import Keys, read_keys
-from ..transforms import PART_OF, Refused, Transform
+from ..compute.components import PART_OF
+from ..compute.sources import Source
+from ..curves import Keys
+from ..transforms import Refused, Transform
+from .key_reading import read_keys
 from .records import recorded_digest, recorded_mode
 from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
 from .slots import SlotTransform
-from .sources import Source
 
 
 def read(place: SlotTransform, mode: int | None = None) -> Source:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import bpy
 
+from ..compute.sources import MODE_NAMES, MODE_NUMBERS, UNKNOWN
 from .slots import Slot, SlotTransform
-from .sources import MODE_NAMES, MODE_NUMBERS, UNKNOWN
 
 
 class Recorded(NamedTuple):

@@ -11,11 +11,11 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ..curves import LARGEST, Keys
+from ..compute.sources import MODE_NAMES, UNKNOWN, Source
+from ..curves import LARGEST, Keys, TooManyRounds
 from ..transforms import GROUP, Refused, Transform
 from .records import recorded_digest, recorded_rows
 from .slots import SlotTransform, is_filled_in
-from .sources import MODE_NAMES, UNKNOWN, Source
 
 MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
@@ -166,8 +166,9 @@ def refuse_numbers(name: str, source: Source) -> None:
         )
     try:
         source.key_frames  # noqa: B018 - raises where cycles make too many
-    except ValueError as problem:
-        raise Refused(f"{name}: {problem}") from None
+    except TooManyRounds as problem:
+        text = rpt_("{rounds:.0f} rounds of {period:g} frames are too many: give Cycles a count")
+        raise Refused(f"{name}: {text.format(rounds=problem.rounds, period=problem.period)}") from None
 
 
 def _numbers(keys: Keys) -> dict[str, np.ndarray]:

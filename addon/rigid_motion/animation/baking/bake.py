@@ -22,8 +22,8 @@ from ..actions.channels import (
     write_channel,
 )
 from ..actions.slots import SlotTransform
-from ..actions.sources import SAME_FRAME, Source
 from ..compute.differences import SMOOTH, in_betweens
+from ..compute.sources import SAME_FRAME, Source
 from ..edits.acting import Readings, Target, Targets, act_on, readable, transforms_of
 from ..edits.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of

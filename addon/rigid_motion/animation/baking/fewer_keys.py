@@ -15,10 +15,11 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
 from ...motion.best_of import least_errors
 from ..actions.slots import SlotTransform
-from ..actions.sources import MODE_NUMBERS, SAME_FRAME, Source, distinct
+from ..compute.components import ROWS, SCALE
 from ..compute.differences import in_betweens
+from ..compute.sources import MODE_NUMBERS, SAME_FRAME, Source, distinct
 from ..curves import CODE, CONSTANT, LINEAR, Keys
-from ..transforms import ROWS, SCALE, Channel, Refused, Transform
+from ..transforms import Channel, Refused, Transform
 from ..writers.channel_values import channel_values
 from .sizes import in_channels
 

@@ -20,7 +20,7 @@ from ...motion.poses import placed
 from ...motion.quaternions import align_signs
 from ..actions.reading import sources_of_users
 from ..actions.slots import Slot, SlotTransform, transforms_in
-from ..actions.sources import SAME_FRAME, Source, distinct
+from ..compute.sources import SAME_FRAME, Source, distinct
 from ..edits.acting import Readings, readable
 from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import (

@@ -21,7 +21,7 @@ from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.slots import places_of, slots_of, transforms_in
-from ..actions.sources import MODE_NAMES, distinct
+from ..compute.sources import MODE_NAMES, distinct
 from ..edits.acting import Readings, Target, Targets, act_on, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
 from ..queries.keyed import segment_modes

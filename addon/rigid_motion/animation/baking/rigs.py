@@ -14,10 +14,10 @@ import bpy
 import numpy as np
 
 from ..actions.channels import copy_fcurve, key_fields
+from ..actions.key_reading import read_keys
 from ..actions.records import record_mode, recorded_mode
 from ..actions.renaming import keep_names
 from ..actions.slots import Slot, SlotTransform, in_action, slots_of, transforms_in
-from ..curves import read_keys
 from ..transforms import MODE_PROPERTY, WIDTHS, Transform
 from .copies import Lookup, copied, exchange, in_copy, let_rest, note, used_in
 

@@ -9,8 +9,8 @@ import numpy as np
 from ...motion import Poses
 from ...motion.eulers import quaternions_from_extrinsic_eulers
 from ...motion.quaternions import conjugate, multiply
-from ..actions.sources import Source
-from ..transforms import LOCATION, ROTATION, ROWS, SCALE
+from .components import LOCATION, ROTATION, ROWS, SCALE
+from .sources import Source
 
 
 def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:

@@ -21,10 +21,10 @@ from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.poses import beyond
 from ...motion.quaternions import multiply
-from ..actions.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
 from ..curves import Keys, evaluate
-from ..transforms import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .bodies import differ, key_poses, location_axes, turn_into_quaternions
+from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
+from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""

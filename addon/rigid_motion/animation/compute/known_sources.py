@@ -9,8 +9,8 @@ from collections import OrderedDict
 
 import numpy as np
 
-from ..actions.sources import Source
 from ..curves import Keys
+from .sources import Source
 
 MOST_BYTES = 32 * 2**20
 """Hundreds of undo steps of an ordinary file."""

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from .keys import Keys
 
 MAX_COPIES = 2**22
 """Of key times that `cyclic_times` returns."""
+
+
+class TooManyRounds(ValueError):
+    """Cycles that are so short, and so many, that there would be millions of keys."""
+
+    def __init__(self, rounds: float, period: float) -> None:
+        super().__init__(rounds, period)
+        self.rounds, self.period = rounds, period
 
 
 def cycled(keys: Keys, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -52,8 +59,8 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
 
     Raises
     ------
-    ValueError
-        Where the cycles are so short, and so many, that there would be millions.
+    TooManyRounds
+        Where there would be more than `MAX_COPIES`.
     """
     times = np.asarray(times, dtype=np.float64)
     copies = [times]
@@ -70,11 +77,7 @@ def cyclic_times(keys: Keys, times: np.ndarray, first: float, last: float) -> np
             rounds = np.ceil(length / period)
             rounds = min(rounds, count) if count else rounds
             if rounds * len(inside) > MAX_COPIES:
-                raise ValueError(
-                    rpt_("{rounds:.0f} rounds of {period:g} frames are too many: give Cycles a count").format(
-                        rounds=rounds, period=period
-                    )
-                )
+                raise TooManyRounds(rounds, period)
             number = np.arange(1.0, rounds + 1.0)[:, None]
             mirrored = (number % 2 == 1) & (mode == "MIRROR")
             copies.append((np.where(mirrored, begin + end - inside, inside) + side * number * period).ravel())

@@ -9,22 +9,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import bpy
 import numpy as np
 
+CONSTANT, LINEAR, BEZIER, BACK, BOUNCE, CIRC, CUBIC, ELASTIC, EXPO, QUAD, QUART, QUINT, SINE = range(13)
+
 INTERPOLATIONS = {
-    item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items
+    CONSTANT: "CONSTANT",
+    LINEAR: "LINEAR",
+    BEZIER: "BEZIER",
+    BACK: "BACK",
+    BOUNCE: "BOUNCE",
+    CIRC: "CIRC",
+    CUBIC: "CUBIC",
+    ELASTIC: "ELASTIC",
+    EXPO: "EXPO",
+    QUAD: "QUAD",
+    QUART: "QUART",
+    QUINT: "QUINT",
+    SINE: "SINE",
 }
-"""From the code of `Keyframe.interpolation` to its name."""
+"""From the code of `bpy.types.Keyframe.interpolation` to its name."""
 
-EASINGS = {item.value: item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items}
-"""From the code of `Keyframe.easing` to its name."""
+AUTO, EASE_IN, EASE_OUT, EASE_IN_OUT = range(4)
 
-CONSTANT, LINEAR, BEZIER, ELASTIC = (
-    {name: code for code, name in INTERPOLATIONS.items()}[name] for name in ("CONSTANT", "LINEAR", "BEZIER", "ELASTIC")
-)
-
-AUTO = {name: code for code, name in EASINGS.items()}["AUTO"]
+EASINGS = {AUTO: "AUTO", EASE_IN: "EASE_IN", EASE_OUT: "EASE_OUT", EASE_IN_OUT: "EASE_IN_OUT"}
+"""From the code of `bpy.types.Keyframe.easing` to its name."""
 
 CODE = np.uint8
 """The type that Blender keeps codes in: any other takes longer to read."""

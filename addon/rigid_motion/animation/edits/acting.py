@@ -14,7 +14,7 @@ from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
-from ..actions.sources import Source
+from ..compute.sources import Source
 from ..live import live
 from ..transforms import Refused, Transform, transform_of
 

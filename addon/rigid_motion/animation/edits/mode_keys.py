@@ -21,7 +21,7 @@ from ..actions.records import record_mode
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
-from ..actions.sources import MODE_NUMBERS, SAME_FRAME
+from ..compute.sources import MODE_NUMBERS, SAME_FRAME
 from ..live import live
 from ..queries.keyed import active_place, frames_in, modes_in
 from ..transforms import Channel, Refused, Transform

@@ -13,9 +13,9 @@ import bpy
 import numpy as np
 
 from ..actions.slots import SlotTransform
-from ..actions.sources import SAME_FRAME, Source
 from ..compute.differences import in_betweens
 from ..compute.known_sources import recall
+from ..compute.sources import SAME_FRAME, Source
 from ..writers.channel_values import channel_values
 from .insertion import TOLERANCE
 

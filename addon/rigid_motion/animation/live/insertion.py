@@ -27,10 +27,11 @@ import bpy
 import numpy as np
 
 from ..actions.slots import SlotTransform
-from ..actions.sources import SAME_FRAME, Source
+from ..compute.components import PART_OF
 from ..compute.known_sources import recall
-from ..compute.on_screen import seen_components
-from ..transforms import PART_OF, Channel, Transform
+from ..compute.sources import SAME_FRAME, Source
+from ..queries.on_screen import seen_components
+from ..transforms import Channel, Transform
 from ..writers.table import outlet_of
 
 MOST_INSERTED = 256

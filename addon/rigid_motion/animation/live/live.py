@@ -23,8 +23,8 @@ from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed, forget_names
 from ..actions.slots import SlotTransform, choose_slots, filled_places_of, read_again, slot_transforms_of, slots_in
-from ..actions.sources import Source
 from ..compute import known_sources
+from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from ..writers.constraints import remove_orphans

@@ -13,12 +13,13 @@ import numpy as np
 from ...motion.eulers import quaternions_from_extrinsic_eulers
 from ..actions.records import recorded_digest
 from ..actions.slots import places_of
-from ..actions.sources import MODE_NAMES, SAME_FRAME, Source
-from ..compute.on_screen import seen_components
+from ..compute.components import PART_OF
+from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
 from ..curves import cycled
-from ..transforms import PART_OF, Transform, transform_of
+from ..transforms import Transform, transform_of
 from ..writers.table import outlet_of
 from .keyed import active_place
+from .on_screen import seen_components
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""

@@ -9,8 +9,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..actions.reading import differing_users, sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import SlotTransform, slot_transforms_of
-from ..actions.sources import Source
 from ..compute.differences import differences
+from ..compute.sources import Source
 from ..transforms import Refused, Transform, transform_of
 
 DIFFERING = n_(

@@ -3,10 +3,9 @@
 A transform knows whose Action animates it, on which property its channels are, and where the difference between
 Blender's in-betweens and the wanted ones goes.
 
-components  the rows of arrays
-transform   the interface: channels, and where differences go
-objects     objects, by their delta transforms
-bones       pose bones, by a constraint
+transform  the interface: channels, and where differences go
+objects    objects, by their delta transforms
+bones      pose bones, by a constraint
 
 Each module imports only those above it.
 """
@@ -16,21 +15,14 @@ from __future__ import annotations
 import bpy
 
 from .bones import CONSTRAINT, BoneTransform, bone_name, is_ours, let_override_be_read, prefix_of, split_path
-from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .objects import GROUP, ORIGINALS, ObjectTransform, default_of
 from .transform import MODE_PROPERTY, WIDTHS, Channel, Refused, Transform, properties_for
 
 __all__ = [
     "CONSTRAINT",
     "GROUP",
-    "LOCATION",
     "MODE_PROPERTY",
     "ORIGINALS",
-    "PART_OF",
-    "REST",
-    "ROTATION",
-    "ROWS",
-    "SCALE",
     "WIDTHS",
     "BoneTransform",
     "Channel",

@@ -12,7 +12,7 @@ from functools import lru_cache
 import bpy
 import numpy as np
 
-from .components import REST
+from ..compute.components import REST
 from .transform import Channel, Transform, channels_under
 
 CONSTRAINT = "Rigid Motion"

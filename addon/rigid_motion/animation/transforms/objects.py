@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
-from .components import REST, ROTATION, ROWS
+from ..compute.components import REST, ROTATION, ROWS
 from .transform import Channel, Transform, channels_under
 
 GROUP = "Rigid Motion"

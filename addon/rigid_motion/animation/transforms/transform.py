@@ -11,7 +11,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.eulers import ORDERS
-from .components import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
 
 MODE_PROPERTY = "rigid_motion.mode"
 

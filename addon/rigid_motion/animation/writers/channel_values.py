@@ -6,9 +6,10 @@ import numpy as np
 
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs, conjugate, multiply
-from ..actions.sources import SAME_FRAME, Source
+from ..compute.components import LOCATION, ROTATION, ROWS
 from ..compute.differences import InBetweens
-from ..transforms import LOCATION, ROTATION, ROWS, Transform
+from ..compute.sources import SAME_FRAME, Source
+from ..transforms import Transform
 
 
 def channel_values(transform: Transform, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:

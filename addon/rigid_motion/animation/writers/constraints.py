@@ -15,22 +15,9 @@ from mathutils import Euler, Quaternion
 
 from ..actions.records import record_constraint, recorded_digest
 from ..actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, uses_of
-from ..actions.sources import Source
-from ..transforms import (
-    CONSTRAINT,
-    LOCATION,
-    REST,
-    ROTATION,
-    ROWS,
-    SCALE,
-    WIDTHS,
-    Channel,
-    Transform,
-    bone_name,
-    is_ours,
-    prefix_of,
-    split_path,
-)
+from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..compute.sources import Source
+from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_ours, prefix_of, split_path
 from .layout import Layout
 from .mounting import constraint_of, dismount, has_stale, is_mounted, mount, slot_of_differences
 from .outlet import Outlet

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..actions.records import recorded_digest
 from ..actions.slots import SlotTransform, is_filled_in, is_replacing, slot_transforms_of
-from ..actions.sources import Source
+from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
 from .layout import Layout
 from .outlet import Outlet

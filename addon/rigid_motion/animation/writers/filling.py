@@ -16,10 +16,11 @@ import numpy as np
 
 from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
 from ..actions.slots import SlotTransform, is_filled_in, is_time
-from ..actions.sources import FULL_TURN, Source
+from ..compute.components import PART_OF, ROTATION
 from ..compute.differences import NOTHING, differences
 from ..compute.known_sources import changed_range, recall
-from ..transforms import PART_OF, ROTATION, Channel
+from ..compute.sources import FULL_TURN, Source
+from ..transforms import Channel
 from .table import outlet_of, release
 
 SAME_ROTATION = 1e-4

@@ -12,7 +12,7 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from ..actions.sources import Source
+from ..compute.sources import Source
 from ..curves import Cycles
 
 ENDLESS = 2.0**20

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from ..actions.slots import SlotTransform
-from ..actions.sources import Source
+from ..compute.sources import Source
 from ..transforms import Channel, Transform
 from .layout import Layout
 

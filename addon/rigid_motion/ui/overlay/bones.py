@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ...animation.actions.sources import Source
-from ...animation.transforms import LOCATION
+from ...animation.compute.components import LOCATION
+from ...animation.compute.sources import Source
 from .points import Followed
 
 SAME = 1e-5

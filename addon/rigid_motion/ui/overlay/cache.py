@@ -17,7 +17,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...animation.actions.slots import SlotTransform
-from ...animation.actions.sources import Source
+from ...animation.compute.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.keyed import active_places_of, frames_in, sources_of
 from ...animation.transforms import BoneTransform, Transform, transform_of

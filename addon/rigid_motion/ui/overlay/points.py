@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...animation.actions.sources import Source
 from ...animation.compute.differences import in_betweens
+from ...animation.compute.sources import Source
 from ...motion import Poses
 from ...motion.quaternions import rotate
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
-from ..transforms import PART_OF, REST, ROTATION, ROWS, SCALE
+from .components import PART_OF, REST, ROTATION, ROWS, SCALE
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
 """The modes, and what the mode channel and saved files have for each. 0 is Blender's own in-betweens."""

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import bpy
 import numpy as np
 
-from .keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
+from ..curves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
 
 
 def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from ..transforms import LOCATION, ROTATION, ROWS, SCALE
+from ..compute.components import LOCATION, ROTATION, ROWS, SCALE
 
 
 def seen_components(
