@@ -23,10 +23,7 @@ from ..motion import KEYFRAME_MODES
 from .baking.copies import BAKED, REDUCED
 from .edits import mode_keys
 from .live import live
-from .transforms import transform_of
-
-OWN_WORDS = "Rigid Motion"
-"""The context of words that Blender has another translation for, or one that is too long where they are shown."""
+from .transforms import OWN_WORDS, transform_of
 
 FIRST = ("motor_spline", "dq_sclerp")
 """The modes that menus show first: those to take where nothing speaks for another."""

@@ -350,7 +350,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         targets = list(self.each_target(context))
-        rigs = any(target.prefix for target in targets)
+        rigs = any(target.is_part for target in targets)
         for name in ("tolerance", "radius", "mode", "best_of", *(("shared", "hold") if rigs else ())):
             layout.prop(self, name)
         if rigs:
@@ -402,7 +402,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
         if not reduced:
             return ""
-        if len(reduced) > MOST_LISTED or any(target.prefix for target in reduced):
+        if len(reduced) > MOST_LISTED or any(target.is_part for target in reduced):
             return reduction_summary(scene, animation.total_reduction(reduced))
         summaries = [reduction_summary(scene, animation.reduction_of(target)) for target in reduced]
         if len(reduced) == len(targets) == 1:

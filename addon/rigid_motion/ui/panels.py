@@ -11,10 +11,9 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
 from ..animation.compute.components import SCALE
-from ..animation.properties import OWN_WORDS
 from ..animation.queries.describing import SegmentFacts, parts_with_in_betweens
 from ..animation.queries.polls import with_in_betweens
-from ..animation.transforms import ORIGINALS, BoneTransform, ObjectTransform, Refused, Transform
+from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
@@ -46,7 +45,7 @@ class _Main:
             _draw_mode_menu(
                 labelled(layout, iface_("Selected", OWN_WORDS)), SELECTED, modes_meant(context, target, SELECTED)
             )
-        label = iface_("Bone", OWN_WORDS) if isinstance(target, BoneTransform) else iface_("Object", OWN_WORDS)
+        label = iface_(target.label, OWN_WORDS)
         mode_path, _ = target.mode_channel
         if any(fcurve.data_path == mode_path for fcurve in fcurves_of(target.animated)):
             _draw_mode_menu(labelled(layout, label), WHOLE, modes_meant(context, target, WHOLE))
@@ -110,7 +109,7 @@ class _Delta:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         target = active_target(context)
-        return isinstance(target, ObjectTransform) and any(target.motion.filled)
+        return target is not None and not target.has_difference_slot and any(target.motion.filled)
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, target = self.layout, active_target(context)

@@ -63,9 +63,9 @@ def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform])
     """The targets, and in place of rigs whose bones have keys, outside of Pose Mode, all of theirs that have any."""
     for target in targets:
         obj = target.carrier
-        bones = () if target.prefix or obj.type != "ARMATURE" or is_key_editor(context) else obj.pose.bones
+        bones = () if target.is_part or obj.type != "ARMATURE" or is_key_editor(context) else obj.pose.bones
         keyed = list(with_more_keys_than((target, *map(transform_of, bones)), 0)) if bones else []
-        yield from keyed if any(one.prefix for one in keyed) else (target,)
+        yield from keyed if any(one.is_part for one in keyed) else (target,)
 
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:

@@ -14,7 +14,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..animation import Reduction, WholeRig
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.describing import SegmentFacts
-from ..animation.transforms import BoneTransform, Transform
+from ..animation.transforms import Transform
 from ..animation.writers.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
@@ -154,8 +154,8 @@ def names_of(targets: Sequence[Transform]) -> str:
 
 def kind_of(targets: Iterable[Transform]) -> str:
     """What several targets are called together."""
-    bones = {isinstance(target, BoneTransform) for target in targets}
-    return "objects and bones" if len(bones) == 2 else "bones" if True in bones else "objects"
+    kinds = {target.plural for target in targets}
+    return "objects and bones" if len(kinds) > 1 else next(iter(kinds), "objects")
 
 
 def spoken_of(text: str, kind: str) -> str:

@@ -40,7 +40,7 @@ def mode_before_move(place: SlotTransform) -> int | None:
     it is the one with the mode that the bone shows.
     """
     found = []
-    for action in bpy.data.actions if place.prefix else ():
+    for action in bpy.data.actions if place.kind.has_difference_slot else ():
         moved = {pair.handle for pair in action.rigid_motion.bone_slots} - {slot.handle for slot in action.slots}
         for record in action.rigid_motion.slots if moved and action != place.slot.action else ():
             if record.handle in moved and record.prefix == place.prefix and record.digest:

@@ -82,7 +82,7 @@ def _has_time_of_its_own(place: SlotTransform) -> bool:
     influences = (
         place.curves.get((path.removesuffix("eval_time") + "influence", 0))
         for path, _ in place.curves
-        if place.prefix and path.endswith(".eval_time")
+        if place.kind.has_difference_slot and path.endswith(".eval_time")
     )
     return any(influence is None or influence.evaluate(0.0) > 0.0 for influence in influences)
 
@@ -121,7 +121,7 @@ def record_constraint(place: SlotTransform, name: str) -> None:
 
 def keep_name(place: SlotTransform) -> None:
     """Have a bone keep the name that its record is under, see `renaming`."""
-    for user in place.users if place.prefix else ():
+    for user in place.users if place.kind.is_part else ():
         if user.motion.recorded_as != user.carrier.name and user.animated.is_editable:
             user.motion.recorded_as = user.carrier.name
 
@@ -154,7 +154,7 @@ def _record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
         number = records.find(key)
-        if number < 0 and not place.prefix:
+        if number < 0 and not place.kind.is_part:
             # Those of versions without bones have no name to be found by.
             handle = place.slot.handle
             old = (n for n, one in enumerate(records) if one.handle == handle and not (one.prefix or one.name))

@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..compute.sources import MODE_NAMES, UNKNOWN, Source
 from ..curves import LARGEST, Keys, TooManyRounds
-from ..transforms import GROUP, Refused, Transform
+from ..transforms import GROUP, LINKED, Refused, Transform
 from .records import recorded_digest, recorded_rows
 from .slots import SlotTransform, is_filled_in
 
@@ -38,9 +38,6 @@ CHANNELS = {
     "delta_scale": n_("Delta Scale"),
 }
 """Properties of what is moved, as the Dope Sheet names their channels."""
-
-LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
-LINKED_RIG = n_("{name} is linked from another file: make an override of it first (Object > Library Override > Make)")
 
 MODIFIED = n_(
     "{name}: {channel} has a modifier of type {modifier}, which rigid in-betweens cannot follow: "
@@ -84,7 +81,7 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
                 )
             )
     # The differences of bones are in a slot of their own.
-    for channel in () if place.prefix else differences:
+    for channel in () if user.has_difference_slot else differences:
         fcurve = place.curves.get(channel)
         if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, place)):
             if fcurve.group is not None and fcurve.group.name == GROUP:
@@ -112,7 +109,7 @@ def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, place: SlotTransfo
 def refuse_linked(user: Transform, place: SlotTransform | None = None) -> None:
     """Raise `Refused` where what is moved, or the Action that moves it, belongs to another file."""
     if not user.animated.is_editable:
-        raise Refused(rpt_(LINKED_RIG if user.prefix else LINKED).format(name=user.animated.name))
+        raise Refused(rpt_(user.linked_text).format(name=user.animated.name))
     if place is not None and not place.slot.action.is_editable:
         raise Refused(rpt_(LINKED).format(name=place.slot.action.name))
 

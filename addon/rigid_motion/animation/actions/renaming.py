@@ -19,7 +19,7 @@ from .slots import Slot, SlotTransform, in_action, slots_in, slots_of
 
 def follow_renamed(places: Iterable[SlotTransform]) -> None:
     """Have records follow the bones of these that were renamed; where there are several, all bones of their rigs."""
-    bones = [place for place in places if place.prefix]
+    bones = [place for place in places if place.kind.is_part]
     users = {user for place in bones for user in place.users}
     rigs = {user.animated for user in users}
     looked_at = (bone for rig in rigs for bone in _bones_of(rig)) if len(bones) > 1 else users
@@ -64,7 +64,7 @@ def keep_names(rig: bpy.types.Object) -> None:
 def forget_names(transforms: Iterable[Transform]) -> None:
     """What no slot moves any more has no F-curves that Blender would rename with it."""
     for bone in transforms:
-        if bone.prefix and bone.motion.recorded_as and bone.animated.is_editable:
+        if bone.is_part and bone.motion.recorded_as and bone.animated.is_editable:
             bone.motion.recorded_as = ""
 
 

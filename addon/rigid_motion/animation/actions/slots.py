@@ -20,11 +20,9 @@ from ..transforms import (
     GROUP,
     MODE_PROPERTY,
     WIDTHS,
-    BoneTransform,
     Channel,
-    ObjectTransform,
     Transform,
-    bone_name,
+    kind_of,
     prefix_of,
     split_path,
 )
@@ -90,6 +88,10 @@ class SlotTransform:
         return self.find()[self.prefix]
 
     @property
+    def kind(self) -> type[Transform]:
+        return self.users[0].kind
+
+    @property
     def name(self) -> str:
         """What messages call it: the name of its first user."""
         return self.users[0].name
@@ -97,21 +99,21 @@ class SlotTransform:
     @property
     def home(self) -> tuple[bpy.types.ActionChannelbag | None, str]:
         """Where in-betweens are, or are to be, and the name of their group there."""
-        if self.prefix:
-            return self.slot.bones_channelbag, bone_name(self.prefix)
-        return self.channelbag, GROUP
+        kind = self.kind
+        channelbag = self.slot.bones_channelbag if kind.has_difference_slot else self.channelbag
+        return channelbag, kind.difference_group(self.prefix)
 
     @cached_property
     def filled(self) -> Curves:
         """The F-curves that in-betweens are in. Who writes them sets it anew."""
-        channelbag, name = self.home
+        (channelbag, name), apart = self.home, self.kind.has_difference_slot
         group = None if channelbag is None else channelbag.groups.get(name)
         if group is None:
             return {}
         return {
             (fcurve.data_path, fcurve.array_index): fcurve
             for fcurve in group.channels
-            if not fcurve.keyframe_points and (self.prefix or _is_difference(fcurve.data_path))
+            if not fcurve.keyframe_points and (apart or _is_difference(fcurve.data_path))
         }
 
     def has_filled(self, curves: Curves) -> None:
@@ -189,11 +191,9 @@ _TIMES = f'constraints["{CONSTRAINT}'
 
 def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
     """What a prefix stands for in each of the users of a slot that has it."""
-    if not prefix:
-        return tuple(map(ObjectTransform, slot.users))
-    name = bone_name(prefix)
-    bones = (user.pose.bones.get(name) for user in slot.users if user.pose is not None)
-    return tuple(BoneTransform(bone) for bone in bones if bone is not None)
+    kind = kind_of(prefix)
+    users = () if kind is None else (kind.in_object(user, prefix) for user in slot.users)
+    return tuple(user for user in users if user is not None)
 
 
 def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChannelbag | None:

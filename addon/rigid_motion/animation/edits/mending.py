@@ -9,8 +9,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.refusals import refuse_linked
 from ..actions.slots import Slot, SlotTransform, uses_of
-from ..transforms import BoneTransform, Refused, Transform, transform_of
-from ..writers.restoring import restore, trouble_of
+from ..transforms import Refused, Transform, transform_of
+from ..writers.table import OUTLETS, outlet_of
 from .acting import Readings, Targets, act_on
 
 
@@ -55,34 +55,35 @@ def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
 
     def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
         refuse_linked(transform)
-        places = [place for place, _ in readings if place.filled] if isinstance(transform, BoneTransform) else []
+        places = [place for place, _ in readings if place.filled and outlet_of(place).uses_constraints]
         if not places:
             raise Refused(
                 rpt_("{name} has no constraint to restore: choose a mode for keys of a bone first").format(
                     name=transform.name
                 )
             )
-        return [place for place in places if trouble_of(transform, place)]
+        return [place for place in places if outlet_of(place).trouble_of(transform, place)]
 
-    def act(transform: BoneTransform, places: list[SlotTransform]) -> None:
+    def act(transform: Transform, places: list[SlotTransform]) -> None:
         for place in places:
-            restore(transform, place)
+            outlet_of(place).restore(transform, place)
 
     act_on(targets, plan, act, refused)
 
 
 def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]]:
     """What is amiss with the constraints of each."""
-    rigs: dict[bpy.types.Object, dict[str, Transform]] = {}
+    by_prefix: dict[bpy.types.Object, dict[str, Transform]] = {}
     for transform in transforms:
-        if isinstance(transform, BoneTransform):
-            rigs.setdefault(transform.animated, {})[transform.prefix] = transform
-    for rig, bones in rigs.items():
-        for action, handle, strips in uses_of(rig).values():
-            slot = Slot(action, handle, (rig,), frozenset(strips))
+        if OUTLETS[transform.kind].uses_constraints:
+            by_prefix.setdefault(transform.animated, {})[transform.prefix] = transform
+    for animated, same in by_prefix.items():
+        for action, handle, strips in uses_of(animated).values():
+            slot = Slot(action, handle, (animated,), frozenset(strips))
             for record in action.rigid_motion.slots:
-                if record.handle != handle or not record.digest or (bone := bones.get(record.prefix)) is None:
+                if record.handle != handle or not record.digest or (user := same.get(record.prefix)) is None:
                     continue
                 # The constraint alone is looked at, not the channels.
-                if trouble := trouble_of(bone, SlotTransform(slot, bone.prefix, None, (bone,), dict)):
-                    yield bone, trouble
+                place = SlotTransform(slot, user.prefix, None, (user,), dict)
+                if trouble := outlet_of(place).trouble_of(user, place):
+                    yield user, trouble

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import bpy
 
 from ..actions.slots import actions_of
-from ..transforms import Transform, transform_of
+from ..transforms import Transform, is_part, transform_of
 
 
 def all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
@@ -30,13 +30,13 @@ def concerns_us(obj: bpy.types.Object) -> bool:
 def has_mode(obj: bpy.types.Object) -> bool:
     """Whether an object itself has, or had, anything to do with modes."""
     records = (record for action in actions_of(obj) for record in action.rigid_motion.slots)
-    return _has_properties(obj) or any(not record.prefix for record in records)
+    return _has_properties(obj) or any(not is_part(record.prefix) for record in records)
 
 
 def has_bones(obj: bpy.types.Object) -> bool:
     """Whether bones of a rig have anything to do with modes."""
     return obj.rigid_motion.has_bones or any(
-        record.prefix for action in actions_of(obj) for record in action.rigid_motion.slots
+        is_part(record.prefix) for action in actions_of(obj) for record in action.rigid_motion.slots
     )
 
 

@@ -27,10 +27,9 @@ from ..compute import known_sources
 from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
-from ..writers.constraints import remove_orphans
 from ..writers.filling import clear, fill_in, follow_ranges, hold, is_complete
 from ..writers.sampled import regroup
-from ..writers.table import outlet_of, release
+from ..writers.table import outlet_of, release, remove_orphans
 from . import glances, insertion
 from .concerned import all_under, concerns_us, has_bones, has_mode
 from .densification import keep_motion
@@ -163,8 +162,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
         regroup(place)
         before = recorded_digest(place)
         if not _is_wanted(place, source, before):
-            # Of bones, Blender can bring differences that no record speaks of: it flips Actions, F-curve by F-curve.
-            if before or (place.prefix and place.filled):
+            # Blender can bring differences of bones that no record speaks of: it flips Actions, F-curve by F-curve.
+            if before or (place.kind.has_difference_slot and place.filled):
                 emptied.append(place)
             idle.append(place)
         elif source.digest != before or not is_complete(place, source):
@@ -192,8 +191,8 @@ def _refresh(places: Sequence[SlotTransform], sources: Sequence[Source | Refused
     follow_ranges({place.slot.action for place in editable} - {place.slot.action for place, _ in stale})
     _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
-    for slot in {place.slot: None for place in editable if place.prefix} if len(editable) > 1 else ():
-        remove_orphans(slot)
+    if len(editable) > 1:
+        remove_orphans(editable)
     return len(stale)
 
 

@@ -125,8 +125,8 @@ def shown_components(transform: Transform) -> np.ndarray | None:
     order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
     rows = transform.differences.items()
     parts = [{PART_OF[row] for row, channel in rows if channel in place.filled} for place in places]
-    if not transform.prefix:
-        # All slots of an object share its delta transforms; each of a bone has a constraint of its own.
+    if not transform.has_difference_slot:
+        # What is beside the keys is one for all slots; what is in a slot of its own is so for each of them.
         places, parts = places[:1], [set().union(*parts)]
     for place, own in zip(places, parts, strict=True):
         difference = outlet_of(place).difference(place, transform, None)
@@ -146,7 +146,7 @@ def is_blended(transform: Transform) -> bool:
     Blender blends the keys, and the time of the constraint beside them: that is not the blend of the poses.
     """
     data = transform.animated.animation_data
-    if not transform.prefix or data is None or not len(data.nla_tracks):
+    if not transform.has_difference_slot or data is None or not len(data.nla_tracks):
         return False
     own = {(place.slot.action, place.slot.handle) for place in places_of(transform) if recorded_digest(place)}
     if (data.action, data.action_slot_handle) in own:
@@ -166,7 +166,7 @@ def has_edited_differences(transform: Transform, frame: float) -> bool:
 
     So it is once somebody has edited what they are in, until the frame changes.
     """
-    if transform.prefix:
+    if transform.has_difference_slot:
         # What a constraint adds cannot be edited.
         return False
     place = active_place(transform, places_of(transform))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bpy
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..actions.reading import differing_users, sources_of_users
@@ -12,15 +11,6 @@ from ..actions.slots import SlotTransform, slot_transforms_of
 from ..compute.differences import differences
 from ..compute.sources import Source
 from ..transforms import Refused, Transform, transform_of
-
-DIFFERING = n_(
-    "{name} moves by the same Action slot as {leader}, but has another rotation mode or delta transform; the "
-    "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
-)
-DIFFERING_BONE = n_(
-    "{name} moves by the same Action slot as {leader}, but has another rotation mode or Local Location; the "
-    "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
-)
 
 
 def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str:
@@ -49,5 +39,4 @@ def _refuse_differing(transform: Transform, place: SlotTransform, sources: list[
     """Raise `Refused` where the in-betweens of a slot are those of another user, which do not fit."""
     if transform in (differing := differing_users(place, sources)):
         leader = next(user for user in place.users if user not in differing)
-        text = DIFFERING_BONE if transform.prefix else DIFFERING
-        raise Refused(rpt_(text).format(name=transform.name, leader=leader.name))
+        raise Refused(rpt_(transform.differing_text).format(name=transform.name, leader=leader.name))

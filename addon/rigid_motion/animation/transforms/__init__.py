@@ -1,4 +1,4 @@
-"""What is moved: one small interface for whatever has location, rotation and scale, and the two kinds that have it.
+"""What is moved: one small interface for whatever has location, rotation and scale, and the kinds that have it.
 
 A transform knows whose Action animates it, on which property its channels are, and where the difference between
 Blender's in-betweens and the wanted ones goes.
@@ -6,23 +6,26 @@ Blender's in-betweens and the wanted ones goes.
 transform  the interface: channels, and where differences go
 objects    objects, by their delta transforms
 bones      pose bones, by a constraint
+kinds      the table of both
 
 Each module imports only those above it.
 """
 
 from __future__ import annotations
 
-import bpy
-
 from .bones import CONSTRAINT, BoneTransform, bone_name, is_ours, let_override_be_read, prefix_of, split_path
+from .kinds import KINDS, is_part, kind_of, transform_of
 from .objects import GROUP, ORIGINALS, ObjectTransform, default_of
-from .transform import MODE_PROPERTY, WIDTHS, Channel, Refused, Transform, properties_for
+from .transform import LINKED, MODE_PROPERTY, OWN_WORDS, WIDTHS, Channel, Refused, Transform, properties_for
 
 __all__ = [
     "CONSTRAINT",
     "GROUP",
+    "KINDS",
+    "LINKED",
     "MODE_PROPERTY",
     "ORIGINALS",
+    "OWN_WORDS",
     "WIDTHS",
     "BoneTransform",
     "Channel",
@@ -32,16 +35,11 @@ __all__ = [
     "bone_name",
     "default_of",
     "is_ours",
+    "is_part",
+    "kind_of",
     "let_override_be_read",
     "prefix_of",
     "properties_for",
     "split_path",
     "transform_of",
 ]
-
-
-def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
-    """The transform of something that Blender has, where it is none already."""
-    if isinstance(carrier, Transform):
-        return carrier
-    return BoneTransform(carrier) if isinstance(carrier, bpy.types.PoseBone) else ObjectTransform(carrier)

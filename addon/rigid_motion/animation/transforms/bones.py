@@ -11,9 +11,10 @@ from functools import lru_cache
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
 
 from ..compute.components import REST
-from .transform import Channel, Transform, channels_under
+from .transform import OWN_WORDS, Channel, Transform, channels_under
 
 CONSTRAINT = "Rigid Motion"
 """What the constraint is called, and what its name begins with where Actions of one rig need one each."""
@@ -24,12 +25,37 @@ _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 class BoneTransform(Transform):
     """A pose bone. The difference is put on top of it by a constraint."""
 
+    carrier_type = bpy.types.PoseBone
+    is_part = True
+    has_difference_slot = True
+    label = n_("Bone", OWN_WORDS)
+    plural = "bones"
+    linked_text = n_(
+        "{name} is linked from another file: make an override of it first (Object > Library Override > Make)"
+    )
+    differing_text = n_(
+        "{name} moves by the same Action slot as {leader}, but has another rotation mode or Local Location; the "
+        "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+    )
     placed_by = ("TRANSFORM_OT_",)
     stored_by = ("POSE_OT_paste", "POSELIB_OT_")
     matrix_lacks_difference = False
 
     def __init__(self, bone: bpy.types.PoseBone) -> None:
         self.animated, self.carrier, self.prefix = bone.id_data, bone, prefix_of(bone.name)
+
+    @classmethod
+    def has_prefix(cls, prefix: str) -> bool:
+        return bool(bone_name(prefix))
+
+    @classmethod
+    def in_object(cls, obj: bpy.types.Object, prefix: str) -> BoneTransform | None:
+        bone = None if obj.pose is None else obj.pose.bones.get(bone_name(prefix))
+        return None if bone is None else cls(bone)
+
+    @classmethod
+    def difference_group(cls, prefix: str) -> str:
+        return bone_name(prefix)
 
     @property
     def name(self) -> str:

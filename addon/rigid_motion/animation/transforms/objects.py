@@ -12,10 +12,11 @@ from functools import cache
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
 
 from ...motion.eulers import ORDERS, quaternions_from_extrinsic_eulers
 from ..compute.components import REST, ROTATION, ROWS
-from .transform import Channel, Transform, channels_under
+from .transform import LINKED, OWN_WORDS, Channel, Transform, channels_under
 
 GROUP = "Rigid Motion"
 """The group of F-curves that an object's mode channel and its differences are in."""
@@ -41,12 +42,34 @@ _BITS = {
 class ObjectTransform(Transform):
     """An object. The difference goes into its delta transforms."""
 
+    carrier_type = bpy.types.Object
+    is_part = False
+    has_difference_slot = False
+    label = n_("Object", OWN_WORDS)
+    plural = "objects"
+    linked_text = LINKED
+    differing_text = n_(
+        "{name} moves by the same Action slot as {leader}, but has another rotation mode or delta transform; the "
+        "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+    )
     placed_by = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
     stored_by = ()
     matrix_lacks_difference = True
 
     def __init__(self, obj: bpy.types.Object) -> None:
         self.animated = self.carrier = obj
+
+    @classmethod
+    def has_prefix(cls, prefix: str) -> bool:
+        return not prefix
+
+    @classmethod
+    def in_object(cls, obj: bpy.types.Object, prefix: str) -> ObjectTransform:
+        return cls(obj)
+
+    @classmethod
+    def difference_group(cls, prefix: str) -> str:
+        return GROUP
 
     @property
     def group(self) -> str:

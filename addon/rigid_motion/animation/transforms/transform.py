@@ -1,4 +1,4 @@
-"""What has location, rotation and scale, and is moved: the interface that objects and pose bones have."""
+"""What has location, rotation and scale, and is moved: the interface of every kind, see `kinds`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,17 @@ from typing import ClassVar
 
 import bpy
 import numpy as np
+from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.eulers import ORDERS
 from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
+
+OWN_WORDS = "Rigid Motion"
+"""The context of words that Blender has another translation for, or one that is too long where they are shown."""
+
+LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
+"""Why a data-block cannot be edited, and the way out."""
 
 MODE_PROPERTY = "rigid_motion.mode"
 
@@ -26,7 +33,32 @@ class Refused(ValueError):
 
 
 class Transform(ABC):
-    """Something with location, rotation and scale, as its animated data-block's Action moves it."""
+    """Something with location, rotation and scale, as its animated data-block's Action moves it.
+
+    A subclass is a kind of such things. What differs from kind to kind is asked of it, never guessed from data paths.
+    """
+
+    carrier_type: ClassVar[type]
+    """The type of what has the properties."""
+
+    is_part: ClassVar[bool]
+    """Whether it is a part of its data-block, with a name that can be changed, and not the data-block itself."""
+
+    has_difference_slot: ClassVar[bool]
+    """Whether its differences are in a slot of their own, where they take the place of nothing that an animator edits.
+    Otherwise they are beside its keys, and overwrite properties whose original values are kept meanwhile."""
+
+    label: ClassVar[str]
+    """What it is called in front of its mode."""
+
+    plural: ClassVar[str]
+    """What several are called, in English."""
+
+    linked_text: ClassVar[str]
+    """Why it cannot be edited where its data-block is linked, and the way out: {name} is that of the data-block."""
+
+    differing_text: ClassVar[str]
+    """Why it is not moved by in-betweens of its own: {leader} is the user of its slot whose they are."""
 
     animated: bpy.types.Object
     """The data-block whose Action it is."""
@@ -45,6 +77,21 @@ class Transform(ABC):
 
     matrix_lacks_difference: ClassVar[bool]
     """Whether Blender takes the difference off where the properties are set from a matrix."""
+
+    @classmethod
+    @abstractmethod
+    def has_prefix(cls, prefix: str) -> bool:
+        """Whether data paths that begin so lead to something of this kind."""
+
+    @classmethod
+    @abstractmethod
+    def in_object(cls, obj: bpy.types.Object, prefix: str) -> Transform | None:
+        """What such data paths lead to in an object, None where it has no such thing."""
+
+    @classmethod
+    @abstractmethod
+    def difference_group(cls, prefix: str) -> str:
+        """The group of F-curves that its differences are in."""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Transform) and (self.animated, self.prefix) == (other.animated, other.prefix)
@@ -69,6 +116,10 @@ class Transform(ABC):
     @abstractmethod
     def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | bpy.types.PoseBone | None:
         """The carrier as it was evaluated last, None where it was not there yet."""
+
+    @property
+    def kind(self) -> type[Transform]:
+        return type(self)
 
     @property
     def motion(self) -> bpy.types.PropertyGroup:

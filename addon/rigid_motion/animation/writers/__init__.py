@@ -6,8 +6,8 @@ outlet          the interface of what writes differences
 deltas          objects
 times           which frame a constraint shows, and how much of it
 mounting        constraints on bones
-constraints     pose bones
 restoring       what may be amiss with a constraint
+constraints     pose bones
 table           what writes the differences of which kind
 filling         computing and writing the in-betweens of many
 channel_values  the values of keys that do without in-betweens

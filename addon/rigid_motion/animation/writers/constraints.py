@@ -17,7 +17,8 @@ from ..actions.records import record_constraint, recorded_digest
 from ..actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, uses_of
 from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
-from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_ours, prefix_of, split_path
+from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_ours, is_part, prefix_of, split_path
+from . import restoring
 from .layout import Layout
 from .mounting import constraint_of, dismount, has_stale, is_mounted, mount, slot_of_differences
 from .outlet import Outlet
@@ -37,6 +38,8 @@ from .times import (
 
 
 class Constraints(Outlet):
+    uses_constraints = True
+
     def layout(self, source: Source) -> Layout:
         return Layout.apart(source)
 
@@ -106,6 +109,45 @@ class Constraints(Outlet):
             remove_if_empty(place.channelbag, bone_name(place.prefix))
         return bool(missing) or len(present) > len(held)
 
+    def trouble_of(self, user: Transform, place: SlotTransform) -> str:
+        return restoring.trouble_of(user, place)
+
+    def restore(self, user: Transform, place: SlotTransform) -> None:
+        restoring.restore(user, place)
+
+    def remove_orphans(self, slot: Slot) -> None:
+        """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
+
+        So it is left of a bone that was renamed. What was deleted, keys and all, may come back.
+        """
+        action, channelbag, differences = slot.action, slot.channelbag, slot.bones_channelbag
+        records = action.rigid_motion.slots
+        prefixes = {record.prefix for record in records if record.handle == slot.handle and is_part(record.prefix)}
+        groups = () if differences is None else differences.groups
+        prefixes |= {prefix_of(group.name) for group in groups}
+        gone = {
+            prefix
+            for prefix in prefixes
+            if all(user.pose is None or bone_name(prefix) not in user.pose.bones for user in slot.users)
+        }
+        if gone and channelbag is not None:
+            gone -= {
+                prefix for prefix, prop in (split_path(one.data_path) for one in channelbag.fcurves) if prop in WIDTHS
+            }
+        if not gone:
+            return
+        for bag in (channelbag, differences):
+            for fcurve in list(bag.fcurves) if bag is not None else ():
+                prefix, prop = split_path(fcurve.data_path)
+                if prefix in gone and (bag is differences or prop.startswith(f'constraints["{CONSTRAINT}')):
+                    bag.fcurves.remove(fcurve)
+        for number, record in reversed(list(enumerate(records))):
+            if record.handle == slot.handle and record.prefix in gone:
+                records.remove(number)
+        for group in [group for group in groups if not group.channels]:
+            differences.groups.remove(group)
+        _remove_slot_if_empty(slot)
+
     def release(self, transforms: Iterable[Transform]) -> None:
         bones = [bone for bone in transforms if bone.motion.mounted or any(map(is_ours, bone.carrier.constraints))]
         if not bones:
@@ -118,38 +160,6 @@ class Constraints(Outlet):
         for bone in bones:
             if bone.animated.is_editable:
                 dismount(bone, shown.get(bone, set()))
-
-
-def remove_orphans(slot: Slot) -> None:
-    """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.
-
-    So it is left of a bone that was renamed. What was deleted, keys and all, may come back.
-    """
-    action, channelbag, differences = slot.action, slot.channelbag, slot.bones_channelbag
-    records = action.rigid_motion.slots
-    prefixes = {record.prefix for record in records if record.handle == slot.handle and record.prefix}
-    groups = () if differences is None else differences.groups
-    prefixes |= {prefix_of(group.name) for group in groups}
-    gone = {
-        prefix
-        for prefix in prefixes
-        if all(user.pose is None or bone_name(prefix) not in user.pose.bones for user in slot.users)
-    }
-    if gone and channelbag is not None:
-        gone -= {prefix for prefix, prop in (split_path(one.data_path) for one in channelbag.fcurves) if prop in WIDTHS}
-    if not gone:
-        return
-    for bag in (channelbag, differences):
-        for fcurve in list(bag.fcurves) if bag is not None else ():
-            prefix, prop = split_path(fcurve.data_path)
-            if prefix in gone and (bag is differences or prop.startswith(f'constraints["{CONSTRAINT}')):
-                bag.fcurves.remove(fcurve)
-    for number, record in reversed(list(enumerate(records))):
-        if record.handle == slot.handle and record.prefix in gone:
-            records.remove(number)
-    for group in [group for group in groups if not group.channels]:
-        differences.groups.remove(group)
-    _remove_slot_if_empty(slot)
 
 
 def _avoid_names(place: SlotTransform) -> None:

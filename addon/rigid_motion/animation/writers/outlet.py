@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Sequence
+from typing import ClassVar
 
 import numpy as np
 
-from ..actions.slots import SlotTransform
+from ..actions.slots import Slot, SlotTransform
 from ..compute.sources import Source
 from ..transforms import Channel, Transform
 from .layout import Layout
@@ -15,6 +16,9 @@ from .layout import Layout
 
 class Outlet(ABC):
     """One way, for one kind of transform. It keeps nothing itself: all there is to it is in the file."""
+
+    uses_constraints: ClassVar[bool] = False
+    """Whether constraints show the differences, which an animator can mute, move or remove."""
 
     @abstractmethod
     def layout(self, source: Source) -> Layout:
@@ -52,6 +56,18 @@ class Outlet(ABC):
 
         `beside` is what moves the same users in the NLA, the place itself among it.
         """
+
+    def trouble_of(self, user: Transform, place: SlotTransform) -> str:
+        """What keeps a user from being seen where its in-betweens have it, see `restoring`; "" where nothing does."""
+        return ""
+
+    def restore(self, user: Transform, place: SlotTransform) -> None:
+        """Have a user show the differences of a slot in full, whatever an animator has done to it."""
+        return
+
+    def remove_orphans(self, slot: Slot) -> None:
+        """Take out of a slot what is left in it of parts that none of its users has any more."""
+        return
 
     @abstractmethod
     def release(self, transforms: Iterable[Transform]) -> None:

@@ -20,9 +20,9 @@ from ...animation.actions.slots import SlotTransform
 from ...animation.compute.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.keyed import active_places_of, frames_in, sources_of
-from ...animation.transforms import BoneTransform, Transform, transform_of
-from .bones import axis_length_of_bone, followed
-from .points import Path, axis_length_of, trace
+from ...animation.transforms import Transform, transform_of
+from .kinds import PATH_KINDS
+from .points import Path, trace
 
 SPARE = 64
 """How many paths are kept that are not drawn any more."""
@@ -133,11 +133,8 @@ def _read(
         # Where it was refused, the panel says why.
         return entry
     mode, tick_step, axes_size, *_ = settings
-    point = None
-    if isinstance(target, BoneTransform):
-        point, size = followed(target.carrier, source, turn), axis_length_of_bone(target.carrier, source)
-    else:
-        size = axis_length_of(target.carrier, source)
+    kind = PATH_KINDS[target.kind]
+    point, size = kind.point(target.carrier, source, turn), kind.axis_length(target.carrier, source)
     entry.selected = _selection(place)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
     of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())

@@ -15,16 +15,16 @@ from weakref import WeakKeyDictionary
 import bpy
 import gpu
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from ...animation.queries.describing import frame_in_action
-from ...animation.transforms import BoneTransform, Transform, transform_of
+from ...animation.transforms import transform_of
 from ..look import DEFAULT_LOOK, Color
 from ..preferences import preferences
 from ..targets import selected_in_view
 from . import cache
-from .bones import space_of_bone
-from .points import TICKS, Path, space_of, thinned
+from .kinds import PATH_KINDS
+from .points import TICKS, Path, thinned
 from .settings import RigidMotionOverlay, are_paths_shown
 from .spacing import Readable, readable
 
@@ -239,7 +239,7 @@ def _complain(problem: Exception) -> None:
 def _draw(context: bpy.types.Context) -> None:
     scene, depsgraph = context.scene, context.view_layer.depsgraph
     settings, targets = scene.rigid_motion_overlay, list(map(transform_of, selected_in_view(context)))
-    spaces = {target: _space_of(target, depsgraph) for target in targets}
+    spaces = {target: PATH_KINDS[target.kind].space(target.carrier, depsgraph) for target in targets}
     found = cache.paths_of(targets, scene, {target: turned for target, (_, turned) in spaces.items()})
     paths = [(target, path) for target, path in zip(targets, found, strict=True) if path is not None]
     cache.keep_only(len(targets))
@@ -266,13 +266,6 @@ def _draw(context: bpy.types.Context) -> None:
     finally:
         gpu.state.program_point_size_set(False)
         gpu.state.blend_set("NONE")
-
-
-def _space_of(target: Transform, depsgraph: bpy.types.Depsgraph) -> tuple[Matrix, np.ndarray | None]:
-    """Where a path leads in the world, and what stands between rotation and location in it, for bones."""
-    if isinstance(target, BoneTransform):
-        return space_of_bone(target.carrier, depsgraph)
-    return space_of(target.carrier, depsgraph), None
 
 
 def _draw_path(pen: _Pen, path: Path, settings: RigidMotionOverlay) -> None:
