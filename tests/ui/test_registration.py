@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 import rigid_motion
-from rigid_motion.animation.live import live
+from rigid_motion.animation.live import follower
 from rigid_motion.ui import keymap, menus
 
 
@@ -41,6 +41,6 @@ def test_switched_off_it_leaves_nothing_behind_however_often(empty_file):
 def test_a_look_through_the_file_that_still_waits_is_called_off(empty_file):
     """In a window Blender is asked for one as soon as it is idle."""
     rigid_motion.register()
-    bpy.app.timers.register(live._look_through, first_interval=1.0)
+    bpy.app.timers.register(follower.first_look, first_interval=1.0)
     rigid_motion.unregister()
-    assert not bpy.app.timers.is_registered(live._look_through)
+    assert not bpy.app.timers.is_registered(follower.first_look)

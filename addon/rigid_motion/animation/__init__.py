@@ -33,8 +33,8 @@ from .baking.sizes import radius_of
 from .compute.sources import MODE_IDS
 from .edits.mending import constraint_trouble, mend
 from .edits.mode_keys import set_mode
-from .live import edit_mode, live
-from .live.live import refresh, set_enabled
+from .live import edit_mode, follower
+from .live.follower import refresh, set_enabled
 from .queries.keyed import key_frames, modes_of
 from .queries.problems import problem_of
 from .transforms import Refused
@@ -75,10 +75,10 @@ __all__ = [
 def register() -> None:
     properties.register()
     edit_mode.register()
-    live.register()
+    follower.register()
 
 
 def unregister() -> None:
-    live.unregister()
+    follower.unregister()
     edit_mode.unregister()
     properties.unregister()

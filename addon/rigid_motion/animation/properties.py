@@ -22,7 +22,7 @@ from bpy.props import (
 from ..motion import KEYFRAME_MODES
 from .baking.copies import BAKED, REDUCED
 from .edits import mode_keys
-from .live import live
+from .live import follower
 from .transforms import OWN_WORDS, transform_of
 
 FIRST = ("motor_spline", "dq_sclerp")
@@ -97,7 +97,7 @@ class ChangedAction(bpy.types.PropertyGroup):
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if live.is_busy():
+    if follower.is_busy():
         return
     obj = motion.id_data
     if isinstance(motion, BoneMotion):
@@ -108,7 +108,7 @@ def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> 
 
 
 def _on_original(motion: ObjectMotion, _context: bpy.types.Context) -> None:
-    live.follow_original(transform_of(motion.id_data))
+    follower.follow_original(transform_of(motion.id_data))
 
 
 class _Motion:

@@ -18,7 +18,7 @@ from ..animation import Refused
 from ..animation.baking.copies import BAKED, REDUCED, entries_of
 from ..animation.baking.sizes import first_tolerance
 from ..animation.edits.mending import with_troubles
-from ..animation.live.live import paused
+from ..animation.live.follower import paused
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.polls import with_in_betweens, with_modes, with_more_keys_than
 from ..animation.transforms import Transform

@@ -15,7 +15,7 @@ from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
 from ..compute.sources import Source
-from ..live import live
+from ..live import follower
 from ..transforms import Refused, Transform, transform_of
 
 Target = bpy.types.Object | bpy.types.PoseBone | Transform
@@ -87,18 +87,18 @@ def act_on(
         raise refusals[0] if len(refusals) == 1 else Refused("\n".join(map(str, refusals)))
     if refused is not None:
         refused.extend(refusals)
-    with live.paused():
+    with follower.paused():
         results = {transform: act(transform, planned) for transform, planned in plans}
     acted = {transform for transform, _ in plans}
     if becomes is None:
-        live.refresh(acted)
+        follower.refresh(acted)
     else:
         read = [
             (place, [becomes(source) if isinstance(source, Source) else source for source in sources])
             for place, sources in zip(places, of_users, strict=True)
             if not acted.isdisjoint(place.users)
         ]
-        live.refresh_read(read)
+        follower.refresh_read(read)
     return results
 
 

@@ -22,7 +22,7 @@ from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
 from ..compute.sources import MODE_NUMBERS, SAME_FRAME
-from ..live import live
+from ..live import follower
 from ..queries.keyed import active_place, frames_in, modes_in
 from ..transforms import Channel, Refused, Transform
 from .acting import Readings, Targets, act_on
@@ -91,7 +91,7 @@ def on_property(transform: Transform) -> None:
     for place in places:
         if not is_keyed(place):
             record_mode(place, MODE_NUMBERS[mode])
-    live.refresh([transform])
+    follower.refresh([transform])
 
 
 def set_whole(place: SlotTransform, mode: str) -> None:

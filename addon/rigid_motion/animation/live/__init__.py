@@ -1,13 +1,15 @@
-"""Keeping in-betweens up to date with every edit in the file that is open.
+"""Following edits: in-betweens are kept up to date with every edit in the file that is open.
 
-graphs         which data-blocks were edited, by Blender's dependency graphs
-concerned      which objects have to do with modes
-glances        which bones an edit was about
-insertion      a key inserted in between keeps the pose on the screen
-densification  keys inserted all along keep the motion
-separated      what Separate Slots does to rigs
-edit_mode      rigs in Edit Mode
-live           Blender's handlers, and the refresh after every edit
+depsgraphs       which data-blocks were edited, by Blender's dependency graphs
+concerned        which objects have to do with modes
+raw_keys         the keys of F-curves as bytes, quickly
+snapshots        which bones an edit was about
+inserted_keys    a key inserted in between keeps the pose on the screen
+dense_keys       keys inserted all along keep the motion
+separated_slots  what Separate Slots does to rigs
+edit_mode        rigs in Edit Mode
+refreshing       what becomes of in-betweens after an edit
+follower         Blender's handlers, which find out what was edited
 
 Each module imports only those above it.
 """

@@ -12,14 +12,6 @@ import bpy
 BlockKey = tuple[str, str | None]
 """What a data-block is found by in the file: its name, and the file that it is linked from."""
 
-_evaluated: set[int] = set()
-"""The addresses of the graphs that have been evaluated since the extension was switched on or the file was opened."""
-
-
-def forget_graphs() -> None:
-    """Take nothing for evaluated."""
-    _evaluated.clear()
-
 
 def key_of(block: bpy.types.ID) -> BlockKey:
     return block.name, block.library and block.library.filepath
@@ -43,13 +35,18 @@ def actions_to_evaluate(scene: bpy.types.Scene) -> set[bpy.types.Action]:
     return {action for layer in scene.view_layers for action in edited_actions(layer.depsgraph)}
 
 
-def objects_to_evaluate(scene: bpy.types.Scene) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
-    """The objects that wait to be evaluated: all where nothing has been yet. With the graph they were evaluated in."""
+def objects_to_evaluate(
+    scene: bpy.types.Scene, evaluated: set[int]
+) -> Iterator[tuple[bpy.types.Object, bpy.types.Depsgraph | None]]:
+    """The objects that wait to be evaluated: all where nothing has been yet. With the graph they were evaluated in.
+
+    `evaluated` has the addresses of the graphs that were evaluated before. Those of the scene are added.
+    """
     for layer in scene.view_layers:
         depsgraph = layer.depsgraph
-        known = depsgraph is not None and depsgraph.as_pointer() in _evaluated
+        known = depsgraph is not None and depsgraph.as_pointer() in evaluated
         if depsgraph is not None:
-            _evaluated.add(depsgraph.as_pointer())
+            evaluated.add(depsgraph.as_pointer())
         # What is new in a scene is in no graph yet.
         if not known or depsgraph.id_type_updated("SCENE") or depsgraph.id_type_updated("COLLECTION"):
             yield from ((obj, None) for obj in scene.objects)

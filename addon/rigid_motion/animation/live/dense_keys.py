@@ -17,7 +17,7 @@ from ..compute.differences import in_betweens
 from ..compute.known_sources import recall
 from ..compute.sources import SAME_FRAME, Source
 from ..writers.channel_values import channel_values
-from .insertion import TOLERANCE
+from .inserted_keys import TOLERANCE
 
 
 def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:

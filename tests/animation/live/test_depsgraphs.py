@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from rigid_motion.animation.live.graphs import forget_graphs, objects_to_evaluate
+from rigid_motion.animation.live.depsgraphs import objects_to_evaluate
 from tests.animation.scenes import new_object
 from tests.blank import blank
 
@@ -24,12 +24,12 @@ def namesakes(tmp_path: Path) -> list[bpy.types.Object]:
     (linked,) = wanted.objects
     bpy.context.scene.collection.objects.link(linked)
     bpy.context.view_layer.update()
-    forget_graphs()
-    assert {obj for obj, _ in objects_to_evaluate(bpy.context.scene)} == {local, linked}
     return [local, linked]
 
 
 @pytest.mark.parametrize("number", [0, 1])
 def test_of_two_objects_with_one_name_that_is_found_which_was_edited(namesakes, number):
+    evaluated: set[int] = set()
+    assert {obj for obj, _ in objects_to_evaluate(bpy.context.scene, evaluated)} == set(namesakes)
     namesakes[number].update_tag()
-    assert [obj for obj, _ in objects_to_evaluate(bpy.context.scene)] == [namesakes[number]]
+    assert [obj for obj, _ in objects_to_evaluate(bpy.context.scene, evaluated)] == [namesakes[number]]

@@ -16,16 +16,16 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from ..actions.slots import Slot, is_time, strips_of, uses_of
 from ..transforms import bone_name, is_ours, split_path
 
-_names: dict[int, set[str]] = {}
+SlotNames = dict[int, set[str]]
 """Of each rig the names of the slots that have its keys, as last seen, by the rig's session id."""
 
 
-def notice_slots(slots: Iterable[Slot]) -> None:
-    """Keep in mind by which slots rigs are keyed that have differences in others."""
+def notice_slots(slots: Iterable[Slot], names: SlotNames) -> None:
+    """Put into `names` by which slots rigs are keyed that have differences in others."""
     for slot in slots:
         if any(pair.handle == slot.handle for pair in slot.action.rigid_motion.bone_slots):
             for user in slot.users:
-                _names[user.session_uid] = _names_of(user)
+                names[user.session_uid] = _names_of(user)
 
 
 def _names_of(rig: bpy.types.Object) -> set[str]:
@@ -45,10 +45,10 @@ def are_separated(actions: Iterable[bpy.types.Action]) -> bool:
     return any(_rigs_left_with(action) for action in actions)
 
 
-def give_keys_back(actions: Iterable[bpy.types.Action]) -> set[bpy.types.Action]:
+def give_keys_back(actions: Iterable[bpy.types.Action], names: SlotNames) -> set[bpy.types.Action]:
     """Give rigs the Actions of their keys again that were left with one of these; which ones, is returned."""
     left = {action: _rigs_left_with(action) for action in actions}
-    return {action for action, rigs in left.items() for rig in rigs if _has_keys_back(rig, action)}
+    return {action for action, rigs in left.items() for rig in rigs if _has_keys_back(rig, action, names)}
 
 
 def discard(actions: Iterable[bpy.types.Action]) -> None:
@@ -90,11 +90,11 @@ def _shows(rig: bpy.types.Object, action: bpy.types.Action) -> bool:
     return any(is_ours(constraint) and constraint.action == action for bone in bones for constraint in bone.constraints)
 
 
-def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action) -> bool:
+def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action, names: SlotNames) -> bool:
     """Give a rig its keys again, unless it cannot be told where they are."""
     bones = _bones_of(_only_channelbag(differences).fcurves)
     timed = [action for action in bpy.data.actions if bones <= _timed_bones(action)]
-    named = [action for action in timed if action.slots[0].identifier in _names.get(rig.session_uid, ())]
+    named = [action for action in timed if action.slots[0].identifier in names.get(rig.session_uid, ())]
     if len(found := named or timed) != 1:
         return False
     for user in _moving(rig, differences):

@@ -1,15 +1,15 @@
-"""A quick look at rigs: which of their many bones an edit was about.
+"""Snapshots of rigs: which of their many bones an edit was about.
 
 Blender tells that an Action or an object was edited, and no more. To read all channels of a rig after every edit of one
-of them takes longer than all the rest, so what they were is kept from the last look, as bytes, and compared. A change
-that means nothing, of what is selected for example, counts too: whether in-betweens depend on it the digest tells.
+of them takes longer than all the rest, so a snapshot of them is kept, as bytes, and compared. A change that means
+nothing, of what is selected for example, counts too: whether in-betweens depend on it the digest tells.
 """
 
 from __future__ import annotations
 
 import itertools
 import operator
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import bpy
@@ -18,58 +18,74 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..actions.slots import Curves, Slot, SlotTransform, slots_in, slots_of, transforms_in, transforms_with, uses_of
 from ..transforms import WIDTHS, Channel, is_ours, prefix_of, split_path
-
-_looks: dict[tuple[int, int], _Look] = {}
-"""At the slots of rigs, the last of each: by the Action's session id, and the slot's handle."""
-
-_rigs: dict[int, tuple[_Shared, _States, float]] = {}
-"""Of each rig what all its bones depend on, what they were, and on which frame, by its session id."""
+from .raw_keys import key_reader
 
 
-def forget_all() -> None:
-    """Take all for changed at the next look."""
-    _looks.clear()
-    _rigs.clear()
+class Snapshots:
+    """The last snapshots of the slots and the rigs in a file."""
+
+    def __init__(self) -> None:
+        self._slots: dict[tuple[int, int], _SlotSnapshot] = {}
+        """By the Action's session id, and the slot's handle."""
+        self._rigs: dict[int, tuple[_Dependencies, _Poses, float]] = {}
+        """Of each rig what all its bones depend on, what they were, and on which frame, by its session id."""
+
+    def clear(self) -> None:
+        """Take all for changed the next time."""
+        self._slots.clear()
+        self._rigs.clear()
+
+    def edited_in(self, slot: Slot) -> list[SlotTransform]:
+        """What of all that a slot moves has other channels than before; everything where there is no telling."""
+        if all(user.pose is None for user in slot.users):
+            return transforms_in(slot)
+        channelbag, key = slot.channelbag, (slot.action.session_uid, slot.handle)
+        if channelbag is None:
+            self._slots.pop(key, None)
+            return transforms_in(slot)
+        snapshot = self._slots.get(key)
+        if snapshot is None or not snapshot.is_of(channelbag):
+            self._slots[key] = _SlotSnapshot(channelbag)
+            return transforms_in(slot)
+        changed = dict.fromkeys(snapshot.prefixes[number] for number in sorted(snapshot.update()))
+        return transforms_with(slot, channelbag, {prefix: snapshot.curves_under(prefix) for prefix in changed})
+
+    def changed_bones(self, rig: bpy.types.Object, frame: float, *, is_set: bool = True) -> list[bpy.types.PoseBone]:
+        """The bones of a rig that are other than before: how they are posed, or what moves them.
+
+        Along with them those of other rigs that move by slots which this one has left.
+
+        Where another frame is shown than before, those do not count that are where the rig's Action has them. Settings
+        take longest to be read: they are where something of the rig itself `is_set`, not of its Action alone.
+        """
+        before = self._rigs.get(rig.session_uid)
+        now, bones = _Poses(rig, None if is_set or before is None else before[1]), rig.pose.bones
+        shared = _Dependencies.of(rig, None if before is None else before[0])
+        self._rigs[rig.session_uid] = shared, now, frame
+        if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
+            left = set() if before is None else dict(before[0].moved_by).keys() - dict(shared.moved_by).keys()
+            return [*bones, *(bone for other in _users_of(left) for bone in other.pose.bones)]
+        changed = now.changed_from(before[1])
+        if changed and before[2] != frame:
+            changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
+        return [bones[number] for number in changed]
 
 
-def edited_in(slot: Slot) -> list[SlotTransform]:
-    """What of all that a slot moves has other channels than at the last look; everything where there is no telling."""
-    if all(user.pose is None for user in slot.users):
-        return transforms_in(slot)
-    channelbag, key = slot.channelbag, (slot.action.session_uid, slot.handle)
-    if channelbag is None:
-        _looks.pop(key, None)
-        return transforms_in(slot)
-    look = _looks.get(key)
-    if look is None or not look.is_at(channelbag):
-        _looks[key] = _Look(channelbag)
-        return transforms_in(slot)
-    changed = dict.fromkeys(look.prefixes[number] for number in sorted(look.again()))
-    return transforms_with(slot, channelbag, {prefix: look.curves_under(prefix) for prefix in changed})
-
-
-class _Look:
-    """The F-curves of a slot, and what they had when they were looked at.
-
-    To ask Blender for a property takes longer than to compare what it is, so what leads to the keys of each F-curve is
-    kept with it, for as long as the F-curves are the same ones.
-    """
+class _SlotSnapshot:
+    """The F-curves of a slot, and what they had."""
 
     def __init__(self, channelbag: bpy.types.ActionChannelbag) -> None:
         self.channelbag, self.address = channelbag, channelbag.as_pointer()
         self.fcurves = list(channelbag.fcurves)
         self.paths = [fcurve.data_path for fcurve in self.fcurves]
         self.prefixes, properties = zip(*map(split_path, self.paths), strict=True) if self.paths else ((), ())
-        self.keys = [fcurve.keyframe_points for fcurve in self.fcurves]
+        self.read_keys = key_reader([fcurve.keyframe_points for fcurve in self.fcurves])
         self.modifiers = [
             fcurve.modifiers if prop in WIDTHS else () for fcurve, prop in zip(self.fcurves, properties, strict=True)
         ]
-        self.places = [(0, 0)] * len(self.fcurves)
-        """Where the keys of each are in memory, and how many bytes: 0 where that is not known."""
-        self.views = [_NOTHING] * len(self.fcurves)
-        self.flags, self.contents, self.modified = self._flags(), self._contents(), self._modified()
+        self.flags, self.keys, self.modified = self._flags(), self.read_keys(), self._modified()
 
-    def is_at(self, channelbag: bpy.types.ActionChannelbag) -> bool:
+    def is_of(self, channelbag: bpy.types.ActionChannelbag) -> bool:
         """Whether these are still the F-curves that there are, under the same data paths."""
         fcurves = list(channelbag.fcurves)
         return (
@@ -78,15 +94,13 @@ class _Look:
             and self.paths == [fcurve.data_path for fcurve in fcurves]
         )
 
-    def again(self) -> set[int]:
-        """Look again: the numbers of those that may have something else than before."""
-        flags, contents, modified = self.flags, self.contents, self.modified
-        self.flags, self.contents, self.modified = self._flags(), self._contents(), self._modified()
+    def update(self) -> set[int]:
+        """Take another snapshot: the numbers of those that may have something else than before."""
+        flags, keys, modified = self.flags, self.keys, self.modified
+        self.flags, self.keys, self.modified = self._flags(), self.read_keys(), self._modified()
         changed = {*modified, *self.modified, *np.flatnonzero((self.flags != flags).any(axis=0)).tolist()}
-        if self.contents != contents:
-            changed.update(itertools.compress(itertools.count(), map(operator.ne, self.contents, contents)))
-        if not _key_size:
-            changed.update(number for number, (address, _) in enumerate(self.places) if address)
+        if self.keys != keys:
+            changed.update(itertools.compress(itertools.count(), map(operator.ne, self.keys, keys)))
         return changed
 
     def curves_under(self, prefix: str) -> Curves:
@@ -109,58 +123,19 @@ class _Look:
             self.channelbag.fcurves.foreach_get(name, row)
         return flags
 
-    def _contents(self) -> list[bytes]:
-        """The keys of each F-curve as they are in memory."""
-        size = _size_of_key(self.keys)
-        places = [(keys[0].as_pointer(), size * count) if (count := len(keys)) else (0, 0) for keys in self.keys]
-        if places != self.places:
-            for number, (place, before) in enumerate(zip(places, self.places, strict=True)):
-                if place != before:
-                    self.views[number] = _view(*place) if place[1] else _NOTHING
-            self.places = places
-        return [view.tobytes() for view in self.views]
-
-
-_NOTHING = np.empty(0, np.uint8)
-
-
-class _Memory:
-    """A stretch of memory that NumPy can read. Property by property the same takes four times as long."""
-
-    __array_interface__: dict[str, object]
-
-
-def _view(address: int, size: int) -> np.ndarray:
-    memory = _Memory()
-    memory.__array_interface__ = {"data": (address, True), "shape": (size,), "typestr": "|u1", "version": 3}
-    return np.asarray(memory)
-
-
-_key_size = 0
-"""How many bytes a key takes, as soon as two were seen one behind the other."""
-
-
-def _size_of_key(channels: Sequence[bpy.types.bpy_prop_collection]) -> int:
-    """How many bytes a key takes, 0 where none of these channels tells."""
-    global _key_size
-    if not _key_size:
-        several = next((keys for keys in channels if len(keys) > 1), None)
-        _key_size = several[1].as_pointer() - several[0].as_pointer() if several is not None else 0
-    return _key_size
-
 
 _COLUMNS = [(prop, index) for prop, width in WIDTHS.items() for index in range(width)]
-"""What the columns of `_States.numbers` are, but for the last one: the rotation mode."""
+"""What the columns of `_Poses.numbers` are, but for the last one: the rotation mode."""
 
 SAME_VALUE = 1e-6
 """How far a property may be from its channel, relative to its value or absolute below 1: single precision."""
 
 
-class _States:
+class _Poses:
     """All about the bones of a rig that in-betweens may depend on, but for their channels."""
 
-    def __init__(self, rig: bpy.types.Object, as_in: _States | None) -> None:
-        """Settings are taken `as_in` an earlier look, where that was at the same bones."""
+    def __init__(self, rig: bpy.types.Object, as_in: _Poses | None) -> None:
+        """Settings are those of an earlier snapshot, `as_in`, where that is of the same bones."""
         bones = rig.pose.bones
         self.names, columns = bones.keys(), []
         for name, width in WIDTHS.items():
@@ -173,7 +148,7 @@ class _States:
         is_known = as_in is not None and as_in.names == self.names
         self.settings = as_in.settings if is_known else [_settings_of(bone) for bone in bones]
 
-    def changed_from(self, before: _States) -> list[int]:
+    def changed_from(self, before: _Poses) -> list[int]:
         """The numbers of the bones, the same ones, that were otherwise before."""
         moved = (self.numbers != before.numbers).any(axis=1).tolist()
         return [
@@ -183,7 +158,7 @@ class _States:
         ]
 
     def posed_since(
-        self, before: _States, numbers: list[int], fcurves: Iterable[bpy.types.FCurve], frame: float
+        self, before: _Poses, numbers: list[int], fcurves: Iterable[bpy.types.FCurve], frame: float
     ) -> list[int]:
         """Those of some bones that are not merely where their channels have them on another frame."""
         posed = {number for number in numbers if self.settings[number] != before.settings[number]}
@@ -211,28 +186,7 @@ def _settings_of(bone: bpy.types.PoseBone) -> tuple:
     return motion.mode, motion.awaited, motion.mounted, shown_by
 
 
-def changed_bones(rig: bpy.types.Object, frame: float, *, is_set: bool = True) -> list[bpy.types.PoseBone]:
-    """The bones of a rig that are other than at the last look: how they are posed, or what moves them.
-
-    Along with them those of other rigs that move by slots which this one has left.
-
-    Where another frame is shown than then, those do not count that are where the rig's Action has them. Settings, which
-    take longest to be asked for, are looked at where something of the rig itself `is_set`, not of its Action alone.
-    """
-    before = _rigs.get(rig.session_uid)
-    now, bones = _States(rig, None if is_set or before is None else before[1]), rig.pose.bones
-    shared = _Shared.of(rig, None if before is None else before[0])
-    _rigs[rig.session_uid] = shared, now, frame
-    if before is None or not shared.is_as(before[0]) or before[1].names != now.names:
-        left = set() if before is None else dict(before[0].moved_by).keys() - dict(shared.moved_by).keys()
-        return [*bones, *(bone for other in _users_of(left) for bone in other.pose.bones)]
-    changed = now.changed_from(before[1])
-    if changed and before[2] != frame:
-        changed = now.posed_since(before[1], changed, _played_fcurves(rig), frame)
-    return [bones[number] for number in changed]
-
-
-class _Shared(NamedTuple):
+class _Dependencies(NamedTuple):
     """What all bones of a rig depend on."""
 
     moved_by: list[tuple[tuple[int, int], list[str]]]
@@ -247,7 +201,7 @@ class _Shared(NamedTuple):
     rest: bytes
 
     @classmethod
-    def of(cls, rig: bpy.types.Object, before: _Shared | None) -> _Shared:
+    def of(cls, rig: bpy.types.Object, before: _Dependencies | None) -> _Dependencies:
         uses = uses_of(rig)
         moved_by = [(key, sorted(map(str, strips))) for key, (_, _, strips) in uses.items()]
         counts = [action.users for action, *_ in uses.values()]
@@ -257,7 +211,7 @@ class _Shared(NamedTuple):
             users = [(slot.in_nla, *(user.session_uid for user in slot.users)) for slot in slots_of([rig])]
         return cls(moved_by, counts, users, _rest_of(rig.data.bones))
 
-    def is_as(self, other: _Shared) -> bool:
+    def is_as(self, other: _Dependencies) -> bool:
         """Whether the bones depend on the same, however many constraints there are."""
         return (self.moved_by, self.users, self.rest) == (other.moved_by, other.users, other.rest)
 

@@ -1,32 +1,46 @@
-"""Which bones an edit was about, at a quick look at their rig."""
+"""Which bones an edit was about, by a snapshot of their rig; whichever way their keys are read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
 import bpy
+import numpy as np
 import pytest
 
 from rigid_motion.animation import set_enabled, set_mode
 from rigid_motion.animation.actions.slots import Slot, slots_in
-from rigid_motion.animation.live import glances
+from rigid_motion.animation.live import raw_keys
+from rigid_motion.animation.live.follower import follower
+from rigid_motion.animation.live.snapshots import Snapshots
 from tests.animation.bones.rigs import key_all, key_bone, new_rig, with_edit_bones
 from tests.animation.oracle import curves_of
 
 EVERYTHING = {"", "Body", "Upper", "Lower", "Hand"}
 
 
-@pytest.fixture
-def rig(live_file) -> Iterator[bpy.types.Object]:
-    """A rig with keys on all bones, one of which has a single key; looked at once, and by nobody else."""
+def view_of_other_memory(address: int, size: int) -> np.ndarray:
+    """What a Blender that keeps keys elsewhere, or otherwise, might have there."""
+    return np.full(size, 171, np.uint8)
+
+
+@pytest.fixture(params=["in memory", "by property"])
+def rig(request, live_file, monkeypatch, caplog) -> Iterator[bpy.types.Object]:
+    """A rig with keys on all bones, one of which has a single key; a snapshot is taken of it, by no other."""
     set_enabled(False)
-    glances.forget_all()
+    monkeypatch.setattr(raw_keys._Layout, "size", None)
+    if request.param == "by property":
+        monkeypatch.setattr(raw_keys, "_view", view_of_other_memory)
+    monkeypatch.setattr(follower, "snapshots", Snapshots())
     rig = new_rig()
     key_all(rig)
     for path in ("location", "rotation_quaternion"):
         for frame in (11, 24, 40):
             rig.pose.bones["Hand"].keyframe_delete(path, frame=frame)
     assert edited(rig) == EVERYTHING
+    warnings = [record for record in caplog.records if "not in memory as expected" in record.message]
+    assert (raw_keys._Layout.size == 0, len(warnings)) == ((True, 1) if request.param == "by property" else (False, 0))
+    caplog.clear()
     yield rig
     set_enabled(True)
 
@@ -38,7 +52,7 @@ def slot_of(rig: bpy.types.Object) -> Slot:
 
 def edited(rig: bpy.types.Object) -> set[str]:
     """The names of bones that were edited since the last look, "" for the rig itself; all their F-curves are found."""
-    found = glances.edited_in(slot_of(rig))
+    found = follower.snapshots.edited_in(slot_of(rig))
     for place in found:
         if place.prefix:
             there = {(place.prefix + path, index) for path, index in curves_of(place.users[0].carrier)}
@@ -140,57 +154,59 @@ def test_a_channel_that_was_made_anew_is_found_wherever_it_is_in_memory(rig):
 
 
 def test_bones_are_noticed_that_are_posed_or_turn_otherwise(rig):
-    assert glances.changed_bones(rig, 1.0) == list(rig.pose.bones)
-    assert glances.changed_bones(rig, 1.0) == []
+    assert follower.snapshots.changed_bones(rig, 1.0) == list(rig.pose.bones)
+    assert follower.snapshots.changed_bones(rig, 1.0) == []
     rig.pose.bones["Body"].location.x += 1e-3
     rig.pose.bones["Hand"].rotation_mode = "ZYX"
-    assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Body", "Hand"]
-    assert glances.changed_bones(rig, 1.0) == []
+    assert [bone.name for bone in follower.snapshots.changed_bones(rig, 1.0)] == ["Body", "Hand"]
+    assert follower.snapshots.changed_bones(rig, 1.0) == []
 
 
 def test_bones_that_another_frame_has_moved_are_not_taken_for_posed(rig):
     bpy.context.scene.frame_set(5)
-    glances.changed_bones(rig, 5.0)
+    follower.snapshots.changed_bones(rig, 5.0)
     bpy.context.scene.frame_set(17)
     rig.pose.bones["Body"].location.x += 1e-3
     rig.pose.bones["Lower"].scale.x = 1.5
     rig.pose.bones["Hand"].rotation_mode = "ZYX"
-    assert [bone.name for bone in glances.changed_bones(rig, 17.0)] == ["Body", "Lower", "Hand"]
-    assert glances.changed_bones(rig, 17.0) == []
+    assert [bone.name for bone in follower.snapshots.changed_bones(rig, 17.0)] == ["Body", "Lower", "Hand"]
+    assert follower.snapshots.changed_bones(rig, 17.0) == []
 
 
 def test_where_a_channel_is_muted_what_another_frame_shows_is_a_pose(rig):
     location(rig, "Upper").mute = True
     bpy.context.scene.frame_set(5)
-    glances.changed_bones(rig, 5.0)
+    follower.snapshots.changed_bones(rig, 5.0)
     rig.pose.bones["Upper"].location.y = location(rig, "Upper").evaluate(17.0)
     bpy.context.scene.frame_set(17)
-    assert [bone.name for bone in glances.changed_bones(rig, 17.0)] == ["Upper"]
+    assert [bone.name for bone in follower.snapshots.changed_bones(rig, 17.0)] == ["Upper"]
 
 
 def test_a_constraint_that_is_switched_off_is_noticed(rig):
     constraint = rig.pose.bones["Upper"].constraints.new("ACTION")
     constraint.name, constraint.use_eval_time = "Rigid Motion", True
-    glances.changed_bones(rig, 1.0)
+    follower.snapshots.changed_bones(rig, 1.0)
     constraint.mute = True
-    assert [bone.name for bone in glances.changed_bones(rig, 1.0)] == ["Upper"]
+    assert [bone.name for bone in follower.snapshots.changed_bones(rig, 1.0)] == ["Upper"]
 
 
 def test_settings_are_looked_at_where_something_of_the_rig_was_set(rig):
     upper = rig.pose.bones["Upper"]
-    glances.changed_bones(rig, 1.0)
+    follower.snapshots.changed_bones(rig, 1.0)
     upper.rigid_motion.awaited, upper.location.x = "pga_slerp", 2.0
-    assert glances.changed_bones(rig, 1.0, is_set=False) == [upper]
-    assert glances.changed_bones(rig, 1.0, is_set=False) == []
-    assert glances.changed_bones(rig, 1.0) == [upper]
+    assert follower.snapshots.changed_bones(rig, 1.0, is_set=False) == [upper]
+    assert follower.snapshots.changed_bones(rig, 1.0, is_set=False) == []
+    assert follower.snapshots.changed_bones(rig, 1.0) == [upper]
 
 
 def test_a_constraint_that_is_switched_off_together_with_an_edit_of_a_key_is_noticed(rig, monkeypatch):
     set_enabled(True)
     set_mode(rig.pose.bones, "dq_sclerp")
     bpy.context.view_layer.update()
-    look, seen = glances.changed_bones, []
-    monkeypatch.setattr(glances, "changed_bones", lambda *rig, **how: seen.append((look(*rig, **how), how)) or [])
+    look, seen = follower.snapshots.changed_bones, []
+    monkeypatch.setattr(
+        follower.snapshots, "changed_bones", lambda *rig, **how: seen.append((look(*rig, **how), how)) or []
+    )
     edited = location(rig, "Body").keyframe_points[1]
     upper = rig.pose.bones["Upper"]
     for together, found in ((False, []), (True, [upper])):
@@ -203,7 +219,7 @@ def test_a_constraint_that_is_switched_off_together_with_an_edit_of_a_key_is_not
 
 
 def test_all_bones_count_as_other_after_one_was_made(rig):
-    glances.changed_bones(rig, 1.0)
+    follower.snapshots.changed_bones(rig, 1.0)
     with_edit_bones(rig, lambda bones: setattr(bones.new("Finger"), "tail", (0.0, 0.0, 1.0)))
     key_bone(rig.pose.bones["Finger"])
-    assert glances.changed_bones(rig, 1.0) == list(rig.pose.bones)
+    assert follower.snapshots.changed_bones(rig, 1.0) == list(rig.pose.bones)

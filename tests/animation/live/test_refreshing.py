@@ -11,7 +11,7 @@ import pytest
 
 from rigid_motion.animation import set_mode
 from rigid_motion.animation.actions import slots
-from rigid_motion.animation.live import live
+from rigid_motion.animation.live import refreshing
 from tests.animation.bones.rigs import moving_rig
 from tests.animation.oracle import assert_shown
 from tests.animation.scenes import key, new_object, push_down
@@ -29,8 +29,8 @@ def read(live_file, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         names.extend(place.name for place in places)
         return of_places(places)
 
-    of_places = live.keyed_in
-    monkeypatch.setattr(live, "keyed_in", keyed_in)
+    of_places = refreshing.keyed_in
+    monkeypatch.setattr(refreshing, "keyed_in", keyed_in)
     return names
 
 

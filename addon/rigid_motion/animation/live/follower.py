@@ -1,0 +1,347 @@
+"""Keeping in-betweens up to date: whatever the animator edits, by hand or by script, shows at once.
+
+Blender's handlers tell that something was edited; those of a `Follower` find out what, and refresh it. For the
+in-betweens to be right nothing has to be remembered here, see `refreshing`. A frame that is played costs nothing.
+"""
+
+from __future__ import annotations
+
+import functools
+import logging
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..actions.mode_property import adopt_from_properties, show_awaited
+from ..actions.reading import leading
+from ..actions.renaming import forget_names
+from ..actions.slots import SlotTransform, choose_slots, filled_places_of, slot_transforms_of, slots_in
+from ..compute import known_sources
+from ..compute.sources import Source
+from ..handlers import append_handlers, remove_handlers
+from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
+from ..writers.table import outlet_of, release
+from .concerned import all_under, concerns_us, has_bones, has_mode
+from .depsgraphs import BlockKey, actions_to_evaluate, edited_actions, key_of, objects_of, objects_to_evaluate
+from .inserted_keys import InsertedKeys
+from .refreshing import refresh_places
+from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
+from .snapshots import Snapshots
+
+log = logging.getLogger(__package__)
+
+Targets = Iterable[bpy.types.Object | bpy.types.PoseBone | Transform]
+
+
+class Follower:
+    """Follows the edits of the file that is open."""
+
+    def __init__(self) -> None:
+        self.enabled = True
+        """Whether edits are followed at once."""
+        self.busy = False
+        """Whether the edits that Blender tells of are the extension's."""
+        self.operator = (0, "")
+        """The operator that had ended last when edits were last seen."""
+        self.handlers = {
+            "depsgraph_update_pre": self._handler(self.before_update),
+            "depsgraph_update_post": self._handler(self.after_update),
+            "frame_change_pre": self._handler(self.before_frame),
+            "frame_change_post": self._handler(self.after_frame),
+            "undo_post": self._handler(self.after_undo),
+            "redo_post": self._handler(self.after_undo),
+            "load_post": self._handler(self.after_load),
+            "save_pre": self._handler(self.before_saving),
+            "render_init": self._handler(self.look_again),
+        }
+        self.begin_file()
+
+    def begin_file(self) -> None:
+        """Know nothing of the file that is open."""
+        self.unseen = True
+        """Whether the file has yet to be looked through."""
+        self.frame = 0.0
+        """The frame that was last shown."""
+        self.ranges: dict[int, tuple[int, int]] = {}
+        """First and last frame of each scene when last seen, by session id."""
+        self.waiting: list[BlockKey] = []
+        """The objects that a script has edited before it went on to another frame."""
+        self.followed: set[int] = set()
+        """The Actions, by session id, that were followed before Blender evaluated them."""
+        self.moved: set[Transform] = set()
+        """What these move."""
+        self.objects: set[int] = set()
+        """The objects of which something was set before Blender evaluated them, by session id."""
+        self.evaluated: set[int] = set()
+        """The addresses of the dependency graphs that have been evaluated."""
+        self.snapshots = Snapshots()
+        self.inserted = InsertedKeys()
+        self.slot_names: SlotNames = {}
+
+    def _handler(self, method: Callable) -> Callable:
+        """A handler that stays quiet while edits are not followed, and never raises into Blender."""
+
+        @persistent
+        @functools.wraps(method)
+        def follow(*arguments: object) -> None:
+            if self.enabled:
+                try:
+                    method(*arguments)
+                except Exception:
+                    log.exception("In-betweens could not be brought up to date")
+
+        return follow
+
+    @contextmanager
+    def turn(self) -> Iterator[bool]:
+        """Whether edits are to be followed: not while they are the extension's."""
+        is_first = not self.busy
+        self.busy = True
+        try:
+            yield is_first
+        finally:
+            if is_first:
+                self.busy = False
+
+    def refresh(self, targets: Targets | None = None, *, again: bool = False) -> int:
+        """Bring the in-betweens of these up to date, or of all in the file: see the function of this name."""
+        transforms = all_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
+        with self.turn() as is_first:
+            if not is_first:
+                return 0
+            separated = give_keys_back(bpy.data.actions, self.slot_names) if targets is None else set()
+            places = slot_transforms_of(transforms)
+            moved = {user for place in places for user in place.users}
+            unmoved = [transform for transform in transforms if transform not in moved]
+            release(unmoved)
+            show_awaited(unmoved)
+            forget_names(unmoved)
+            count = self.refresh_places(places, again=again)
+            notice_slots({place.slot for place in places}, self.slot_names)
+            discard(separated)
+            return count
+
+    def refresh_places(
+        self,
+        places: Sequence[SlotTransform],
+        sources: Sequence[Source | Refused | None] | None = None,
+        *,
+        again: bool = False,
+    ) -> int:
+        return refresh_places(places, sources, self.inserted, self.frame, again=again)
+
+    def refresh_edited(self, actions: Collection[bpy.types.Action]) -> set[Transform]:
+        """Refresh what these Actions, which were edited, move; and say what that is."""
+        if not actions:
+            return set()
+        slots = slots_in(actions)
+        notice_slots(slots, self.slot_names)
+        places = [place for slot in slots for place in self.snapshots.edited_in(slot)]
+        with self.turn() as is_first:
+            if is_first:
+                self.refresh_places(places)
+        return {user for place in places for user in place.users}
+
+    def refresh_objects(self, depsgraph: bpy.types.Depsgraph, seen: set[Transform]) -> None:
+        """Refresh after an edit of scenes, or of other objects than these, and notice how one was posed by hand."""
+        edited = []
+        for update in depsgraph.updates:
+            block = update.id
+            if isinstance(block, bpy.types.Scene):
+                # Only the original has an identity: that of the evaluated scene is 0.
+                scene, frames = block.original, (block.frame_start, block.frame_end)
+                if self.ranges.get(scene.session_uid) != frames:
+                    edited += all_under(filter(concerns_us, scene.objects))
+                self.ranges[scene.session_uid] = frames
+            if isinstance(block, bpy.types.Object) and concerns_us(block):
+                for transform in self.edited_of(block.original):
+                    if transform not in seen:
+                        self.inserted.notice_pose(transform, self.frame)
+                        edited.append(transform)
+        if edited:
+            self.refresh(edited)
+
+    def edited_of(self, obj: bpy.types.Object) -> list[Transform]:
+        """An object that was evaluated on the frame that is shown, and of a rig the bones that were edited."""
+        if obj.pose is None or not has_bones(obj):
+            return [transform_of(obj)]
+        changed = self.snapshots.changed_bones(obj, self.frame, is_set=obj.session_uid in self.objects)
+        posed = self.inserted.posed_of(obj)
+        also = [bone for bone in obj.pose.bones if prefix_of(bone.name) in posed] if posed else []
+        itself = (obj,) if has_mode(obj) else ()
+        return list(dict.fromkeys(map(transform_of, (*itself, *changed, *also))))
+
+    def before_evaluation(self, scene: bpy.types.Scene) -> list[bpy.types.Object]:
+        """Look at what was set and is not evaluated yet: what in-betweens will overwrite, and poses set in one go.
+
+        Returns the objects of which anything was, as far as they have to do with modes.
+        """
+        waiting = objects_to_evaluate(scene, self.evaluated)
+        edited = {obj: depsgraph for obj, depsgraph in waiting if concerns_us(obj)}
+        operator = _last_operator()
+        name = operator[1] if operator != self.operator else ""
+        self.operator = operator
+        for obj, depsgraph in edited.items():
+            if not obj.is_editable:
+                continue
+            choose_slots(obj)
+            for place in filled_places_of(obj):
+                with self.turn() as is_first:
+                    if is_first:
+                        outlet_of(place).prepare(place)
+                if depsgraph is not None:
+                    for transform in place.users:
+                        with suppress(Refused):
+                            self.inserted.notice_assignment(transform, depsgraph, self.frame, operator=name)
+        return list(edited)
+
+    def look_through(self, *, again: bool = False) -> None:
+        """Refresh all there is in the file, whatever it is."""
+        self.unseen = False
+        self.keep_ranges()
+        self.refresh(again=again)
+
+    def look_again(self, *_: object, again: bool = False) -> None:
+        """Refresh all in the file that has anything to do with modes."""
+        self.frame = bpy.context.scene.frame_current_final if bpy.context.scene else 0.0
+        if self.unseen:
+            self.look_through(again=again)
+        else:
+            self.keep_ranges()
+            self.refresh(all_under(filter(concerns_us, bpy.data.objects)), again=again)
+
+    def keep_ranges(self) -> None:
+        self.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
+
+    def before_update(self, scene: bpy.types.Scene, *_: object) -> None:
+        self.frame = scene.frame_current_final
+        self.objects = {obj.session_uid for obj in self.before_evaluation(scene)}
+        # In-betweens that are there by now are evaluated with the edit; later they would cost one more evaluation.
+        edited = actions_to_evaluate(scene)
+        self.followed = {action.session_uid for action in edited}
+        self.moved = self.refresh_edited(edited)
+        self.inserted.forget_poses(self.moved)
+
+    def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+        self.frame = scene.frame_current_final
+        edited = edited_actions(depsgraph)
+        if self.unseen or are_separated(edited):
+            self.look_through()
+            # Some may have been deleted by that.
+            edited = edited_actions(depsgraph)
+        later = self.refresh_edited([action for action in edited if action.session_uid not in self.followed])
+        self.inserted.forget_poses(later)
+        seen = self.moved | later
+        self.followed, self.moved = set(), set()
+        if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
+            self.refresh_objects(depsgraph, seen)
+
+    def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
+        # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
+        self.waiting = [key_of(obj) for obj in self.before_evaluation(scene)]
+        self.refresh_edited(actions_to_evaluate(scene))
+
+    def after_frame(self, scene: bpy.types.Scene, *_: object) -> None:
+        edited = objects_of(self.waiting)
+        if self.unseen:
+            self.look_through()
+        elif edited:
+            self.refresh(all_under(edited))
+        self.waiting = []
+        self.inserted.forget_poses()
+        self.frame = scene.frame_current_final
+
+    def after_undo(self, *_: object) -> None:
+        self.snapshots.clear()
+        self.look_again(again=True)
+
+    def after_load(self, *_: object) -> None:
+        known_sources.forget_all()
+        self.begin_file()
+        with self.turn() as is_first:
+            if is_first:
+                transforms = all_under(bpy.data.objects)
+                moved = {user for place in slot_transforms_of(transforms) for user in place.users}
+                adopt_from_properties(transform for transform in transforms if transform not in moved)
+        self.look_again()
+
+    def before_saving(self, *_: object) -> None:
+        self.look_again()
+        for obj in bpy.data.objects:
+            if obj.rigid_motion.has_bones:
+                let_override_be_read(obj)
+
+
+def _last_operator() -> tuple[int, str]:
+    """The operator that has ended last, told from others of its kind, and its name."""
+    manager = bpy.context.window_manager
+    operators = manager.operators if manager is not None else ()
+    return (operators[-1].as_pointer(), operators[-1].bl_idname) if len(operators) else (0, "")
+
+
+follower = Follower()
+
+
+def set_enabled(enabled: bool) -> None:
+    """Follow edits at once, or else only when `refresh` is called."""
+    follower.enabled, follower.unseen = enabled, enabled
+
+
+def is_busy() -> bool:
+    """Whether the edits that Blender tells of at this moment are the extension's."""
+    return follower.busy
+
+
+def refresh(targets: Targets | None = None) -> int:
+    """Bring the in-betweens of these up to date, or of all in the file.
+
+    Returns
+    -------
+    int
+        How much had to be filled in anew, counted in transforms of slots.
+    """
+    return follower.refresh(targets)
+
+
+def refresh_read(readings: Sequence[tuple[SlotTransform, list[Source | Refused]]]) -> None:
+    """Bring the in-betweens of these up to date, which are read already, as each of their users has them."""
+    with follower.turn() as is_first:
+        if is_first:
+            sources = [leading(place, of_users) for place, of_users in readings]
+            follower.refresh_places([place for place, _ in readings], sources)
+
+
+def follow_original(transform: ObjectTransform) -> None:
+    """Follow an edit of what is written down of a transform's original difference."""
+    with follower.turn() as is_first:
+        if is_first:
+            transform.follow_original()
+            follower.refresh_places(slot_transforms_of([transform]))
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """Do several things, and refresh after them."""
+    with follower.turn():
+        yield
+
+
+def first_look() -> None:
+    """Look through the file as soon as Blender is idle."""
+    follower.look_through()
+
+
+def register() -> None:
+    follower.begin_file()
+    append_handlers(follower.handlers)
+    if not bpy.app.background:
+        # While an extension is switched on, the file is out of its reach.
+        bpy.app.timers.register(first_look, first_interval=0.0)
+
+
+def unregister() -> None:
+    if bpy.app.timers.is_registered(first_look):
+        bpy.app.timers.unregister(first_look)
+    remove_handlers(follower.handlers)
