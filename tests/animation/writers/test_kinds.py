@@ -6,12 +6,12 @@ import bpy
 import pytest
 
 from rigid_motion.animation.transforms import KINDS, BoneTransform, ObjectTransform, is_part, kind_of, transform_of
-from rigid_motion.animation.writers.table import OUTLETS
+from rigid_motion.animation.writers.table import WRITERS
 from rigid_motion.ui.overlay.kinds import PATH_KINDS
 from tests.animation.bones.rigs import new_rig
 
 
-@pytest.mark.parametrize("table", [OUTLETS, PATH_KINDS], ids=["outlets", "paths"])
+@pytest.mark.parametrize("table", [WRITERS, PATH_KINDS], ids=["writers", "paths"])
 def test_every_kind_has_a_row_in_every_table(table):
     assert table.keys() == set(KINDS)
 

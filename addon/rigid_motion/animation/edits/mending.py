@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..actions.refusals import refuse_linked
 from ..actions.slots import Slot, SlotTransform, uses_of
 from ..transforms import Refused, Transform, transform_of
-from ..writers.table import OUTLETS, outlet_of
+from ..writers.table import WRITERS, writer_of
 from .acting import Readings, Targets, act_on
 
 
@@ -20,7 +20,7 @@ def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform
     Returns
     -------
     str
-        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `outlets.restoring`; "" where its
+        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `writers.restoring`; "" where its
         constraint is as it was made, where there are no in-betweens, and for objects, which need no constraint.
     """
     transform = transform_of(target)
@@ -55,18 +55,18 @@ def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
 
     def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
         refuse_linked(transform)
-        places = [place for place, _ in readings if place.filled and outlet_of(place).uses_constraints]
+        places = [place for place, _ in readings if place.filled and writer_of(place).uses_constraints]
         if not places:
             raise Refused(
                 rpt_("{name} has no constraint to restore: choose a mode for keys of a bone first").format(
                     name=transform.name
                 )
             )
-        return [place for place in places if outlet_of(place).trouble_of(transform, place)]
+        return [place for place in places if writer_of(place).trouble_of(transform, place)]
 
     def act(transform: Transform, places: list[SlotTransform]) -> None:
         for place in places:
-            outlet_of(place).restore(transform, place)
+            writer_of(place).restore(transform, place)
 
     act_on(targets, plan, act, refused)
 
@@ -75,7 +75,7 @@ def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]
     """What is amiss with the constraints of each."""
     by_prefix: dict[bpy.types.Object, dict[str, Transform]] = {}
     for transform in transforms:
-        if OUTLETS[transform.kind].uses_constraints:
+        if WRITERS[transform.kind].uses_constraints:
             by_prefix.setdefault(transform.animated, {})[transform.prefix] = transform
     for animated, same in by_prefix.items():
         for action, handle, strips in uses_of(animated).values():
@@ -85,5 +85,5 @@ def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]
                     continue
                 # The constraint alone is looked at, not the channels.
                 place = SlotTransform(slot, user.prefix, None, (user,), dict)
-                if trouble := outlet_of(place).trouble_of(user, place):
+                if trouble := writer_of(place).trouble_of(user, place):
                     yield user, trouble

@@ -22,7 +22,7 @@ from ..compute import known_sources
 from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
-from ..writers.table import outlet_of, release
+from ..writers.table import release, writer_of
 from .concerned import all_under, concerns_us, has_bones, has_mode
 from .depsgraphs import BlockKey, actions_to_evaluate, edited_actions, key_of, objects_of, objects_to_evaluate
 from .inserted_keys import InsertedKeys
@@ -190,7 +190,7 @@ class Follower:
             for place in filled_places_of(obj):
                 with self.turn() as is_first:
                     if is_first:
-                        outlet_of(place).prepare(place)
+                        writer_of(place).prepare(place)
                 if depsgraph is not None:
                     for transform in place.users:
                         with suppress(Refused):

@@ -32,7 +32,7 @@ from ..compute.known_sources import recall
 from ..compute.sources import SAME_FRAME, Source
 from ..queries.on_screen import seen_components
 from ..transforms import Channel, Transform
-from ..writers.table import outlet_of
+from ..writers.table import writer_of
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -189,7 +189,7 @@ def _on_screen(
     user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
 ) -> dict[Channel, float]:
     """The values of the channels that, with the original difference alone, look as the screen does."""
-    filled, difference = place.filled, outlet_of(place).difference(place, user, frame)
+    filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
     seen = seen_components(shown, old.original, difference, old.order, parts)
     return {channel: seen[row] for row, channel in user.channels.items()}

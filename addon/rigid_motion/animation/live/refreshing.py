@@ -20,7 +20,7 @@ from ..compute.sources import Source
 from ..transforms import Refused, Transform
 from ..writers.filling import clear, fill_in, follow_ranges, hold, is_complete
 from ..writers.sampled import regroup
-from ..writers.table import outlet_of, release, remove_orphans
+from ..writers.table import release, remove_orphans, writer_of
 from .dense_keys import keep_motion
 from .inserted_keys import InsertedKeys
 
@@ -56,7 +56,7 @@ def refresh_places(
         sources = [keyed.get(place) for place in places]
     stale, idle, emptied, keyed_anew = [], [], [], []
     for place, source in zip(places, sources, strict=True):
-        outlet_of(place).show(place)
+        writer_of(place).show(place)
         # What is linked has the in-betweens that its own file was saved with.
         if not place.slot.action.is_editable:
             continue

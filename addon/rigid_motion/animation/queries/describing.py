@@ -17,7 +17,7 @@ from ..compute.components import PART_OF
 from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
 from ..curves import cycled
 from ..transforms import Transform, transform_of
-from ..writers.table import outlet_of
+from ..writers.table import writer_of
 from .keyed import active_place
 from .on_screen import seen_components
 
@@ -129,7 +129,7 @@ def shown_components(transform: Transform) -> np.ndarray | None:
         # What is beside the keys is one for all slots; what is in a slot of its own is so for each of them.
         places, parts = places[:1], [set().union(*parts)]
     for place, own in zip(places, parts, strict=True):
-        difference = outlet_of(place).difference(place, transform, None)
+        difference = writer_of(place).difference(place, transform, None)
         seen = seen_components(seen, transform.original(), difference, order, own)
     return seen
 

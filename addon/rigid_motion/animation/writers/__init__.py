@@ -2,7 +2,7 @@
 
 layout          how samples lie in F-curves
 sampled         F-curves without keys
-outlet          the interface of what writes differences
+writer          the interface of a writer
 deltas          objects
 times           which frame a constraint shows, and how much of it
 mounting        constraints on bones

@@ -21,7 +21,6 @@ from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_o
 from . import restoring
 from .layout import Layout
 from .mounting import constraint_of, dismount, has_stale, is_mounted, mount, slot_of_differences
-from .outlet import Outlet
 from .sampled import remove_if_empty, replace_samples
 from .times import (
     constraint_path,
@@ -35,9 +34,10 @@ from .times import (
     write_line,
     write_time,
 )
+from .writer import Writer
 
 
-class Constraints(Outlet):
+class ConstraintWriter(Writer):
     uses_constraints = True
 
     def layout(self, source: Source) -> Layout:

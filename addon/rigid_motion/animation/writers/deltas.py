@@ -13,11 +13,11 @@ from ..actions.slots import SlotTransform, is_filled_in, is_replacing, slot_tran
 from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
 from .layout import Layout
-from .outlet import Outlet
 from .sampled import hold_constants, replace_samples
+from .writer import Writer
 
 
-class Deltas(Outlet):
+class DeltaWriter(Writer):
     def layout(self, source: Source) -> Layout:
         return Layout.of(source)
 

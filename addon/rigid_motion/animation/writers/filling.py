@@ -2,7 +2,7 @@
 
 A sampled F-curve has a value on every whole frame and no keys: Blender alone evaluates it, and the Dope Sheet shows
 nothing of it. There are samples only where a mode counts, and only of components that it changes; which F-curves these
-are is up to the outlet. Where some have to lie outside of the keys, a manual frame range keeps the Action, its strips
+are is up to the writer. Where some have to lie outside of the keys, a manual frame range keeps the Action, its strips
 and exports from being longer for it.
 """
 
@@ -21,7 +21,7 @@ from ..compute.differences import NOTHING, differences
 from ..compute.known_sources import changed_range, recall
 from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
-from .table import outlet_of, release
+from .table import release, writer_of
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -41,9 +41,9 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
     longer, emptied = set(), []
     for (place, source), samples in zip(anew, differences(rounds), strict=True):
-        outlet = outlet_of(place)
-        layout, channels = outlet.layout(source), _channels(place, source)
-        outlet.write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
+        writer = writer_of(place)
+        layout, channels = writer.layout(source), _channels(place, source)
+        writer.write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
         _tag(place)
         record_in_betweens(place, source.digest, samples)
         if not samples:
@@ -57,7 +57,7 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
 def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
     """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
     old = recall(recorded_digest(place))
-    if old is None or old is source or outlet_of(place).layout(source).is_ring or not is_complete(place, source):
+    if old is None or old is source or writer_of(place).layout(source).is_ring or not is_complete(place, source):
         return None
     return changed_range(old, source)
 
@@ -116,19 +116,19 @@ def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], sour
 
 def is_complete(place: SlotTransform, source: Source) -> bool:
     """Whether all F-curves are as they were written for a source."""
-    outlet, channels, curves = outlet_of(place), _channels(place, source), place.filled
-    layout, written = outlet.layout(source), [channels.get(row) for row in recorded_rows(place)]
+    writer, channels, curves = writer_of(place), _channels(place, source), place.filled
+    layout, written = writer.layout(source), [channels.get(row) for row in recorded_rows(place)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
-        and outlet.is_shown(place, layout, written)
+        and writer.is_shown(place, layout, written)
     )
 
 
 def clear(places: Sequence[SlotTransform]) -> None:
     """Take the in-betweens out of slots, and give their users their original differences back."""
     for place in places:
-        outlet_of(place).write(place, {}, None)
+        writer_of(place).write(place, {}, None)
         _tag(place)
         record_in_betweens(place, "", ())
     release(user for place in places for user in place.users)
@@ -142,7 +142,7 @@ def follow_ranges(actions: Iterable[bpy.types.Action]) -> None:
 
 def hold(place: SlotTransform, beside: Sequence[SlotTransform]) -> None:
     """Have a slot hold what the NLA needs of it beside others that are filled in, which are among these."""
-    if outlet_of(place).hold(place, beside):
+    if writer_of(place).hold(place, beside):
         _tag(place)
 
 

@@ -7,17 +7,17 @@ from collections.abc import Iterable
 
 from ..actions.slots import Slot, SlotTransform
 from ..transforms import BoneTransform, ObjectTransform, Transform
-from .constraints import Constraints
-from .deltas import Deltas
-from .outlet import Outlet
+from .constraints import ConstraintWriter
+from .deltas import DeltaWriter
+from .writer import Writer
 
-OUTLETS: dict[type[Transform], Outlet] = {BoneTransform: Constraints(), ObjectTransform: Deltas()}
+WRITERS: dict[type[Transform], Writer] = {BoneTransform: ConstraintWriter(), ObjectTransform: DeltaWriter()}
 """A row for each of the `transforms.KINDS`."""
 
 
-def outlet_of(place: SlotTransform) -> Outlet:
+def writer_of(place: SlotTransform) -> Writer:
     """Where the differences of a transform go."""
-    return OUTLETS[place.kind]
+    return WRITERS[place.kind]
 
 
 def release(transforms: Iterable[Transform]) -> None:
@@ -26,11 +26,11 @@ def release(transforms: Iterable[Transform]) -> None:
     for transform in transforms:
         by_kind[transform.kind].append(transform)
     for kind, same in by_kind.items():
-        OUTLETS[kind].release(same)
+        WRITERS[kind].release(same)
 
 
 def remove_orphans(places: Iterable[SlotTransform]) -> None:
     """Take out of the slots of these what is left in them of parts that none of their users has any more."""
-    slots: dict[tuple[Slot, Outlet], None] = {(place.slot, outlet_of(place)): None for place in places}
-    for slot, outlet in slots:
-        outlet.remove_orphans(slot)
+    slots: dict[tuple[Slot, Writer], None] = {(place.slot, writer_of(place)): None for place in places}
+    for slot, writer in slots:
+        writer.remove_orphans(slot)

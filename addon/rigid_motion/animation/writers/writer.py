@@ -14,7 +14,7 @@ from ..transforms import Channel, Transform
 from .layout import Layout
 
 
-class Outlet(ABC):
+class Writer(ABC):
     """One way, for one kind of transform. It keeps nothing itself: all there is to it is in the file."""
 
     uses_constraints: ClassVar[bool] = False
