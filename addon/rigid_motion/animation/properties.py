@@ -1,7 +1,8 @@
 """What is kept in the file, on Actions and on objects. Without the extension all of it is inert, and stays in the file.
 
 An Action keeps the modes of what it moves: see `records`. An object or a pose bone shows its own, to be chosen and to
-be animated; an object keeps the delta transforms that it has without in-betweens.
+be animated; an object keeps the delta transforms that it has without in-betweens. Files have the properties by the
+names that these were first given, so no property is ever renamed.
 """
 
 from __future__ import annotations

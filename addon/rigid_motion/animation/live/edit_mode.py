@@ -13,13 +13,13 @@ from bpy.app.handlers import persistent
 
 from ..actions.renaming import follow_renamed_in
 from ..handlers import append_handlers, remove_handlers
-from ..writers.mounting import lay_aside, take_up
+from ..writers.bone_constraints import attach_slots, detach_slots
 
 
 def follow_mode(rig: bpy.types.Object) -> None:
     """Have the constraints of a rig show nothing in Edit Mode, and their slots again outside of it."""
     if rig.mode == "EDIT":
-        lay_aside(rig)
+        detach_slots(rig)
         # Most edits find it set, and to set it again would be an edit.
         if not rig.rigid_motion.laid_aside:
             rig.rigid_motion.laid_aside = True
@@ -30,7 +30,7 @@ def follow_mode(rig: bpy.types.Object) -> None:
 def _put_back(rig: bpy.types.Object) -> None:
     if rig.rigid_motion.laid_aside:
         follow_renamed_in(rig)
-        take_up(rig)
+        attach_slots(rig)
         rig.rigid_motion.laid_aside = False
 
 

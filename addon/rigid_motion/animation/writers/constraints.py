@@ -19,8 +19,15 @@ from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
 from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_ours, is_part, prefix_of, split_path
 from . import restoring
+from .bone_constraints import (
+    constraint_of,
+    ensure_constraint,
+    has_constraint,
+    has_stale_constraint,
+    remove_constraints,
+    slot_of_differences,
+)
 from .layout import Layout
-from .mounting import constraint_of, dismount, has_stale, is_mounted, mount, slot_of_differences
 from .sampled import remove_if_empty, replace_samples
 from .times import (
     constraint_path,
@@ -51,8 +58,8 @@ class ConstraintWriter(Writer):
             place.has_filled(curves)
             write_time(place, layout)
             for user in place.users:
-                if user.animated.is_editable and not is_mounted(user, place):
-                    mount(user, place)
+                if user.animated.is_editable and not has_constraint(user, place):
+                    ensure_constraint(user, place)
         elif present:
             remove_time(place)
             replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
@@ -63,14 +70,14 @@ class ConstraintWriter(Writer):
         if not channels:
             return True
         time = time_of(place)
-        return time is not None and says(time, layout) and all(is_mounted(user, place) for user in place.users)
+        return time is not None and says(time, layout) and all(has_constraint(user, place) for user in place.users)
 
     def show(self, place: SlotTransform) -> None:
         for user in place.users:
             if user.animated.is_editable:
-                if place.filled and not is_mounted(user, place):
-                    mount(user, place)
-                if has_stale(user, place):
+                if place.filled and not has_constraint(user, place):
+                    ensure_constraint(user, place)
+                if has_stale_constraint(user, place):
                     self.release([user])
 
     def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
@@ -159,7 +166,7 @@ class ConstraintWriter(Writer):
                     shown.setdefault(user, set()).add(slot_of_differences(place))
         for bone in bones:
             if bone.animated.is_editable:
-                dismount(bone, shown.get(bone, set()))
+                remove_constraints(bone, shown.get(bone, set()))
 
 
 def _avoid_names(place: SlotTransform) -> None:

@@ -6,7 +6,7 @@ import bpy
 
 from ..actions.slots import SlotTransform
 from ..transforms import BoneTransform, Transform, is_ours
-from .mounting import SETTINGS, constraint_of, mount, shown_by, slot_of_differences
+from .bone_constraints import SETTINGS, constraint_of, ensure_constraint, shown_by, slot_of_differences
 from .times import name_of
 
 REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
@@ -56,7 +56,7 @@ def restore(user: BoneTransform, place: SlotTransform) -> None:
             if one.type == "ACTION" and shown_by(one) == wanted:
                 one.name, one.use_eval_time = name, True
                 break
-    mount(user, place)
+    ensure_constraint(user, place)
     constraint = constraint_of(user, place)
     for setting, value in SETTINGS.items():
         setattr(constraint, setting, value)

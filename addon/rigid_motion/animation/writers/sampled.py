@@ -81,7 +81,7 @@ def _constant(fcurve: bpy.types.FCurve) -> float | None:
     return next((point.co[1] for point in fcurve.sampled_points), None)
 
 
-def put_away(channelbag: bpy.types.ActionChannelbag, group: str, fcurve: bpy.types.FCurve) -> None:
+def hide_fcurve(channelbag: bpy.types.ActionChannelbag, group: str, fcurve: bpy.types.FCurve) -> None:
     """Take an F-curve out of the animator's way: into a group, locked, and hidden in the Graph Editor."""
     fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
     fcurve.lock = fcurve.hide = True
@@ -98,7 +98,7 @@ def regroup(place: SlotTransform) -> None:
     for channel in {of_rotation[row] for of_rotation in channels for row in rows if row in of_rotation}:
         fcurve = channelbag.fcurves.find(channel[0], index=channel[1])
         if fcurve is not None and channel not in place.filled and not fcurve.keyframe_points:
-            put_away(channelbag, group, fcurve)
+            hide_fcurve(channelbag, group, fcurve)
             place.has_filled({**place.filled, channel: fcurve})
 
 
@@ -112,7 +112,7 @@ def remove_if_empty(channelbag: bpy.types.ActionChannelbag, group: str) -> None:
 def _new(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, count: int) -> bpy.types.FCurve:
     path, index = channel
     fcurve = channelbag.fcurves.new(path, index=index)
-    put_away(channelbag, group, fcurve)
+    hide_fcurve(channelbag, group, fcurve)
     fcurve.keyframe_points.add(1)
     fcurve.convert_to_samples(0, count)
     return fcurve

@@ -22,7 +22,7 @@ from ..actions.slots import Slot, SlotTransform, strips_of
 from ..curves import Cycles
 from ..transforms import CONSTRAINT, WIDTHS, Channel, bone_name
 from .layout import Layout
-from .sampled import put_away, remove_if_empty
+from .sampled import hide_fcurve, remove_if_empty
 
 MOST_FRAMES = 1_048_574
 """The last frame that Blender lets a constraint have."""
@@ -134,7 +134,7 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
     frames, times = np.array(_seams(layout)).T
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
-    put_away(place.channelbag, bone_name(place.prefix), fcurve)
+    hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
 
 
 def write_line(place: SlotTransform, path: str, line: Line) -> None:
@@ -143,7 +143,7 @@ def write_line(place: SlotTransform, path: str, line: Line) -> None:
     generator = fcurve.modifiers.new("GENERATOR")
     generator.poly_order = 1
     generator.coefficients = line
-    put_away(place.channelbag, bone_name(place.prefix), fcurve)
+    hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
 
 
 def says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:

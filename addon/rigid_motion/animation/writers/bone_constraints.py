@@ -33,8 +33,8 @@ def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action |
     return constraint.action, handle
 
 
-def lay_aside(rig: bpy.types.Object) -> None:
-    """Have the constraints of a rig show no slot for now, which they remember by its name.
+def detach_slots(rig: bpy.types.Object) -> None:
+    """Have the constraints of a rig show no slot for now; they keep its name.
 
     Blender's Symmetrize mirrors the keys of what Action constraints show, and crashes on F-curves that have none.
     """
@@ -43,8 +43,8 @@ def lay_aside(rig: bpy.types.Object) -> None:
             constraint.action_slot = None
 
 
-def take_up(rig: bpy.types.Object) -> None:
-    """Have the constraints of a rig that were laid aside show their slots again."""
+def attach_slots(rig: bpy.types.Object) -> None:
+    """Have the constraints of a rig that were detached show their slots again."""
     for constraint in _constraints_on(rig):
         if not constraint.action_slot_handle and (slot := _last_slot(constraint)) is not None:
             constraint.action_slot = slot
@@ -66,15 +66,15 @@ def slot_of_differences(place: SlotTransform) -> tuple[bpy.types.Action, int]:
     return place.slot.action, handle
 
 
-def is_mounted(user: Transform, place: SlotTransform) -> bool:
+def has_constraint(user: Transform, place: SlotTransform) -> bool:
     """Whether a bone has its constraint as it has to be, or somebody took it off."""
     constraint = constraint_of(user, place)
     if constraint is None:
-        return not _is_free_to_mount(user, place)
+        return not _may_add_constraint(user, place)
     return (constraint.name, constraint.frame_start, constraint.frame_end) == (name_of(place), *span_of(place))
 
 
-def has_stale(user: BoneTransform, place: SlotTransform) -> bool:
+def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
     shown = [shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
     if not shown or shown == [slot_of_differences(place)]:
@@ -82,18 +82,18 @@ def has_stale(user: BoneTransform, place: SlotTransform) -> bool:
     return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
 
 
-def _is_free_to_mount(user: Transform, place: SlotTransform) -> bool:
+def _may_add_constraint(user: Transform, place: SlotTransform) -> bool:
     """Whether a bone lacks a constraint that nobody took off it."""
     name = name_of(place)
     present = user.carrier.constraints.get(name)
     return name not in user.motion.mounted.split("\n") or (present is not None and is_ours(present))
 
 
-def mount(user: BoneTransform, place: SlotTransform) -> None:
+def ensure_constraint(user: BoneTransform, place: SlotTransform) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
     constraints, name = user.carrier.constraints, name_of(place)
     constraint = constraint_of(user, place) or constraints.get(name)
-    if constraint is not None and not (is_ours(constraint) and _is_to_be_had(constraint, user, place)):
+    if constraint is not None and not (is_ours(constraint) and _can_be_reused(constraint, user, place)):
         # This slot gets a constraint of another name when it is written.
         return
     if constraint is None:
@@ -148,7 +148,7 @@ def _renamed(
     return constraint
 
 
-def _is_to_be_had(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
+def _can_be_reused(constraint: bpy.types.ActionConstraint, user: BoneTransform, place: SlotTransform) -> bool:
     """Whether a constraint shows a slot already, or one that does not move the rig any more."""
     shown = shown_by(constraint)
     return shown == slot_of_differences(place) or shown not in _in_use(user.animated)
@@ -164,7 +164,7 @@ def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
     }
 
 
-def dismount(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
+def remove_constraints(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
     """Take the constraints off a bone that show something else than these."""
     constraints, names, left = user.carrier.constraints, [], set(shown)
     for constraint in [one for one in constraints if is_ours(one)]:
