@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from rigid_motion import animation
-from rigid_motion.animation import constraint_trouble, mend, modes_of, set_mode
+from rigid_motion.animation import constraint_trouble, modes_of, restore_constraints, set_mode
 from rigid_motion.animation.transforms import CONSTRAINT, Refused, transform_of
-from rigid_motion.animation.writers.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from rigid_motion.animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from rigid_motion.ui import menus
 from rigid_motion.ui.notes import facts_and_notes
 from rigid_motion.ui.targets import (
@@ -421,11 +421,11 @@ def test_what_has_no_in_betweens_has_no_trouble_and_cannot_be_mended(rig):
     tool = keyed("Tool")
     set_mode(tool, SCREW)
     refused = []
-    mend([tool, bone(rig)], refused=refused)
+    restore_constraints([tool, bone(rig)], refused=refused)
     assert [str(refusal).split(" has ")[0] for refusal in refused] == ["Tool", "Rig/Hand"]
     assert constraint_trouble(tool) == constraint_trouble(bone(rig)) == ""
     with pytest.raises(Refused, match="choose a mode"):
-        mend(bone(rig))
+        restore_constraints(bone(rig))
 
 
 def test_a_mended_constraint_is_one_step_of_undo(rig):

@@ -31,8 +31,8 @@ from .baking.reducing import (
 )
 from .baking.sizes import radius_of
 from .compute.sources import MODE_IDS
-from .edits.mending import constraint_trouble, mend
 from .edits.mode_keys import set_mode
+from .edits.repair import constraint_trouble, restore_constraints
 from .live import edit_mode, follower
 from .live.follower import refresh, set_enabled
 from .queries.keyed import key_frames, modes_of
@@ -53,7 +53,6 @@ __all__ = [
     "is_baked",
     "is_reduced",
     "key_frames",
-    "mend",
     "modes_of",
     "problem_of",
     "radius_of",
@@ -62,6 +61,7 @@ __all__ = [
     "reduction_of",
     "refresh",
     "register",
+    "restore_constraints",
     "restore_keys",
     "set_enabled",
     "set_mode",

@@ -17,7 +17,7 @@ from .. import animation
 from ..animation import Refused
 from ..animation.baking.copies import BAKED, REDUCED, entries_of
 from ..animation.baking.sizes import first_tolerance
-from ..animation.edits.mending import with_troubles
+from ..animation.edits.repair import with_troubles
 from ..animation.live.follower import paused
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.polls import with_in_betweens, with_modes, with_more_keys_than
@@ -449,11 +449,11 @@ class RIGID_MOTION_OT_mend(OnTargets, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(with_troubles(each_target(context)))
 
-        def mend(refused: list[Refused]) -> str:
-            animation.mend(targets, refused=refused)
+        def restore(refused: list[Refused]) -> str:
+            animation.restore_constraints(targets, refused=refused)
             return rpt_("constraint restored")
 
-        return self.act(targets, mend)
+        return self.act(targets, restore)
 
 
 class RIGID_MOTION_OT_refresh(bpy.types.Operator):

@@ -15,7 +15,7 @@ from ..animation import Reduction, WholeRig
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.describing import SegmentFacts
 from ..animation.transforms import Transform
-from ..animation.writers.restoring import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from ..animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""

@@ -2,7 +2,7 @@
 
 acting     targets, refusals and one refresh for every verb
 mode_keys  choosing modes
-mending    constraints of bones, put back
+repair     constraints of bones, put back
 
 Each module imports only those above it.
 """

@@ -18,7 +18,7 @@ from ..actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, 
 from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
 from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_ours, is_part, prefix_of, split_path
-from . import restoring
+from . import constraint_repair
 from .bone_constraints import (
     constraint_of,
     ensure_constraint,
@@ -117,10 +117,10 @@ class ConstraintWriter(Writer):
         return bool(missing) or len(present) > len(held)
 
     def trouble_of(self, user: Transform, place: SlotTransform) -> str:
-        return restoring.trouble_of(user, place)
+        return constraint_repair.trouble_of(user, place)
 
     def restore(self, user: Transform, place: SlotTransform) -> None:
-        restoring.restore(user, place)
+        constraint_repair.restore(user, place)
 
     def remove_orphans(self, slot: Slot) -> None:
         """Take out what a slot has for bones that are in none of its users any more, and are not keyed in it either.

@@ -58,7 +58,7 @@ class Writer(ABC):
         """
 
     def trouble_of(self, user: Transform, place: SlotTransform) -> str:
-        """What keeps a user from being seen where its in-betweens have it, see `restoring`; "" where nothing does."""
+        """Why a user is not seen where its in-betweens have it, see `constraint_repair`; "" where nothing is amiss."""
         return ""
 
     def restore(self, user: Transform, place: SlotTransform) -> None:

@@ -20,7 +20,7 @@ def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform
     Returns
     -------
     str
-        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `writers.restoring`; "" where its
+        `REMOVED`, `OTHER_SLOT`, `MUTED`, `CHANGED`, `NOT_FIRST` or `WEAK`, see `constraint_repair`; "" where its
         constraint is as it was made, where there are no in-betweens, and for objects, which need no constraint.
     """
     transform = transform_of(target)
@@ -36,7 +36,7 @@ def with_troubles(transforms: Iterable[Transform]) -> Iterator[Transform]:
             yield transform
 
 
-def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
+def restore_constraints(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     """Put the constraints of bones back: first in their stack, unmuted, with full influence.
 
     Parameters
@@ -44,7 +44,7 @@ def mend(targets: Targets, *, refused: list[Refused] | None = None) -> None:
     targets : bpy.types.PoseBone, or several of them
         Where nothing is amiss, nothing changes.
     refused : list, optional
-        Takes the refusals, and all others are mended.
+        Takes the refusals, and those of all others are put back.
 
     Raises
     ------
