@@ -9,7 +9,7 @@ import bpy
 import pytest
 
 from rigid_motion.animation import Reduction
-from rigid_motion.animation.queries.describing import SegmentFacts
+from rigid_motion.animation.queries.segments import SegmentFacts
 from rigid_motion.ui.wording import cautions, degrees, length, listed, reduction_summary, wrapped
 
 PLAIN = SegmentFacts(

@@ -8,7 +8,8 @@ from .. import animation
 from ..animation.actions.records import recorded_digest
 from ..animation.actions.slots import places_of
 from ..animation.compute.sources import Source
-from ..animation.queries.describing import (
+from ..animation.queries.keyed import active_place, source_of
+from ..animation.queries.segments import (
     SegmentFacts,
     frame_in_action,
     has_edited_differences,
@@ -16,7 +17,6 @@ from ..animation.queries.describing import (
     is_up_to_date,
     segment_at,
 )
-from ..animation.queries.keyed import active_place, source_of
 from ..animation.transforms import Transform, transform_of
 from .wording import BAKED, BLENDED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS, TROUBLES, cautions
 

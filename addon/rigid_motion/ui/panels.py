@@ -11,8 +11,8 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
 from ..animation.compute.components import SCALE
-from ..animation.queries.describing import SegmentFacts, parts_with_in_betweens
 from ..animation.queries.polls import with_in_betweens
+from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
 from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes

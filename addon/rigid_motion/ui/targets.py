@@ -14,9 +14,9 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..animation import Refused, key_frames, modes_of
-from ..animation.queries.describing import frame_in_action, segment_at
 from ..animation.queries.keyed import source_of
 from ..animation.queries.polls import with_more_keys_than
+from ..animation.queries.segments import frame_in_action, segment_at
 from ..animation.transforms import MODE_PROPERTY, WIDTHS, Transform, bone_name, split_path, transform_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")

@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..animation import Reduction, WholeRig
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
-from ..animation.queries.describing import SegmentFacts
+from ..animation.queries.segments import SegmentFacts
 from ..animation.transforms import Transform
 from ..animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 

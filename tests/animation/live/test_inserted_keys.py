@@ -10,7 +10,7 @@ import pytest
 from mathutils import Euler, Matrix
 
 from rigid_motion.animation import key_frames, set_mode
-from rigid_motion.animation.compute.known_sources import MOST_BYTES, known, size_of
+from rigid_motion.animation.compute.source_cache import MOST_BYTES, known, size_of
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object, push_down, tweak
 

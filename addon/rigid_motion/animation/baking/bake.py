@@ -24,7 +24,7 @@ from ..actions.channels import (
 from ..actions.slots import SlotTransform
 from ..compute.differences import SMOOTH, in_betweens
 from ..compute.sources import SAME_FRAME, Source
-from ..edits.acting import Readings, Target, Targets, act_on, readable, transforms_of
+from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_mode_in, set_whole
 from ..transforms import Refused, Transform, transform_of
 from ..writers.channel_values import channel_values
@@ -139,7 +139,7 @@ def bake(
             max(float(frames[-1]) for *_, frames in planned),
         )
 
-    ranges = act_on(targets, plan, act, refused).values()
+    ranges = apply_edit(targets, plan, act, refused).values()
     return min((begin for begin, _ in ranges), default=0.0), max((end for _, end in ranges), default=0.0)
 
 
@@ -170,7 +170,7 @@ def go_back(targets: Targets, kind: str, refused: list[Refused] | None) -> None:
         refuse_tweak_mode(transform)
 
     lookup = Lookup(transforms_of(targets))
-    act_on(targets, plan, lambda transform, _: put_back(transform, kind, lookup), refused)
+    apply_edit(targets, plan, lambda transform, _: put_back(transform, kind, lookup), refused)
 
 
 def is_baked(target: Target) -> bool:

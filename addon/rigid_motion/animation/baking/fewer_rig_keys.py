@@ -21,7 +21,7 @@ from ...motion.quaternions import align_signs
 from ..actions.reading import sources_of_users
 from ..actions.slots import Slot, SlotTransform, transforms_in
 from ..compute.sources import SAME_FRAME, Source, distinct
-from ..edits.acting import Readings, readable
+from ..edits.apply import Readings, readable
 from ..transforms import Refused, Transform, transform_of
 from .fewer_keys import (
     SMALLEST,

@@ -22,7 +22,7 @@ from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.slots import places_of, slots_of, transforms_in
 from ..compute.sources import MODE_NAMES, distinct
-from ..edits.acting import Readings, Target, Targets, act_on, readable, transforms_of
+from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
 from ..queries.keyed import segment_modes
 from ..transforms import Refused, Transform, is_ours, transform_of
@@ -161,7 +161,7 @@ def reduce_keys_of(
         for reduced in fewer:
             _write(transform, reduced)
 
-    done = act_on(targets, plan, act, refused, survey=survey)
+    done = apply_edit(targets, plan, act, refused, survey=survey)
     return reduction_of(list(done)[-1]) if done else None
 
 
@@ -241,7 +241,7 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
     Refused
         Where the keys of a target are not reduced, or gone, and there is no list to take that. Nothing is changed then.
     """
-    act_on(
+    apply_edit(
         targets,
         lambda transform, _: refuse_without_original(transform, REDUCED),
         lambda transform, _: discard_originals(transform, REDUCED),

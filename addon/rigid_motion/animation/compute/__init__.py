@@ -1,10 +1,10 @@
 """From what is keyed to the differences between Blender's in-betweens and those of the modes: NumPy alone.
 
-components     the rows of arrays: location, rotation, scale
-sources        what is keyed, as arrays with a digest
-known_sources  the sources of earlier edits, and what has changed since
-bodies         channels as poses of a body
-differences    from sources to differences
+components    the rows of arrays: location, rotation, scale
+sources       what is keyed, as arrays with a digest
+source_cache  the sources of earlier edits, and what has changed since
+bodies        channels as poses of a body
+differences   from sources to differences
 
 Each module imports only those above it.
 """

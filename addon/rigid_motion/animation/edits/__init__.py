@@ -1,6 +1,6 @@
 """What can be done to motions by hand or by script: the verbs behind operators, for many targets at once.
 
-acting     targets, refusals and one refresh for every verb
+apply      targets, refusals and one refresh for every verb
 mode_keys  choosing modes
 repair     constraints of bones, put back
 

@@ -25,7 +25,7 @@ from ..compute.sources import MODE_NUMBERS, SAME_FRAME
 from ..live import follower
 from ..queries.keyed import active_place, frames_in, modes_in
 from ..transforms import Channel, Refused, Transform
-from .acting import Readings, Targets, act_on
+from .apply import Readings, Targets, apply_edit
 
 
 def set_mode(
@@ -78,7 +78,7 @@ def set_mode(
     if mode not in MODE_NUMBERS:
         raise Refused(no_such_mode(mode, MODE_NUMBERS))
     whole = None if frames is not None else partial(replace, mode=MODE_NUMBERS[mode])
-    act_on(targets, plan, act, refused, whole)
+    apply_edit(targets, plan, act, refused, whole)
 
 
 def on_property(transform: Transform) -> None:

@@ -11,7 +11,7 @@ from ..actions.refusals import refuse_linked
 from ..actions.slots import Slot, SlotTransform, uses_of
 from ..transforms import Refused, Transform, transform_of
 from ..writers.table import WRITERS, writer_of
-from .acting import Readings, Targets, act_on
+from .apply import Readings, Targets, apply_edit
 
 
 def constraint_trouble(target: bpy.types.PoseBone | bpy.types.Object | Transform) -> str:
@@ -68,7 +68,7 @@ def restore_constraints(targets: Targets, *, refused: list[Refused] | None = Non
         for place in places:
             writer_of(place).restore(transform, place)
 
-    act_on(targets, plan, act, refused)
+    apply_edit(targets, plan, act, refused)
 
 
 def _troubles(transforms: Iterable[Transform]) -> Iterator[tuple[Transform, str]]:

@@ -1,7 +1,7 @@
 """Following edits: in-betweens are kept up to date with every edit in the file that is open.
 
 depsgraphs       which data-blocks were edited, by Blender's dependency graphs
-concerned        which objects have to do with modes
+modes_in_use     which objects have to do with modes
 raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
 inserted_keys    a key inserted in between keeps the pose on the screen

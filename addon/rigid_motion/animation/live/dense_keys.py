@@ -14,7 +14,7 @@ import numpy as np
 
 from ..actions.slots import SlotTransform
 from ..compute.differences import in_betweens
-from ..compute.known_sources import recall
+from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
 from ..writers.channel_values import channel_values
 from .inserted_keys import TOLERANCE
@@ -35,7 +35,7 @@ def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:
     bool
         Whether there were such keys.
     """
-    old = recall(before)
+    old = cached_source(before)
     if old is None or source.key_count <= old.key_count or old.order != source.order or old.keyed != source.keyed:
         return False
     inserted = _without(source.keyed_frames, old.keyed_frames)

@@ -18,14 +18,14 @@ from ..actions.mode_property import adopt_from_properties, show_awaited
 from ..actions.reading import leading
 from ..actions.renaming import forget_names
 from ..actions.slots import SlotTransform, choose_slots, filled_places_of, slot_transforms_of, slots_in
-from ..compute import known_sources
+from ..compute import source_cache
 from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from ..writers.table import release, writer_of
-from .concerned import all_under, concerns_us, has_bones, has_mode
 from .depsgraphs import BlockKey, actions_to_evaluate, edited_actions, key_of, objects_of, objects_to_evaluate
 from .inserted_keys import InsertedKeys
+from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
 from .refreshing import refresh_places
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
 from .snapshots import Snapshots
@@ -107,7 +107,9 @@ class Follower:
 
     def refresh(self, targets: Targets | None = None, *, again: bool = False) -> int:
         """Bring the in-betweens of these up to date, or of all in the file: see the function of this name."""
-        transforms = all_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
+        transforms = (
+            transforms_under(bpy.data.objects) if targets is None else [transform_of(target) for target in targets]
+        )
         with self.turn() as is_first:
             if not is_first:
                 return 0
@@ -153,9 +155,9 @@ class Follower:
                 # Only the original has an identity: that of the evaluated scene is 0.
                 scene, frames = block.original, (block.frame_start, block.frame_end)
                 if self.ranges.get(scene.session_uid) != frames:
-                    edited += all_under(filter(concerns_us, scene.objects))
+                    edited += transforms_under(filter(uses_modes, scene.objects))
                 self.ranges[scene.session_uid] = frames
-            if isinstance(block, bpy.types.Object) and concerns_us(block):
+            if isinstance(block, bpy.types.Object) and uses_modes(block):
                 for transform in self.edited_of(block.original):
                     if transform not in seen:
                         self.inserted.notice_pose(transform, self.frame)
@@ -179,7 +181,7 @@ class Follower:
         Returns the objects of which anything was, as far as they have to do with modes.
         """
         waiting = objects_to_evaluate(scene, self.evaluated)
-        edited = {obj: depsgraph for obj, depsgraph in waiting if concerns_us(obj)}
+        edited = {obj: depsgraph for obj, depsgraph in waiting if uses_modes(obj)}
         operator = _last_operator()
         name = operator[1] if operator != self.operator else ""
         self.operator = operator
@@ -210,7 +212,7 @@ class Follower:
             self.look_through(again=again)
         else:
             self.keep_ranges()
-            self.refresh(all_under(filter(concerns_us, bpy.data.objects)), again=again)
+            self.refresh(transforms_under(filter(uses_modes, bpy.data.objects)), again=again)
 
     def keep_ranges(self) -> None:
         self.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
@@ -248,7 +250,7 @@ class Follower:
         if self.unseen:
             self.look_through()
         elif edited:
-            self.refresh(all_under(edited))
+            self.refresh(transforms_under(edited))
         self.waiting = []
         self.inserted.forget_poses()
         self.frame = scene.frame_current_final
@@ -258,11 +260,11 @@ class Follower:
         self.look_again(again=True)
 
     def after_load(self, *_: object) -> None:
-        known_sources.forget_all()
+        source_cache.clear()
         self.begin_file()
         with self.turn() as is_first:
             if is_first:
-                transforms = all_under(bpy.data.objects)
+                transforms = transforms_under(bpy.data.objects)
                 moved = {user for place in slot_transforms_of(transforms) for user in place.users}
                 adopt_from_properties(transform for transform in transforms if transform not in moved)
         self.look_again()

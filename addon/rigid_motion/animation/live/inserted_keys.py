@@ -28,9 +28,9 @@ import numpy as np
 
 from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
-from ..compute.known_sources import recall
+from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
-from ..queries.on_screen import seen_components
+from ..queries.visible_pose import visible_components
 from ..transforms import Channel, Transform
 from ..writers.table import writer_of
 
@@ -122,7 +122,7 @@ class InsertedKeys:
         bool
             Whether there was such a key.
         """
-        old = recall(before)
+        old = cached_source(before)
         if old is None or source.key_count <= old.key_count or old.order != source.order:
             return False
         users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
@@ -155,7 +155,7 @@ class InsertedKeys:
             self._inserted[change] = shown
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
-        for channel, value in _on_screen(user, place, old, shown, frame).items():
+        for channel, value in _visible_values(user, place, old, shown, frame).items():
             if (fcurve := place.curves.get(channel)) is not None:
                 _set_key(fcurve, frame, value)
         return True
@@ -185,13 +185,13 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
     return True
 
 
-def _on_screen(
+def _visible_values(
     user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
 ) -> dict[Channel, float]:
     """The values of the channels that, with the original difference alone, look as the screen does."""
     filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
-    seen = seen_components(shown, old.original, difference, old.order, parts)
+    seen = visible_components(shown, old.original, difference, old.order, parts)
     return {channel: seen[row] for row, channel in user.channels.items()}
 
 

@@ -15,7 +15,7 @@ from ..actions.records import recorded_digest
 from ..actions.refusals import refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, read_again, slot_transforms_of
-from ..compute import known_sources
+from ..compute.source_cache import cache_source
 from ..compute.sources import Source
 from ..transforms import Refused, Transform
 from ..writers.filling import clear, fill_in, follow_ranges, hold, is_complete
@@ -51,8 +51,8 @@ def refresh_places(
     follow_renamed(places)
     show_modes(places)
     if sources is None:
-        concerned = [place for place in places if has_to_do_with_modes(place)]
-        keyed = dict(zip(concerned, keyed_in(concerned), strict=True))
+        with_modes = [place for place in places if has_to_do_with_modes(place)]
+        keyed = dict(zip(with_modes, keyed_in(with_modes), strict=True))
         sources = [keyed.get(place) for place in places]
     stale, idle, emptied, keyed_anew = [], [], [], []
     for place, source in zip(places, sources, strict=True):
@@ -118,7 +118,7 @@ def _is_wanted(place: SlotTransform, source: Source | Refused | None, before: st
             return False
         if not source.is_live:
             return False
-    known_sources.remember(source)
+    cache_source(source)
     return True
 
 

@@ -1,10 +1,10 @@
 """What the user interface and scripts ask of motions. Nothing is changed.
 
-on_screen   what is seen, as properties
-keyed       keys in the slot that the editors show, and their modes
-describing  one segment in numbers, and where something is seen
-problems    why something does not move as its mode says
-polls       what is asked of many at every redraw
+visible_pose  what is seen, as properties
+keyed         keys in the slot that the editors show, and their modes
+segments      one segment in numbers, and where something is seen
+problems      why something does not move as its mode says
+polls         what is asked of many at every redraw
 
 Each module imports only those above it.
 """

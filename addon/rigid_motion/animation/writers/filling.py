@@ -18,7 +18,7 @@ from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
 from ..actions.slots import SlotTransform, is_filled_in, is_time
 from ..compute.components import PART_OF, ROTATION
 from ..compute.differences import NOTHING, differences
-from ..compute.known_sources import changed_range, recall
+from ..compute.source_cache import cached_source, changed_range
 from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
 from .table import release, writer_of
@@ -56,7 +56,7 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
 
 def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
     """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
-    old = recall(recorded_digest(place))
+    old = cached_source(recorded_digest(place))
     if old is None or old is source or writer_of(place).layout(source).is_ring or not is_complete(place, source):
         return None
     return changed_range(old, source)

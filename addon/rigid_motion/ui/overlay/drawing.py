@@ -17,7 +17,7 @@ import gpu
 import numpy as np
 from mathutils import Vector
 
-from ...animation.queries.describing import frame_in_action
+from ...animation.queries.segments import frame_in_action
 from ...animation.transforms import transform_of
 from ..look import DEFAULT_LOOK, Color
 from ..preferences import preferences

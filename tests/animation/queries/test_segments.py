@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import refresh, set_enabled, set_mode, write_channel
-from rigid_motion.animation.queries.describing import frame_in_action, is_up_to_date, segment_at
 from rigid_motion.animation.queries.keyed import source_of
+from rigid_motion.animation.queries.segments import frame_in_action, is_up_to_date, segment_at
 from tests.animation.scenes import new_object
 
 FRAMES = np.array((1.0, 11.0, 31.0))

@@ -29,7 +29,7 @@ class _Sources(OrderedDict[str, Source]):
 known = _Sources()
 
 
-def remember(source: Source) -> None:
+def cache_source(source: Source) -> None:
     """Keep a source; those that were not used for longest go where there is no room."""
     known.drop(source.digest)
     known[source.digest] = source
@@ -38,12 +38,12 @@ def remember(source: Source) -> None:
         known.drop(next(iter(known)))
 
 
-def recall(digest: str) -> Source | None:
+def cached_source(digest: str) -> Source | None:
     """The source with this digest, None where it is not known any more."""
     return known.get(digest)
 
 
-def forget_all() -> None:
+def clear() -> None:
     """Forget the sources of a file that is no longer open."""
     known.clear()
     known.size = 0

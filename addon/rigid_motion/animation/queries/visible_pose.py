@@ -10,7 +10,7 @@ from mathutils import Euler, Quaternion
 from ..compute.components import LOCATION, ROTATION, ROWS, SCALE
 
 
-def seen_components(
+def visible_components(
     components: np.ndarray, original: np.ndarray, difference: np.ndarray, order: str | None, parts: Collection[str]
 ) -> np.ndarray:
     """What the properties would have to be to look the same with the original difference alone.

@@ -19,7 +19,7 @@ from ..curves import cycled
 from ..transforms import Transform, transform_of
 from ..writers.table import writer_of
 from .keyed import active_place
-from .on_screen import seen_components
+from .visible_pose import visible_components
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -130,7 +130,7 @@ def shown_components(transform: Transform) -> np.ndarray | None:
         places, parts = places[:1], [set().union(*parts)]
     for place, own in zip(places, parts, strict=True):
         difference = writer_of(place).difference(place, transform, None)
-        seen = seen_components(seen, transform.original(), difference, order, own)
+        seen = visible_components(seen, transform.original(), difference, order, own)
     return seen
 
 

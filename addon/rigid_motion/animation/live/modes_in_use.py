@@ -10,7 +10,7 @@ from ..actions.slots import actions_of
 from ..transforms import Transform, is_part, transform_of
 
 
-def all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
+def transforms_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
     """These objects, and of rigs all bones that their Actions move, or that have modes or constraints for them."""
     found: dict[Transform, None] = {}
     for obj in objects:
@@ -20,7 +20,7 @@ def all_under(objects: Iterable[bpy.types.Object]) -> list[Transform]:
     return list(found)
 
 
-def concerns_us(obj: bpy.types.Object) -> bool:
+def uses_modes(obj: bpy.types.Object) -> bool:
     """Whether an object or its bones have, or had, anything to do with modes."""
     if obj.rigid_motion.has_bones or _has_properties(obj):
         return True

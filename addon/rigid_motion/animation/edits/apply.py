@@ -37,7 +37,7 @@ def transforms_of(targets: Targets) -> list[Transform]:
     return list(dict.fromkeys(map(transform_of, (targets,) if single else targets)))
 
 
-def act_on(
+def apply_edit(
     targets: Targets,
     plan: Callable[[Transform, Readings], Plan],
     act: Callable[[Transform, Plan], Result],

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import set_mode
-from rigid_motion.animation.compute.known_sources import changed_range, remember
+from rigid_motion.animation.compute.source_cache import cache_source, changed_range
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.animation.writers import filling
 from tests.animation.oracle import WIDTHS, assert_shown, curves_of
@@ -95,7 +95,7 @@ def test_an_edit_of_a_key_computes_the_frames_around_it_and_leaves_the_others(
 def test_where_nothing_is_known_of_the_source_before_all_is_computed(live_file):
     obj = tool()
     old = source_of(obj)
-    remember(old)
+    cache_source(old)
     set_mode(obj, "lerp_slerp")
     assert changed_range(old, source_of(obj)) is None, "another mode changes all"
     set_mode(obj, "dq_sclerp")
