@@ -53,6 +53,7 @@ UNSEEN = {
     "Whether the constraints of bones show nothing, for as long as the rig is in Edit Mode",
     # For the log, and for those who call the program from Python
     "In-betweens could not be brought up to date",
+    "neither an object nor a pose bone: ",
     "Keys are not in memory as expected, and are read by Blender's own functions, which takes longer",
     "The paths could not be drawn",
     "The transform on the screen cannot be shown",

@@ -260,9 +260,9 @@ class RigEditing(Editing):
             for bag in channelbags(action):
                 assert bag.slot_handle not in slots or len(bag.fcurves), f"an empty slot is left in {action.name}"
                 for fcurve in bag.fcurves:
-                    is_ours = bag.slot_handle in slots or CONSTRAINT in fcurve.data_path
+                    is_of_extension = bag.slot_handle in slots or CONSTRAINT in fcurve.data_path
                     path = fcurve.data_path[: fcurve.data_path.find('"]') + 2]
-                    if is_ours and path.startswith("pose"):
+                    if is_of_extension and path.startswith("pose"):
                         # What a bone leaves behind that is deleted is Blender's to keep.
                         assert path in live or path not in present, f"{fcurve.data_path} is left in {action.name}"
                     elif len(fcurve.keyframe_points):

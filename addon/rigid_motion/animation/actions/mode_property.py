@@ -15,7 +15,7 @@ from .records import NOTHING_RECORDED, has_in_betweens, has_mode, record_mode, r
 from .slots import SlotTransform
 
 
-def await_mode(transform: Transform, mode: str) -> None:
+def set_pending_mode(transform: Transform, mode: str) -> None:
     """Keep a mode until there is an Action to keep it."""
     motion = transform.motion
     motion.awaited = mode
@@ -54,7 +54,7 @@ def show_modes(places: Iterable[SlotTransform]) -> None:
                 motion.mode = mode
 
 
-def show_awaited(transforms: Iterable[Transform]) -> None:
+def show_pending_modes(transforms: Iterable[Transform]) -> None:
     """Have the property of what no slot moves any more say what it waits with."""
     for transform in transforms:
         motion = transform.motion

@@ -376,8 +376,8 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
     group = fcurve.group
-    is_ours = group is not None and group.name == GROUP
-    return is_ours and not fcurve.keyframe_points and _is_difference(fcurve.data_path)
+    is_in_group = group is not None and group.name == GROUP
+    return is_in_group and not fcurve.keyframe_points and _is_difference(fcurve.data_path)
 
 
 def _is_difference(path: str) -> bool:

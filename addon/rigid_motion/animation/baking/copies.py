@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import bpy
 
 from ..actions.slots import Slot, SlotTransform, counterpart_in, strips_of, transforms_in, transforms_with, uses_of
-from ..transforms import Transform, is_ours
+from ..transforms import Transform, shows_differences
 
 BAKED, REDUCED = "BAKED", "REDUCED"
 """What was done to the keys."""
@@ -83,7 +83,7 @@ def exchange(obj: bpy.types.Object, old: Slot, new: bpy.types.Action) -> None:
     shown_by += [(strip, old.handle) for strip in strips_of(obj)]
     differences = {pair.handle: pair.differences for pair in old.action.rigid_motion.bone_slots}.get(old.handle)
     for bone in obj.pose.bones if obj.pose is not None else ():
-        shown_by += [(constraint, differences) for constraint in filter(is_ours, bone.constraints)]
+        shown_by += [(constraint, differences) for constraint in filter(shows_differences, bone.constraints)]
     for user, handle in shown_by:
         slot = user.action_slot
         if user.action == old.action and slot is not None and slot.handle == handle:

@@ -66,7 +66,7 @@ def fewer_keys_of_rigs(
     """Plans for all bones among the targets, those together that one slot of a rig moves."""
     together: dict[tuple[bpy.types.Object, bpy.types.Action, int], dict[Transform, tuple[SlotTransform, Source]]] = {}
     for transform, reading in readings.items():
-        if transform.prefix:
+        if transform.is_part:
             try:
                 keyed = readable(transform, reading)
             except Refused:
@@ -113,7 +113,7 @@ class _Rig:
         slot = next(iter(self.places.values())).slot
         others = {transform: source for transform, source in _keyed_in(rig, slot) if transform not in members}
         self._look_at_frames()
-        self._pose_bones({numbers[one.carrier.name]: source for one, source in others.items() if one.prefix})
+        self._pose_bones({numbers[one.carrier.name]: source for one, source in others.items() if one.is_part})
         self.unit = size_of(rig.matrix_world) or 1.0
         self.tolerance = tolerance / self.unit
         self.radii = np.array([(radius or radius_of(bone)) / self.unit for bone in self.bones])

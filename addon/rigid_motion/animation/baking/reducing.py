@@ -25,7 +25,7 @@ from ..compute.sources import MODE_NAMES, distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
 from ..edits.mode_keys import set_mode_in
 from ..queries.keyed import segment_modes
-from ..transforms import Refused, Transform, is_ours, transform_of
+from ..transforms import Refused, Transform, shows_differences, transform_of
 from .bake import go_back
 from .copies import REDUCED, entries_in_use, entries_of
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys
@@ -141,7 +141,7 @@ def reduce_keys_of(
         keyed = [(place, source) for place, source in readable(transform, readings) if source.channels]
         if not keyed:
             raise Refused(_why_nothing_is_keyed(transform, 0))
-        if transform.prefix:
+        if transform.is_part:
             found = of_rigs.get(transform, [])
             if isinstance(found, Refused):
                 raise found
@@ -174,7 +174,7 @@ def reduction_of(target: Target) -> Reduction | None:
     entries = _reduced(entries_in_use(transform))
     reduced = {entry.changed for entry in entries}
     modes = [mode for place in places if place.slot.action in reduced for mode in segment_modes(place)]
-    return _summed(entries, entries if transform.prefix else [], dict(Counter(modes)))
+    return _summed(entries, entries if transform.is_part else [], dict(Counter(modes)))
 
 
 _Entries = list[bpy.types.PropertyGroup]
@@ -201,7 +201,7 @@ def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> 
 def total_reduction(targets: Targets) -> Reduction | None:
     """What became of the keys of several targets together, without their modes. None where none were reduced."""
     of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
-    of_bones = [entry for transform, entries in of_each if transform.prefix for entry in entries]
+    of_bones = [entry for transform, entries in of_each if transform.is_part for entry in entries]
     return _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
 
 
@@ -289,15 +289,17 @@ def _why_nothing_is_keyed(transform: Transform, count: int) -> str:
     """What moves something that has hardly a key, and how that becomes keys."""
     obj = transform.carrier
     has = rpt_(HAS_KEYS[min(count, 2)]).format(name=transform.name, count=count)
-    constraints = {constraint.type for constraint in obj.constraints if constraint.enabled and not is_ours(constraint)}
-    if not transform.prefix and obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
+    constraints = {
+        constraint.type for constraint in obj.constraints if constraint.enabled and not shows_differences(constraint)
+    }
+    if not transform.is_part and obj.rigid_body is not None and obj.rigid_body.type == "ACTIVE":
         return rpt_(SIMULATED).format(has=has)
     if constraints & SOLVED:
         return rpt_(SOLVED_CAMERA).format(has=has)
     if constraints or _is_driven(transform):
-        return rpt_(CONSTRAINED_BONE if transform.prefix else CONSTRAINED).format(has=has)
-    if not transform.prefix and any(
-        place.prefix for slot in slots_of([transform.animated]) for place in transforms_in(slot)
+        return rpt_(CONSTRAINED_BONE if transform.is_part else CONSTRAINED).format(has=has)
+    if not transform.is_part and any(
+        place.kind.is_part for slot in slots_of([transform.animated]) for place in transforms_in(slot)
     ):
         return rpt_("{has}, its bones have: select those in Pose mode, and reduce theirs").format(has=has)
     return rpt_("{has}: there is nothing to reduce").format(has=has)

@@ -40,7 +40,7 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
 
 def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform]) -> float:
     """What to begin with: a millimetre, and of a rig a share of its size; in the scene's units."""
-    sizes = [max(target.animated.dimensions) for target in targets if target.prefix]
+    sizes = [max(target.animated.dimensions) for target in targets if target.is_part]
     if not sizes or max(sizes) <= 0.0:
         return 0.001 / metres_per_unit(scene)
     return float(f"{OF_A_RIG * max(sizes):.2g}")
@@ -62,7 +62,7 @@ def size_of(matrix: object) -> float:
 def in_channels(transform: Transform, radius: float, scaled: bool) -> tuple[float, float]:
     """The length of a unit of the channels in the scene, and a radius in it, before the pose itself scales it."""
     own, world = size_of(transform.carrier.matrix_basis), size_of(_evaluated(transform.animated).matrix_world)
-    if transform.prefix:
+    if transform.is_part:
         world *= size_of(transform.carrier.matrix)
     if not (own > 0.0 and world > 0.0):
         return 1.0, radius

@@ -16,7 +16,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
-from ..actions.mode_property import await_mode, is_keyed
+from ..actions.mode_property import is_keyed, set_pending_mode
 from ..actions.records import record_mode
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
@@ -68,7 +68,7 @@ def set_mode(
 
     def act(transform: Transform, places: list[SlotTransform]) -> None:
         if not places:
-            await_mode(transform, mode)
+            set_pending_mode(transform, mode)
         for place in places:
             if frames is not None:
                 set_mode_in(place, mode, frames)
@@ -86,7 +86,7 @@ def on_property(transform: Transform) -> None:
     mode = transform.motion.mode
     places = [place for place in slot_transforms_of([transform]) if place.slot.action.is_editable]
     if not places:
-        await_mode(transform, mode)
+        set_pending_mode(transform, mode)
     follow_renamed(places)
     for place in places:
         if not is_keyed(place):

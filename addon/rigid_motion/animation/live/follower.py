@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 import bpy
 from bpy.app.handlers import persistent
 
-from ..actions.mode_property import adopt_from_properties, show_awaited
+from ..actions.mode_property import adopt_from_properties, show_pending_modes
 from ..actions.reading import leading
 from ..actions.renaming import forget_names
 from ..actions.slots import SlotTransform, choose_slots, filled_places_of, slot_transforms_of, slots_in
@@ -118,7 +118,7 @@ class Follower:
             moved = {user for place in places for user in place.users}
             unmoved = [transform for transform in transforms if transform not in moved]
             release(unmoved)
-            show_awaited(unmoved)
+            show_pending_modes(unmoved)
             forget_names(unmoved)
             count = self.refresh_places(places, again=again)
             notice_slots({place.slot for place in places}, self.slot_names)

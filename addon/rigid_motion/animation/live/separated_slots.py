@@ -14,7 +14,7 @@ import bpy
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..actions.slots import Slot, is_time, strips_of, uses_of
-from ..transforms import bone_name, is_ours, split_path
+from ..transforms import bone_name, shows_differences, split_path
 
 SlotNames = dict[int, set[str]]
 """Of each rig the names of the slots that have its keys, as last seen, by the rig's session id."""
@@ -87,7 +87,11 @@ def _moving(rig: bpy.types.Object, action: bpy.types.Action) -> list[bpy.types.A
 
 def _shows(rig: bpy.types.Object, action: bpy.types.Action) -> bool:
     bones = () if rig.pose is None else rig.pose.bones
-    return any(is_ours(constraint) and constraint.action == action for bone in bones for constraint in bone.constraints)
+    return any(
+        shows_differences(constraint) and constraint.action == action
+        for bone in bones
+        for constraint in bone.constraints
+    )
 
 
 def _has_keys_back(rig: bpy.types.Object, differences: bpy.types.Action, names: SlotNames) -> bool:

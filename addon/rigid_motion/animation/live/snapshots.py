@@ -17,7 +17,7 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
 from ..actions.slots import Curves, Slot, SlotTransform, slots_in, slots_of, transforms_in, transforms_with, uses_of
-from ..transforms import WIDTHS, Channel, is_ours, prefix_of, split_path
+from ..transforms import WIDTHS, Channel, prefix_of, shows_differences, split_path
 from .raw_keys import key_reader
 
 
@@ -182,7 +182,7 @@ class _Poses:
 
 def _settings_of(bone: bpy.types.PoseBone) -> tuple:
     motion = bone.rigid_motion
-    shown_by = [(one.name, one.mute) for one in bone.constraints if is_ours(one)]
+    shown_by = [(one.name, one.mute) for one in bone.constraints if shows_differences(one)]
     return motion.mode, motion.awaited, motion.mounted, shown_by
 
 

@@ -13,7 +13,7 @@ Each module imports only those above it.
 
 from __future__ import annotations
 
-from .bones import CONSTRAINT, BoneTransform, bone_name, is_ours, let_override_be_read, prefix_of, split_path
+from .bones import CONSTRAINT, BoneTransform, bone_name, let_override_be_read, prefix_of, shows_differences, split_path
 from .kinds import KINDS, is_part, kind_of, transform_of
 from .objects import GROUP, ORIGINALS, ObjectTransform, default_of
 from .transform import LINKED, MODE_PROPERTY, OWN_WORDS, WIDTHS, Channel, Refused, Transform, properties_for
@@ -34,12 +34,12 @@ __all__ = [
     "Transform",
     "bone_name",
     "default_of",
-    "is_ours",
     "is_part",
     "kind_of",
     "let_override_be_read",
     "prefix_of",
     "properties_for",
+    "shows_differences",
     "split_path",
     "transform_of",
 ]

@@ -85,7 +85,7 @@ class BoneTransform(Transform):
         return self.animated.evaluated_get(depsgraph).pose.bones.get(self.carrier.name)
 
 
-def is_ours(constraint: bpy.types.Constraint) -> bool:
+def shows_differences(constraint: bpy.types.Constraint) -> bool:
     """Whether a constraint is one that differences are shown by."""
     return constraint.type == "ACTION" and constraint.name.startswith(CONSTRAINT) and constraint.use_eval_time
 

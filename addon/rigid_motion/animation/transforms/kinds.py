@@ -17,7 +17,10 @@ def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> 
     """The transform of something that Blender has, where it is none already."""
     if isinstance(carrier, Transform):
         return carrier
-    return next(kind for kind in KINDS if isinstance(carrier, kind.carrier_type))(carrier)
+    for kind in KINDS:
+        if isinstance(carrier, kind.carrier_type):
+            return kind(carrier)
+    raise TypeError(f"neither an object nor a pose bone: {carrier!r}")
 
 
 @lru_cache(maxsize=65536)

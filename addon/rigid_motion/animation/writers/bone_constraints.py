@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import bpy
 
 from ..actions.slots import SlotTransform, uses_of
-from ..transforms import BoneTransform, Transform, is_ours
+from ..transforms import BoneTransform, Transform, shows_differences
 from .times import constraint_path, name_of, span_of
 
 SETTINGS = {
@@ -22,7 +22,7 @@ SETTINGS = {
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
     """The constraint that shows the differences of a slot on a bone."""
     wanted = slot_of_differences(place)
-    return next((one for one in user.carrier.constraints if is_ours(one) and shown_by(one) == wanted), None)
+    return next((one for one in user.carrier.constraints if shows_differences(one) and shown_by(one) == wanted), None)
 
 
 def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action | None, int]:
@@ -51,7 +51,7 @@ def attach_slots(rig: bpy.types.Object) -> None:
 
 
 def _constraints_on(rig: bpy.types.Object) -> Iterator[bpy.types.ActionConstraint]:
-    return (constraint for bone in rig.pose.bones for constraint in bone.constraints if is_ours(constraint))
+    return (constraint for bone in rig.pose.bones for constraint in bone.constraints if shows_differences(constraint))
 
 
 def _last_slot(constraint: bpy.types.ActionConstraint) -> bpy.types.ActionSlot | None:
@@ -76,7 +76,7 @@ def has_constraint(user: Transform, place: SlotTransform) -> bool:
 
 def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
-    shown = [shown_by(constraint) for constraint in filter(is_ours, user.carrier.constraints)]
+    shown = [shown_by(constraint) for constraint in filter(shows_differences, user.carrier.constraints)]
     if not shown or shown == [slot_of_differences(place)]:
         return False
     return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)
@@ -86,14 +86,14 @@ def _may_add_constraint(user: Transform, place: SlotTransform) -> bool:
     """Whether a bone lacks a constraint that nobody took off it."""
     name = name_of(place)
     present = user.carrier.constraints.get(name)
-    return name not in user.motion.mounted.split("\n") or (present is not None and is_ours(present))
+    return name not in user.motion.mounted.split("\n") or (present is not None and shows_differences(present))
 
 
 def ensure_constraint(user: BoneTransform, place: SlotTransform) -> None:
     """Have a bone show the differences of a slot, by a constraint that it has already or by a new one."""
     constraints, name = user.carrier.constraints, name_of(place)
     constraint = constraint_of(user, place) or constraints.get(name)
-    if constraint is not None and not (is_ours(constraint) and _can_be_reused(constraint, user, place)):
+    if constraint is not None and not (shows_differences(constraint) and _can_be_reused(constraint, user, place)):
         # This slot gets a constraint of another name when it is written.
         return
     if constraint is None:
@@ -167,7 +167,7 @@ def _in_use(rig: bpy.types.Object) -> set[tuple[bpy.types.Action, int]]:
 def remove_constraints(user: BoneTransform, shown: set[tuple[bpy.types.Action, int]]) -> None:
     """Take the constraints off a bone that show something else than these."""
     constraints, names, left = user.carrier.constraints, [], set(shown)
-    for constraint in [one for one in constraints if is_ours(one)]:
+    for constraint in [one for one in constraints if shows_differences(one)]:
         if (what := shown_by(constraint)) in left:
             left.remove(what)
             names.append(constraint.name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..actions.slots import SlotTransform
-from ..transforms import BoneTransform, Transform, is_ours
+from ..transforms import BoneTransform, Transform, shows_differences
 from .bone_constraints import SETTINGS, constraint_of, ensure_constraint, shown_by, slot_of_differences
 from .times import name_of
 
@@ -21,12 +21,12 @@ def trouble_of(user: Transform, place: SlotTransform) -> str:
     """
     wanted, name, is_behind = slot_of_differences(place), name_of(place), False
     for constraint in user.carrier.constraints:
-        if not is_ours(constraint):
+        if not shows_differences(constraint):
             is_behind |= constraint.enabled and constraint.influence > 0.0
         elif shown_by(constraint) == wanted:
             return _trouble_with(constraint, user, place, is_behind=is_behind)
     present = user.carrier.constraints.get(name)
-    return OTHER_SLOT if present is not None and is_ours(present) else REMOVED
+    return OTHER_SLOT if present is not None and shows_differences(present) else REMOVED
 
 
 def _trouble_with(

@@ -17,7 +17,17 @@ from ..actions.records import record_constraint, recorded_digest
 from ..actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, uses_of
 from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
-from ..transforms import CONSTRAINT, WIDTHS, Channel, Transform, bone_name, is_ours, is_part, prefix_of, split_path
+from ..transforms import (
+    CONSTRAINT,
+    WIDTHS,
+    Channel,
+    Transform,
+    bone_name,
+    is_part,
+    prefix_of,
+    shows_differences,
+    split_path,
+)
 from . import constraint_repair
 from .bone_constraints import (
     constraint_of,
@@ -156,7 +166,9 @@ class ConstraintWriter(Writer):
         _remove_slot_if_empty(slot)
 
     def release(self, transforms: Iterable[Transform]) -> None:
-        bones = [bone for bone in transforms if bone.motion.mounted or any(map(is_ours, bone.carrier.constraints))]
+        bones = [
+            bone for bone in transforms if bone.motion.mounted or any(map(shows_differences, bone.carrier.constraints))
+        ]
         if not bones:
             return
         shown: dict[Transform, set[tuple[bpy.types.Action, int]]] = {}
@@ -172,7 +184,10 @@ class ConstraintWriter(Writer):
 def _avoid_names(place: SlotTransform) -> None:
     """Give the constraint of a slot a name that no other constraint of its users has."""
     taken = {
-        constraint.name for user in place.users for constraint in user.carrier.constraints if not is_ours(constraint)
+        constraint.name
+        for user in place.users
+        for constraint in user.carrier.constraints
+        if not shows_differences(constraint)
     }
     # Where it is all that moves them, nothing else can have the name.
     tracked = [

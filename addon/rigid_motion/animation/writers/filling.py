@@ -166,8 +166,8 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         motion = action.rigid_motion
         if action in longer and not motion.has_longer:
             motion.has_longer = True
-        is_ours = motion.range_is_ours
-        if (action.use_frame_range and not is_ours) or not (is_ours or motion.has_longer):
+        was_set_for_samples = motion.range_is_ours
+        if (action.use_frame_range and not was_set_for_samples) or not (was_set_for_samples or motion.has_longer):
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
         of_bones = {pair.differences for pair in motion.bone_slots}
@@ -184,7 +184,7 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
             motion.range_is_ours = True
-        elif is_ours:
+        elif was_set_for_samples:
             action.use_frame_range = motion.range_is_ours = False
         if not samples and motion.has_longer:
             motion.has_longer = False
