@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rigid_motion import animation
+from rigid_motion.animation.transforms import KINDS
 
 HOUSE = Path(animation.__file__).parent
 OUTSIDE = {"handlers"}
@@ -91,3 +92,30 @@ def test_other_rooms_need_blender():
     command = [sys.executable, "-c", WITHOUT_BLENDER, str(HOUSE), "actions.slots"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert "ModuleNotFoundError: import of bpy halted" in done.stderr
+
+
+def guesses(path: Path) -> list[int]:
+    """The lines where a file guesses a kind: it tests a prefix for being there, or asks for the class of a kind."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.If | ast.IfExp):
+            tested = [node.test]
+        elif isinstance(node, ast.comprehension):
+            tested = node.ifs
+        elif isinstance(node, ast.BoolOp):
+            tested = node.values
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            tested = [node.operand]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
+            names = {name.id for name in ast.walk(node.args[1]) if isinstance(name, ast.Name)}
+            found += [node.lineno] if names & {kind.__name__ for kind in KINDS} else []
+            continue
+        else:
+            continue
+        found += [test.lineno for test in tested if isinstance(test, ast.Attribute) and test.attr == "prefix"]
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize("path", [*FILES, *sorted((HOUSE.parent / "ui").rglob("*.py"))], ids=lambda path: path.stem)
+def test_kinds_are_asked_and_not_guessed(path):
+    assert guesses(path) == []

@@ -156,8 +156,8 @@ def _record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
         number = records.find(key)
         if number < 0 and not place.kind.is_part:
             # Those of versions without bones have no name to be found by.
-            handle = place.slot.handle
-            old = (n for n, one in enumerate(records) if one.handle == handle and not (one.prefix or one.name))
+            unnamed = (place.slot.handle, place.prefix, "")
+            old = (n for n, one in enumerate(records) if (one.handle, one.prefix, one.name) == unnamed)
             number = next(old, -1)
         _numbers[key] = number
     return records[number] if number >= 0 else None
