@@ -19,6 +19,7 @@ from urllib.parse import unquote
 
 from .bvh import MOST_POSES
 from .importing import read_imported, refuse_too_large
+from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, shown
 
 ADDON = "io_scene_gltf2"
@@ -43,7 +44,7 @@ MAGIC = b"glTF"
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 
 
-def read(path: Path, selection: Selection) -> list[Trajectory]:
+def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
     """The whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     content = path.read_bytes()
@@ -60,7 +61,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     _refuse_made_up(path, document)
     with TemporaryDirectory(prefix="rigid_motion_") as folder:
         copy = _copy(Path(folder), document, binary, others)
-        return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, FPS)
+        return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, options.scale, FPS)
 
 
 def _rate(_: float, keys: float | None) -> float:

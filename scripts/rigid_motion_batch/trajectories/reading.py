@@ -34,13 +34,13 @@ class Format:
     label: str
     extensions: tuple[str, ...]
     read: Callable[..., list[Trajectory]]
-    """Given the path, the bodies that are wanted and, where it honours any but the scale, the options."""
+    """Given the path, the bodies that are wanted and, where it honours any, the options."""
 
     recognises: Callable[[list[str]], bool] | None = None
     """Given the first lines. None where the extension is enough."""
 
     honours: tuple[str, ...] = ()
-    """The options that it takes besides the scale: for what its files do not say themselves."""
+    """The options that it takes: for what its files do not say themselves. The scale is applied to all formats."""
 
     doubted: bool = True
     """Whether it holds what people recorded, and not what they animated, which may go at any speed."""
@@ -63,9 +63,9 @@ FORMATS = (
     ),
     Format("A-Frame recording", (".json",), aframe.read),
     Format("BVH", (".bvh",), bvh.read, axes="opengl"),
-    Format("FBX", (".fbx",), fbx.read, doubted=False),
-    Format("glTF", (".glb", ".gltf"), gltf.read, doubted=False),
-    Format("Blender file", (".blend",), blend.read, doubted=False),
+    Format("FBX", (".fbx",), fbx.read, honours=("scale",), doubted=False),
+    Format("glTF", (".glb", ".gltf"), gltf.read, honours=("scale",), doubted=False),
+    Format("Blender file", (".blend",), blend.read, honours=("scale",), doubted=False),
 )
 
 

@@ -21,7 +21,7 @@ from rigid_motion_batch.trajectories import Trajectory, TrajectoryError, gltf, i
 from rigid_motion_batch.trajectories.fbx_records import FIRST
 from tests.blank import blank
 from tests.recordings import RECORDINGS
-from tests.scripts.trajectories.blends import empty, key, rig
+from tests.scripts.trajectories.blends import empty, key, on_frames, rig
 from tests.scripts.trajectories.skeletons import (
     BONES,
     CARRYING,
@@ -100,7 +100,7 @@ def test_the_skin_moves_with_its_joints_as_in_blender(scene, tmp_path: Path, end
         blank()
     else:
         export(path)
-    walk = whole(path)
+    walk = on_frames(whole(path))
     skin, rest = walk.figure.skin, walk.figure.rest
     moved = placed(in_world(walk), inverse(rest[:, None]))
     carried = moved.positions[skin.joints] + np.stack(
@@ -168,7 +168,7 @@ def test_a_gltf_without_a_rate_is_sampled_60_times_a_second(scene, tmp_path: Pat
         key(obj.pose.bones["Upper"], frame, rotation_euler=(0.1 * frame, 0, 0))
     bpy.context.scene.render.fps, bpy.context.scene.frame_start, bpy.context.scene.frame_end = 24, 0, 40
     path = export(tmp_path / "walk.glb", export_force_sampling=False)
-    assert 1.0 / np.diff(whole(path).times).mean() == pytest.approx(rate)
+    assert 1.0 / np.diff(on_frames(whole(path)).times).mean() == pytest.approx(rate)
 
 
 def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) -> None:
@@ -264,7 +264,7 @@ def matrices_of_curves(obj: bpy.types.Object, frame: float) -> dict[str, np.ndar
 @pytest.mark.parametrize(("name", "count"), [("pab_run", 21), ("pab_walk", 41)])
 def test_other_peoples_bodies_are_where_their_curves_put_them(scene, name: str, count: int) -> None:
     path = RECORDINGS.parent / "rigs" / f"{name}.fbx"
-    walk = whole(path)
+    walk = on_frames(whole(path))
     assert walk.poses.shape == (66, count)
     np.testing.assert_allclose(walk.times, np.arange(count) / 30.0)
     with hushed(), warnings.catch_warnings():

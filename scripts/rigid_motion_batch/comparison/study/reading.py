@@ -98,7 +98,9 @@ def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip
         raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
     figure, drawn = repaired(trajectory.figure) if trajectory.figure else (None, ())
     notes = (*trajectory.warnings, *map(str, repairs), *map(printable, drawn))
-    return Clip(name, source, axes, times, poses, notes, trajectory.metres_per_unit, figure=figure)
+    return Clip(
+        name, source, axes, times, poses, notes, trajectory.metres_per_unit, figure=figure, rate=trajectory.rate
+    )
 
 
 def clip_names(wanted: Sequence[tuple[str, str]]) -> list[str]:
