@@ -17,7 +17,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import unquote
 
+import numpy as np
+
 from .bvh import MOST_POSES
+from .gltf_tracks import bytes_of_uri, straightened
 from .importing import read_imported, refuse_too_large
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, shown
@@ -60,8 +63,8 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
     refuse_too_large(path, *others.values())
     _refuse_made_up(path, document)
     with TemporaryDirectory(prefix="rigid_motion_") as folder:
-        copy = _copy(Path(folder), document, binary, others)
-        return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, options.scale, FPS)
+        copy, made = _copy(Path(folder), document, binary, others)
+        return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, options.scale, FPS, made * FPS)
 
 
 def _rate(_: float, keys: float | None) -> float:
@@ -141,8 +144,10 @@ def _inside(uri: str) -> bool:
     return True
 
 
-def _copy(folder: Path, document: dict[str, Any], binary: bytes | None, others: dict[int, Path]) -> Path:
-    """What Blender is to import, in a folder."""
+def _copy(
+    folder: Path, document: dict[str, Any], binary: bytes | None, others: dict[int, Path]
+) -> tuple[Path, np.ndarray]:
+    """What Blender is to import, in a folder, and the times of keys in it that are in no track of the file."""
     plain = {name: _plain(part) for name, part in document.items() if name in PARTS}
     for number, other in others.items():
         plain["buffers"][number]["uri"] = name = f"buffer{number}.bin"
@@ -152,9 +157,18 @@ def _copy(folder: Path, document: dict[str, Any], binary: bytes | None, others: 
     if binary is not None and isinstance(first, dict) and first.get("uri") is None:
         (folder / "binary.bin").write_bytes(binary)
         first["uri"] = "binary.bin"
+    more, made = straightened(plain, lambda number: _bytes_of(folder, plain["buffers"][number]))
+    if more:
+        (folder / "more.bin").write_bytes(more)
+        plain["buffers"][-1]["uri"] = "more.bin"
     copy = folder / "copy.gltf"
     copy.write_text(json.dumps(plain), encoding="utf-8")
-    return copy
+    return copy, made
+
+
+def _bytes_of(folder: Path, buffer: dict[str, Any]) -> bytes:
+    uri = buffer["uri"]
+    return bytes_of_uri(uri) if uri[:5].lower() == "data:" else (folder / uri).read_bytes()
 
 
 def _plain(part: Any) -> Any:

@@ -23,7 +23,7 @@ from rigid_motion_batch.hushing import hushed
 from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed
 from .rigs import LAST_FRAME, joints_of, refuse_too_many, single_joints, whole_body
-from .sampling import LEAD, SAME, Moments, merged
+from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE
 
 if TYPE_CHECKING:
@@ -38,11 +38,16 @@ ROUND = 2e-4
 ON_A_FRAME = 1e-4
 """What is as near to a whole frame is on it."""
 
+FINE = 1e-3
+"""By how much less fine that is for each frame from the first: F-curves keep frames in single precision."""
+
+NONE = np.empty(0)
+
 MULTIPLE = 0.05
 """By how much of the least gap between keys others may miss its multiples."""
 
-OFTEN = 0.25
-"""The share of the gaps between keys that the least of them is, to be the step of what was thinned."""
+THINNED = 4.0
+"""How many samples a key may stand for where keys were thinned."""
 
 FEW = 5
 """Names of a kind that a remark tells."""
@@ -70,6 +75,7 @@ def read_imported(
     rate_of: Callable[[float, float | None], float],
     scale: float | None,
     fps: int = 24,
+    made: np.ndarray = NONE,
 ) -> list[Trajectory]:
     """The whole skeleton of a file; or bones that are named, or all.
 
@@ -88,6 +94,8 @@ def read_imported(
         Metres of a unit, where the user says them.
     fps : int
         Frames a second of the scene to import into.
+    made : array, shape (n,)
+        Frames, rising, at which curves have keys that the file has not.
 
     Raises
     ------
@@ -101,7 +109,7 @@ def read_imported(
     try:
         with _imported(path, importer, addon, fps) as (scene, names):
             rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
-            return _read(path, selection, rigs, scene, rate_of, scale)
+            return _read(path, selection, rigs, scene, rate_of, scale, made)
     except (UnicodeDecodeError, SystemError):
         raise TrajectoryError(path, "a name in this file is no text", "export it again") from None
     except MemoryError:
@@ -115,6 +123,7 @@ def _read(
     scene: bpy.types.Scene,
     rate_of: Callable[[float, float | None], float],
     scale: float | None,
+    made: np.ndarray,
 ) -> list[Trajectory]:
     moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
     if not moving:
@@ -123,10 +132,10 @@ def _read(
     name, bone = _wanted(rigs, moving, selection.wanted)
     rig, fps = rigs[name], scene.render.fps / scene.render.fps_base
     first, last = moving.get(name) or next(iter(moving.values()))
-    rate = rate_of(fps, _rate_of_keys(rig, fps))
+    rate = rate_of(fps, _rate_of_keys(rig, fps, made))
     if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
         refuse_too_many(path, name, 1, np.array([first, last]))
-    moments = _moments(rig, first, last, fps, fps / rate)
+    moments = _moments(rig, first, last, fps, fps / rate, made)
     remarks = _remarks(scene, rig, name, list(rigs), several=selection.wanted in (None, ALL))
     if bone is None and selection.wanted != ALL:
         called = path.stem if selection.wanted is None else name
@@ -195,29 +204,34 @@ def _frames_of_keys(rig: bpy.types.Object) -> tuple[float, float] | None:
     return (min(own[0] for own in keys), max(own[-1] for own in keys)) if keys else None
 
 
-def _rate_of_keys(rig: bpy.types.Object, fps: float) -> float | None:
+def _rate_of_keys(rig: bpy.types.Object, fps: float, made: np.ndarray) -> float | None:
     """How many keys a second the densest curve has; None where that is no rate that anything is recorded at.
 
     A curve with even gaps, or a thinned one whose gaps are multiples of the least, goes before uneven ones.
     """
     rates: dict[bool, list[float]] = {True: [], False: []}
     for keys in _keys_of_curves(rig):
-        gaps = np.diff(keys)
+        gaps = np.diff(_less(keys, made))
         if len(gaps := gaps[gaps > ON_A_FRAME]):
             times = gaps / gaps.min()
-            even = np.abs(times - np.rint(times)).max() < MULTIPLE and np.mean(times < 1.5) > OFTEN
+            even = np.abs(times - np.rint(times)).max() < MULTIPLE and times.mean() < THINNED
             rate = fps / (gaps.sum() / np.rint(times).sum() if even else float(np.median(gaps)))
             rates[bool(even)].append(float(round(rate)) if abs(rate - round(rate)) < ROUND * rate else rate)
     of_recordings = [[rate for rate in some if SLOWEST <= rate <= FASTEST] for some in rates.values()]
     return max(of_recordings[0] or of_recordings[1], default=None)
 
 
-def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step: float) -> Moments:
+def _less(keys: np.ndarray, made: np.ndarray) -> np.ndarray:
+    """Frames of keys without those that were made."""
+    return keys[away(keys, made) > ON_A_FRAME * (1.0 + FINE * np.abs(keys))]
+
+
+def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step: float, made: np.ndarray) -> Moments:
     """Even frames from the first key to the last one, and all keys between."""
     even = first + step * np.arange(int((last - first) / step + SAME) + 1)
     if last - even[-1] > SAME * step:
         even = np.append(even, last)
-    frames = merged(even, moments_of(rig, LEAD * step), step)
+    frames = merged(even, _less(moments_of(rig, LEAD * step), made), step)
     whole = np.rint(frames)
     return Moments(np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames), fps, first, step)
 

@@ -24,8 +24,8 @@ WITHIN = 1e-3
 OF_JOINTS, OF_OBJECTS = 0.03, 0.1
 """Metres around a joint and an object in which all points count, as in comparisons."""
 
-SEEN = 0.75
-"""The share of that at which a gap is halved: of a cubic curve, the two looks see at least so much of the largest."""
+SEEN = 0.6
+"""The share of that at which a gap is halved: of a cubic curve, the looks see at least three quarters of the most."""
 
 LOOKS = 0.25, 0.75
 """Where in a gap is looked. Half-way an ease in and out would seem to be a straight line."""
@@ -80,13 +80,13 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
     """
     keys = np.unique(keys[(keys > even[0]) & (keys < even[-1])])
     kept: list[float] = []
-    for key in keys[_away(keys, even) >= CLOSEST * step].tolist():
+    for key in keys[away(keys, even) >= CLOSEST * step].tolist():
         if not kept or key - kept[-1] >= CLOSEST * step:
             kept.append(key)
     return np.sort(np.concatenate((even, kept)))
 
 
-def _away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """How far the nearest of others, which rise, is from each of some frames; shape of the frames."""
     if not len(others):
         return np.full(len(frames), np.inf)
@@ -165,7 +165,7 @@ def sampled(
         over = (turned > FLIP) & (lengths <= longest) if halving == 0 else np.zeros(len(unsure), dtype=bool)
         flips += np.count_nonzero(over)
         off = (errors > allowed) & ~over
-        halved = off & (lengths >= 2.0 * closest) & (halving < HALVINGS)
+        halved = off & (lengths > 2.1 * closest) & (halving < HALVINGS)
         if len(frames) + np.count_nonzero(halved) > most:
             halved[:] = False
         left |= dict(zip(frames[unsure[off & ~halved]].tolist(), errors[off & ~halved].tolist(), strict=True))

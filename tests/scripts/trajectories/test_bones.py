@@ -298,7 +298,7 @@ def test_of_a_rig_the_bones_count_that_deform(saved) -> None:
     linear(arm)
     expected = shown_by_blender(arm, range(1, 10))[[0, 2]]
     recording = read_trajectories(saved())
-    (body,) = recording.trajectories
+    (body,) = map(on_frames, recording.trajectories)
     assert recording.note.startswith("took the 2 bones that deform of 4")
     assert body.figure.joints == ("Upper", "Hand")
     assert body.figure.parents.tolist() == [-1, 0], "the nearest that counts"

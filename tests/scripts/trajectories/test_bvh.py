@@ -98,6 +98,36 @@ def test_position_channels_take_the_place_of_the_offset(write) -> None:
     np.testing.assert_allclose(elbow.poses.positions, [[1, 2, 3], [1 - 2, 5 + 1, 3]], atol=1e-15)
 
 
+@pytest.mark.parametrize("count", [1, 3, 60])
+def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, count: int) -> None:
+    path = write("arm.bvh", ARM.replace("Frames: 2", f"Frames: {count}"))
+    (body,) = read_trajectories(path).trajectories
+    (warning,) = body.warnings
+    assert warning.startswith(f"arm.bvh:17: Frames: says {count} and 2 whole rows follow")
+    np.testing.assert_array_equal(body.times, [0.0, 0.04])
+    assert read_trajectories(write("arm.bvh", ARM)).trajectories[0].warnings == ()
+    shoulder, elbow = read_trajectories(write("arm.bvh", ARM.replace("Frames: 2", "Frames: 3")) + ":*").trajectories
+    assert (len(shoulder.warnings), len(elbow.warnings)) == (1, 0)
+
+
+ROW = "2 5 0  90 0 0  -91 0 12.5"
+
+
+@pytest.mark.parametrize("kept", [1, 6, 9, 10, 17, 21, 22, 24, 25])
+def test_a_file_that_is_cut_off_in_a_row_loses_that_row_with_a_warning(write, kept: int) -> None:
+    path = write("arm.bvh", ARM.replace("Frames: 2", "Frames: 60") + ROW[:kept])
+    (body,) = read_trajectories(path).trajectories
+    assert len(body.times) == 2
+    cut, short = body.warnings
+    assert cut == "arm.bvh:21: the file is cut off in this row, which is left out"
+    assert short.startswith("arm.bvh:17: Frames: says 60 and 2 whole rows follow")
+
+
+def test_the_last_row_needs_no_end_of_line(write) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM.rstrip())).trajectories
+    assert (len(body.times), body.warnings) == (2, ())
+
+
 @pytest.mark.parametrize("number", ["nan", "inf", "1e308"])
 def test_numbers_that_are_broken_are_kept_for_the_repair(write, number: str) -> None:
     text = ARM.replace("1 5 0  90 0 0", f"{number} -{number} 0  90 {number} 0")
@@ -187,11 +217,11 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
         (ARM.split("Frames")[0], 16, "'' where Frames: and a positive number are expected"),
         (ARM.split("Frame Time")[0], 16, "'' where Frame Time: and a positive number are expected"),
         (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
-        (ARM.replace("Frames: 2", "Frames: 3"), 17, "Frames: says 3 and 2 rows follow"),
-        (ARM.replace("Frames: 2", "Frames: 1"), 17, "Frames: says 1 and 2 rows follow"),
         (ARM.replace("Time: 0.04", "Time: 0"), 18, "'Frame Time: 0' where Frame Time: and a positive number"),
         (ARM.replace("1 5 0 ", "1 5 "), 20, "8 columns where 9 are needed"),
         (ARM.replace("1 5 0 ", "1 5 0 0 "), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0 ", "1 5 0 0 ").rstrip(), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0  90", "1 5 0  9O").rstrip(), 20, "Shoulder Zrotation is '9O', not a number"),
         (ARM.replace("1 5 0  90", "1 5 0  9O"), 20, "Shoulder Zrotation is '9O', not a number"),
         (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),

@@ -120,10 +120,10 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
     path, seen = exported(ending)
     world = in_world(walk := whole(path))
     for source in ("Hand", "Body/Hand"):
-        (hand,) = read_trajectories(f"{path}:{source}").trajectories
+        (hand,) = map(on_frames, read_trajectories(f"{path}:{source}").trajectories)
         assert (hand.name, hand.figure) == (source, None)
         np.testing.assert_allclose(hand.poses.positions, seen[-1], atol=SINGLE)
-    everything = read_trajectories(f"{path}:*").trajectories
+    everything = [*map(on_frames, read_trajectories(f"{path}:*").trajectories)]
     assert tuple(one.name for one in everything) == walk.figure.joints
     for joint, one in enumerate(everything):
         np.testing.assert_allclose(one.poses.positions, world.positions[joint], atol=1e-12)
@@ -147,7 +147,7 @@ def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: s
 
 def test_keys_that_come_closer_than_the_frames_of_an_fbx_count(exported, monkeypatch: pytest.MonkeyPatch) -> None:
     path, seen = exported(".fbx", fps=60)
-    monkeypatch.setattr(importing, "_rate_of_keys", lambda rig, fps: None)
+    monkeypatch.setattr(importing, "_rate_of_keys", lambda *_: None)
     assert len(whole(path).times) == len(FRAMES)
     monkeypatch.undo()
     content = path.read_bytes()
