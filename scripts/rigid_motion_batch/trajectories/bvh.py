@@ -31,8 +31,11 @@ from .tables import lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
-MOST_JOINTS = 100_000
-"""A thousand times what a skeleton has."""
+MOST_JOINTS = 3000
+"""Of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
+
+DEEPEST = 500
+"""Joints that hang on one another: five times what the longest tails have."""
 
 MOST_POSES = 50_000_000
 """Of all joints together: a file may hold any number of joints and frames in little space."""
@@ -206,8 +209,8 @@ class _Words:
                 self.fail("a { is missing behind a name")
         return "_".join(words)
 
-    def fail(self, problem: str) -> NoReturn:
-        raise TrajectoryError(self.path, problem, "export the BVH again", self.line)
+    def fail(self, problem: str, way_out: str = "export the BVH again") -> NoReturn:
+        raise TrajectoryError(self.path, problem, way_out, self.line)
 
 
 def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
@@ -221,7 +224,9 @@ def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
     opened: list[int | None] = []
     while (word := words.next("MOTION")).upper() != "MOTION":
         if len(joints) > MOST_JOINTS:
-            words.fail(f"more than {MOST_JOINTS} joints")
+            words.fail(f"more than {MOST_JOINTS} joints", "export fewer, such as one body at a time")
+        if len(opened) > DEEPEST:
+            words.fail(f"more than {DEEPEST} joints hang on one another", "export a shorter chain")
         joint = joints[opened[-1]] if opened and opened[-1] is not None else None
         match word.upper():
             case "ROOT" if not opened:

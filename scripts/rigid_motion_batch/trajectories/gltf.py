@@ -19,7 +19,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from .bvh import MOST_POSES
+from .bvh import DEEPEST, MOST_JOINTS, MOST_POSES
 from .gltf_tracks import bytes_of_uri, straightened
 from .importing import read_imported, refuse_too_large
 from .options import AS_THE_FILE_SAYS, ReadingOptions
@@ -42,6 +42,12 @@ PARTS = {
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression")
 """Extensions without which the numbers cannot be read."""
 
+MOST_NODES = 10_000
+"""Of a file, with all that is no joint: Blender takes seconds for so many, and four times as long for twice as many."""
+
+MOST_CHANNELS = 100_000
+"""Of all takes together: each becomes up to four F-curves."""
+
 MAGIC = b"glTF"
 
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
@@ -62,6 +68,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
     others = _buffers(path, document)
     refuse_too_large(path, *others.values())
     _refuse_made_up(path, document)
+    _refuse_too_many(path, document)
     with TemporaryDirectory(prefix="rigid_motion_") as folder:
         copy, made = _copy(Path(folder), document, binary, others)
         return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, options.scale, FPS, made * FPS)
@@ -130,6 +137,43 @@ def _refuse_made_up(path: Path, document: dict[str, Any]) -> None:
     if total > MOST_POSES:
         problem = f"{total} numbers, vectors and matrices are more than {MOST_POSES}"
         raise TrajectoryError(path, problem, "export the skeleton without its meshes, or split the recording")
+
+
+def _refuse_too_many(path: Path, document: dict[str, Any]) -> None:
+    """Raise TrajectoryError for more nodes, joints or channels than Blender's importer is done with in seconds."""
+    nodes, skins, animations = (_objects(document.get(name)) for name in ("nodes", "skins", "animations"))
+    joints = max((len(joints) for skin in skins if isinstance(joints := skin.get("joints"), list)), default=0)
+    channels = sum(len(_objects(animation.get("channels"))) for animation in animations)
+    fewer = "export the skeleton alone, without the rest of its scene"
+    for count, most, kind, way_out in (
+        (len(nodes), MOST_NODES, "nodes", fewer),
+        (joints, MOST_JOINTS, "joints of a skin", "export one body at a time"),
+        (channels, MOST_CHANNELS, "animated channels", "export fewer takes"),
+    ):
+        if count > most:
+            raise TrajectoryError(path, f"{count} {kind} are more than the {most} that are read", way_out)
+    if _depth(nodes) > DEEPEST:
+        problem = f"more than {DEEPEST} nodes hang on one another"
+        raise TrajectoryError(path, problem, "export a shorter chain")
+
+
+def _objects(part: Any) -> list[dict[str, Any]]:
+    return [one for one in part if isinstance(one, dict)] if isinstance(part, list) else []
+
+
+def _depth(nodes: list[dict[str, Any]]) -> int:
+    """How many nodes hang on one another at most; `DEEPEST` and one more where they hang on themselves."""
+    children = [node.get("children") for node in nodes]
+    below = [
+        [child for child in own if isinstance(child, int) and child in range(len(nodes))]
+        if isinstance(own, list)
+        else []
+        for own in children
+    ]
+    level, depth = set(range(len(nodes))), 0
+    while level and depth <= DEEPEST:
+        level, depth = {child for node in level for child in below[node]}, depth + 1
+    return depth
 
 
 def _inside(uri: str) -> bool:

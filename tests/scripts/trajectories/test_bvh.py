@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.trajectories import read_trajectories
+from rigid_motion_batch.trajectories import ReadingOptions, read_trajectories
 from tests.scripts.trajectories import seeds
 
 ARM = f"""{seeds.ARM}Frames: 2
@@ -108,6 +108,35 @@ def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, co
     assert read_trajectories(write("arm.bvh", ARM)).trajectories[0].warnings == ()
     shoulder, elbow = read_trajectories(write("arm.bvh", ARM.replace("Frames: 2", "Frames: 3")) + ":*").trajectories
     assert (len(shoulder.warnings), len(elbow.warnings)) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "metres", "told"),
+    [
+        (1.7, "", 1.7, ""),
+        (4.0, "", 4.0, ""),
+        (170.0, "centimetres", 1.7, "the only usual unit that makes a grown-up of it"),
+        (7.0, "feet", 2.13, "the only usual unit that makes a grown-up of it"),
+        (17.0, "units of CMU's motion capture", 0.96, "may as well be decimetres (1.7 m)"),
+        (5.5, "feet", 1.68, "the only usual"),
+        (0.1, "", 0.1, ""),
+        (60.0, "inches", 1.52, ""),
+    ],
+)
+def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: str, metres: float, told: str) -> None:
+    text = ARM.replace("2.0 0.0 0.0", f"{size} 0.0 0.0")
+    (body,) = read_trajectories(path := write("arm.bvh", text)).trajectories
+    found = size * body.metres_per_unit
+    assert unit in body.remark
+    assert told in body.remark
+    doubted = "; if not, say how long it is: --scale METRES" in " ".join(body.warnings)
+    assert doubted == (not 0.5 <= found <= 2.5)
+    if doubted:
+        assert f"it is {found:.3g} m large" in body.warnings[-1]
+    if size > 1.0:
+        assert found == pytest.approx(metres, abs=5e-3)
+    (scaled,) = read_trajectories(path, ReadingOptions(scale=0.5)).trajectories
+    assert (scaled.metres_per_unit, scaled.remark, scaled.warnings) == (0.5, "", ())
 
 
 ROW = "2 5 0  90 0 0  -91 0 12.5"
@@ -225,7 +254,13 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
         (ARM.replace("1 5 0  90", "1 5 0  9O"), 20, "Shoulder Zrotation is '9O', not a number"),
         (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
-        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "the file ends where MOTION is expected"),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
+        (
+            "HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000,
+            2,
+            "more than 3000 joints; export fewer, such as one body",
+        ),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 400, 2, "the file ends where MOTION is expected"),
         (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
     ],
 )

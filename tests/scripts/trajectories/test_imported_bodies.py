@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import struct
+import time
 import warnings
 import zlib
 from pathlib import Path
@@ -143,6 +144,7 @@ def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: s
     recording = read_trajectories(str(export(tmp_path / f"walk{ending}")))
     assert recording.trajectories[0].metres_per_unit == 0.01
     assert "taken for centimetres" in recording.note
+    assert recording.trajectories[0].warnings == ()
 
 
 def test_keys_that_come_closer_than_the_frames_of_an_fbx_count(exported, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -386,6 +388,40 @@ def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_fo
         assert " is not as long as it says" in (said := refusal(str(path))[1]) or "more than" in said
     path.write_bytes(record(zlib.compress(bytes(1 << 26)), 1 << 23))
     assert refusal(str(path))[1].startswith("Blender cannot import this file ("), "which is sound, and no skeleton"
+
+
+def with_more(path: Path, **more: list) -> str:
+    """The same glTF with more parts at the end of its lists."""
+    document = json.loads(path.read_text())
+    for name, parts in more.items():
+        document[name] = document.get(name, []) + parts
+    path.write_text(json.dumps(document))
+    return str(path)
+
+
+def test_more_nodes_joints_and_channels_than_blender_takes_in_seconds_are_refused_at_once(exported, refusal) -> None:
+    path, _ = exported(".gltf")
+    whole(path)
+    count = len(json.loads(path.read_text())["nodes"])
+    started = time.perf_counter()
+    chain = [{"children": [count + number + 1]} for number in range(5000)]
+    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith("more than 500 nodes hang on one another; export")
+    assert refusal(with_more(path, nodes=[{}] * 200_000))[1].startswith(
+        f"{count + 205_001} nodes are more than the 10000"
+    )
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps(document | {"nodes": document["nodes"][:count]}))
+    whole(path)
+    skin = {"joints": list(range(4000))}
+    assert refusal(with_more(path, skins=[skin]))[1].startswith("4000 joints of a skin are more than the 3000 that")
+    document["skins"], document["nodes"] = document["skins"][:1], document["nodes"][:count]
+    path.write_text(json.dumps(document))
+    take = {"channels": [{}] * 200_000}
+    assert (
+        "animated channels are more than the 100000 that are read; export fewer"
+        in refusal(with_more(path, animations=[take]))[1]
+    )
+    assert time.perf_counter() - started < 20.0
 
 
 OUTSIDE = [
