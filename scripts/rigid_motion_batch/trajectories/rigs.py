@@ -95,7 +95,7 @@ def whole_body(
     scale : float, optional
         The same as the user says it. Without, a size tells whether it can be.
     made_up : bool
-        Whether an importer made up where the bones of joints without children end.
+        Whether an importer made up where the bones end.
 
     Raises
     ------
@@ -297,17 +297,23 @@ def _figure(
     rest = _filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
     ends = np.array([bones[name].tail_local for name in joints.names]) @ there[:3, :3].T + there[:3, 3]
     tails = rotate(conjugate(rest.quaternions), ends - rest.positions)
-    if made_up:
-        tails = _shortened(tails, rest.positions, joints.parents)
+    largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
+    tails = _shortened(tails, rest.positions, joints.parents, largest)
     skin = skin_of(meshes, joints.names, matrices)
     return Figure(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin)
 
 
-def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """Tails (joints, 3) with those of joints without children no longer than it is from the parent to the joint."""
-    leaves = np.setdiff1d(np.flatnonzero(parents >= 0), parents)
-    reach = np.linalg.norm(heads[leaves] - heads[parents[leaves]], axis=-1)
-    lengths = np.linalg.norm(tails[leaves], axis=-1)
-    shorter = (reach > 0.0) & (lengths > reach)
-    tails[leaves[shorter]] *= (reach[shorter] / lengths[shorter])[:, None]
-    return tails
+def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:
+    """Tails (joints, 3) of bones that reach no farther than to their children, or else as far as from their parents.
+
+    Bones up to the largest length stay: longer ones than a body is large are an importer's, where it took other units.
+    """
+    hanging = np.flatnonzero(parents >= 0)
+    gaps = np.linalg.norm(heads[hanging] - heads[parents[hanging]], axis=-1)
+    reach = np.zeros(len(parents))
+    np.maximum.at(reach, parents[hanging], gaps)
+    ends = reach[hanging] == 0.0
+    reach[hanging[ends]] = gaps[ends]
+    lengths = np.linalg.norm(tails, axis=-1)
+    longer = (reach > 0.0) & (lengths > np.maximum(reach, largest))
+    return np.where(longer[:, None], tails * (reach / np.where(longer, lengths, 1.0))[:, None], tails)

@@ -167,3 +167,20 @@ def mixed_rates(seconds: float = 2.0) -> Body:
     ]
     tracks.append(Track(3, "rotation", fast, turning(fast, 0.25 * np.sin(2 * np.pi * 5 * fast + 0.3))))
     return Body(parents, offsets, tracks)
+
+
+def soldier(size: float = 0.01) -> Body:
+    """A body of 1.8 m in a unit of its own below a node that scales it, as Mixamo exports them."""
+    parents = [-1, 0, 1, 2, 3, 2, 5, 0, 7, 0, 9]
+    offsets = np.array(
+        [
+            *((0, 95, 0), (0, 25, 0), (0, 25, 0), (0, 15, 0), (0, 18, 0), (50, 0, 0), (25, 0, 0)),
+            *((10, -5, 0), (0, -85, 5), (-10, -5, 0), (0, -85, 5)),
+        ]
+    )
+    times = np.arange(31) / 30
+    tracks = [
+        Track(joint, "rotation", times, turning(times, 0.3 * np.sin(3 * times + joint), (1, 0, 0)))
+        for joint in range(len(parents))
+    ]
+    return Body(parents, offsets * 0.01 / size, tracks, size)

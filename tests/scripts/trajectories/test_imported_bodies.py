@@ -9,6 +9,7 @@ import struct
 import time
 import warnings
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,15 @@ import pytest
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.comparison.stage.armature import Rest
+from rigid_motion_batch.comparison.stage.physique import figure_size
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.trajectories import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.trajectories.fbx_records import FIRST
 from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.blends import empty, key, on_frames, rig
+from tests.scripts.trajectories.glbs import soldier
 from tests.scripts.trajectories.skeletons import (
     BONES,
     CARRYING,
@@ -145,6 +149,28 @@ def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: s
     assert recording.trajectories[0].metres_per_unit == 0.01
     assert "taken for centimetres" in recording.note
     assert recording.trajectories[0].warnings == ()
+
+
+@pytest.mark.parametrize("ending", [".glb", ".blend"])
+def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
+    path = soldier().write(tmp_path / "soldier.glb")
+    if ending == ".blend":
+        with hushed():
+            bpy.ops.import_scene.gltf(filepath=str(path))
+        path = path.with_suffix(".blend")
+        (obj,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+        assert max(obj.dimensions) > 20.0, "Blender has the bones of joints without children end far away"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        blank()
+    recording = read_trajectories(str(path))
+    (found,) = recording.trajectories
+    assert (found.metres_per_unit, recording.note, found.warnings) == (1.0, "", ())
+    assert np.linalg.norm(found.figure.tails, axis=-1).max() < 1.0
+    rest = Rest.of(found.figure, 1.0, "blender")
+    assert figure_size(rest) == pytest.approx(1.73, abs=0.01)
+    assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
+    far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
+    assert figure_size(far) == figure_size(rest)
 
 
 def test_keys_that_come_closer_than_the_frames_of_an_fbx_count(exported, monkeypatch: pytest.MonkeyPatch) -> None:
