@@ -127,10 +127,10 @@ class Sampled:
                 "taken to go the short way"
             )
         if self.gaps:
-            first = moments.times(np.array(self.gaps[:1]))[0]
+            first, count = moments.times(np.array(self.gaps[:1]))[0], len(self.gaps)
             warnings += (
-                f"it jumps, or swings too fast for samples, {len(self.gaps)} times, first at {first:.4g} s: what lies "
-                f"between two samples is up to {1e3 * metres * self.off:.3g} mm off there; "
+                f"it jumps, or swings too fast, in {count} gap{'s' * (count > 1)} between samples, first at "
+                f"{first:.4g} s: what lies there is up to {1e3 * metres * self.off:.3g} mm off a straight way; "
                 "give it keys at such moments, or smooth the curves",
             )
         rate = moments.fps / moments.step

@@ -281,5 +281,5 @@ def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None
     noise.function_type, noise.amplitude, noise.phase_multiplier, noise.use_additive = "SIN", 0.5, 400.0, True
     found = read(saved())
     (warning,) = found.warnings
-    assert "mm off there" in warning
+    assert "mm off a straight way" in warning
     assert len(found.times) < 300
