@@ -184,9 +184,11 @@ def _moments(path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = 
     if not (rate > 0 and base > 0.0):
         raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
     whole = np.arange(np.floor(first), np.ceil(last) + 1.0)
-    frames = merged(whole, moments_of(body.obj, LEAD), 1.0)
+    keys, straight = moments_of(body.obj, LEAD)
     units = scene.unit_settings
-    return Moments(frames, rate / base), 1.0 if units.system == "NONE" else units.scale_length
+    return Moments(
+        merged(whole, keys, 1.0), rate / base, straight=straight
+    ), 1.0 if units.system == "NONE" else units.scale_length
 
 
 def _remark(body: Body, poses: Poses) -> str:

@@ -231,9 +231,11 @@ def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step:
     even = first + step * np.arange(int((last - first) / step + SAME) + 1)
     if last - even[-1] > SAME * step:
         even = np.append(even, last)
-    frames = merged(even, _less(moments_of(rig, LEAD * step), made), step)
+    keys, straight = moments_of(rig, LEAD * step)
+    frames = merged(even, _less(keys, made), step)
     whole = np.rint(frames)
-    return Moments(np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames), fps, first, step)
+    frames = np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
+    return Moments(frames, fps, first, step, straight and not len(made))
 
 
 def _other_takes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:

@@ -21,6 +21,9 @@ TRANSFORMS = ("location", "rotation_", "scale", "delta_")
 BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
 """The data paths of the channels that move a pose bone, whose name is escaped in them."""
 
+CONSTANT, LINEAR = 0, 1
+"""Blender's numbers of the interpolations of keys."""
+
 MOST_KEYS = 1_000_000
 """Of a strip with all of its repeats; keys of one with more are left to looking between samples."""
 
@@ -38,6 +41,9 @@ class Keys:
 
     jumps: np.ndarray
     """Shape (n,): whether the curve jumps to that key, from a constant value before it to another one."""
+
+    straight: bool
+    """Whether there are straight lines or constant values between them."""
 
 
 def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
@@ -61,14 +67,15 @@ def curves_that_move(
 def keys_of(fcurve: bpy.types.FCurve) -> Keys:
     """The keys of an F-curve, by their frames."""
     points = fcurve.keyframe_points
-    places, constant = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
+    places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
     points.foreach_get("co", places)
-    points.foreach_get("interpolation", constant)
+    points.foreach_get("interpolation", kinds)
     frames, values = places.reshape(-1, 2).T.astype(np.float64)
     order = np.argsort(frames, kind="stable")
-    frames, values, constant = frames[order], values[order], constant[order] == 0
+    frames, values, kinds = frames[order], values[order], kinds[order]
     changes = np.abs(np.diff(values)) > NOISE * np.abs(values).max(initial=1.0)
-    return Keys(frames, np.append(False, constant[:-1] & changes)[: len(frames)])
+    jumps = np.append(False, (kinds[:-1] == CONSTANT) & changes)[: len(frames)]
+    return Keys(frames, jumps, bool(np.isin(kinds, (CONSTANT, LINEAR)).all()))
 
 
 def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
@@ -78,7 +85,7 @@ def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
         obj = obj.parent
 
 
-def moments_of(obj: bpy.types.Object, lead: float) -> np.ndarray:
+def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
     """The frames at which a curve may bend or jump that moves an object, its bones or its parents.
 
     Parameters
@@ -89,18 +96,22 @@ def moments_of(obj: bpy.types.Object, lead: float) -> np.ndarray:
 
     Returns
     -------
-    array, shape (n,)
+    frames : array, shape (n,)
         In any order, some of them several times.
+    straight : bool
+        Whether there is nothing but straight lines and steps between them.
     """
-    found = [np.empty(0)]
+    found, straight = [np.empty(0)], True
     for one in with_parents(obj):
         if data := one.animation_data:
             for fcurve in curves_that_move(data.action, data.action_slot, bones=True):
                 keys = keys_of(fcurve)
                 found += [keys.frames, keys.frames[keys.jumps] - lead]
+                straight &= keys.straight and not fcurve.modifiers
             for track in data.nla_tracks:
                 found += _of_strips(track.strips, lead)
-    return np.concatenate(found)
+                straight = False
+    return np.concatenate(found), straight
 
 
 def _of_strips(strips: bpy.types.NlaStrips, lead: float) -> Iterator[np.ndarray]:

@@ -27,8 +27,14 @@ OF_JOINTS, OF_OBJECTS = 0.03, 0.1
 SEEN = 0.6
 """The share of that at which a gap is halved: of a cubic curve, the looks see at least three quarters of the most."""
 
-LOOKS = 0.25, 0.75
+LOOKS = np.array([0.25, 0.75])
 """Where in a gap is looked. Half-way an ease in and out would seem to be a straight line."""
+
+HALF_WAY = np.array([0.5])
+"""Where curves of straight lines are looked at: what several of them make together bends to one side."""
+
+WIDE = np.radians(20.0)
+"""A turn from sample to sample that is wider is looked at as if it were eased: quaternions on a line ease it."""
 
 HALVINGS = 8
 """How often a gap may be halved."""
@@ -41,6 +47,9 @@ LEAD = 2.0 * CLOSEST
 
 SAME = 2e-3
 """By how much gaps may differ, in steps, that are the same: F-curves keep frames in single precision."""
+
+LEAST = 1e-6
+"""Radians: a smaller turn is divided like a line."""
 
 FLIP = np.radians(60.0)
 """What is turned farther off between two frames, and back, are angles that jump by a whole turn."""
@@ -67,6 +76,9 @@ class Moments:
 
     step: float = 1.0
     """Frames between two samples of the recording."""
+
+    straight: bool = False
+    """Whether all keys are joined by straight lines or steps."""
 
     def times(self, frames: np.ndarray) -> np.ndarray:
         """Seconds."""
@@ -154,7 +166,7 @@ def sampled(
     metres : float
         The length of the unit that the poses are in.
     """
-    gaps = _Gaps(look, Skeleton(parents), radius / metres)
+    gaps = _Gaps(look, Skeleton(parents), radius / metres, moments.straight)
     frames, poses = moments.frames, look(moments.frames)
     allowed, most = SEEN * WITHIN / metres, (1 + MOST_ADDED) * len(frames)
     closest, longest = CLOSEST * moments.step, moments.step * (1.0 + SAME)
@@ -188,46 +200,39 @@ class _Gaps:
     look: Callable[[np.ndarray], Poses]
     skeleton: Skeleton
     radius: float
+    straight: bool
 
     def errors(self, frames: np.ndarray, poses: Poses, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of these gaps (n,) between samples, the largest distance and angle of any joint, shape (n,) each."""
         errors, angles = np.zeros(len(gaps)), np.zeros(len(gaps))
         for first in range(0, len(gaps), BLOCK):
-            rows = slice(first, first + BLOCK)
-            some = gaps[rows]
-            begins, lengths = frames[some, None], (frames[some + 1] - frames[some])[:, None]
-            seen = self.look((begins + lengths * LOOKS).ravel())
-            straight = self._between(poses[:, some], poses[:, some + 1])
-            # What is damaged, or has no direction, is no reason for more samples.
+            rows = np.arange(first, min(first + BLOCK, len(gaps)))
+            begin, end = poses[:, gaps[rows]], poses[:, gaps[rows] + 1]
             with np.errstate(invalid="ignore", over="ignore"):
-                angle = angle_between(seen.quaternions, straight.quaternions)
-                error = np.linalg.norm(seen.positions - straight.positions, axis=-1)
-                error += 2.0 * self.radius * np.sin(angle / 2.0)
-                if seen.scales is not None or straight.scales is not None:
-                    error += self.radius * np.abs(_scales(seen) - _scales(straight))
-            for kind, found in ((errors, error), (angles, angle)):
-                found = np.where(np.isfinite(found), found, 0.0).max(axis=0)
-                kind[rows] = found.reshape(-1, len(LOOKS)).max(axis=1)
+                turns = angle_between(begin.quaternions, end.quaternions)
+            eased = ~(np.nan_to_num(turns).max(axis=0) < WIDE) | (not self.straight)
+            for some, looks in ((eased, LOOKS), (~eased, HALF_WAY)):
+                if some.any():
+                    places = frames[gaps[rows[some]]], frames[gaps[rows[some]] + 1]
+                    found = self._off(*places, begin[:, some], end[:, some], looks)
+                    errors[rows[some]], angles[rows[some]] = found
         return errors, angles
 
-    def _between(self, first: Poses, last: Poses) -> Poses:
-        """Half-way there, as far as `LOOKS` says: shape (joints, 2 n) in the world, of shape (joints, n)."""
+    def _off(
+        self, first: np.ndarray, last: np.ndarray, begin: Poses, end: Poses, looks: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same of gaps from the first frames (n,) to the last ones, and from poses (joints, n) to others."""
+        seen = self.look((first[:, None] + (last - first)[:, None] * looks).ravel())
+        # What is damaged, or has no direction, is no reason for more samples.
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            a, b = self._in_parents(first), self._in_parents(last)
-            share = np.array(LOOKS)[:, None]
-            positions = a.positions[..., None, :] + share * (b.positions - a.positions)[..., None, :]
-            dots = np.sum(a.quaternions * b.quaternions, axis=-1, keepdims=True)[..., None, :]
-            half = np.arccos(np.minimum(np.abs(dots), 1.0))
-            parts = [np.where(half > 1e-6, np.sin(part * half) / np.sin(half), part) for part in (1.0 - share, share)]
-            signs = np.where(dots < 0.0, -1.0, 1.0)
-            turns = parts[0] * a.quaternions[..., None, :] + parts[1] * signs * b.quaternions[..., None, :]
-            scales = None
-            if a.scales is not None or b.scales is not None:
-                scales = (_scales(a)[..., None] + np.array(LOOKS) * (_scales(b) - _scales(a))[..., None]).reshape(
-                    len(positions), -1
-                )
-            local = Poses(positions.reshape(len(positions), -1, 3), turns.reshape(len(turns), -1, 4), scales)
-            return self.skeleton.in_root_space(local)
+            straight = self.skeleton.in_root_space(_between(self._in_parents(begin), self._in_parents(end), looks))
+            angle = angle_between(seen.quaternions, straight.quaternions)
+            error = np.linalg.norm(seen.positions - straight.positions, axis=-1)
+            error += 2.0 * self.radius * np.sin(angle / 2.0)
+            if seen.scales is not None or straight.scales is not None:
+                error += self.radius * np.abs(_scales(seen) - _scales(straight))
+        error, angle = (np.where(np.isfinite(some), some, 0.0).max(axis=0) for some in (error, angle))
+        return error.reshape(-1, len(looks)).max(axis=1), angle.reshape(-1, len(looks)).max(axis=1)
 
     def _in_parents(self, world: Poses) -> Poses:
         parents = self.skeleton.parents
@@ -238,6 +243,22 @@ class _Gaps:
         own = placed(inverse(world[parents[hanging]]), world[hanging])
         local.positions[hanging], local.quaternions[hanging] = own.positions, own.quaternions
         return local
+
+
+def _between(a: Poses, b: Poses, looks: np.ndarray) -> Poses:
+    """From poses (joints, n) on lines and even turns to others, so far as the looks (k,) say: shape (joints, n k)."""
+    share = looks[:, None]
+    positions = a.positions[..., None, :] + share * (b.positions - a.positions)[..., None, :]
+    dots = np.sum(a.quaternions * b.quaternions, axis=-1, keepdims=True)[..., None, :]
+    half = np.arccos(np.minimum(np.abs(dots), 1.0))
+    parts = [np.where(half > LEAST, np.sin(part * half) / np.sin(half), part) for part in (1.0 - share, share)]
+    signs = np.where(dots < 0.0, -1.0, 1.0)
+    turns = parts[0] * a.quaternions[..., None, :] + parts[1] * signs * b.quaternions[..., None, :]
+    scales = None
+    if a.scales is not None or b.scales is not None:
+        first, last = _scales(a)[..., None], _scales(b)[..., None]
+        scales = (first + looks * (last - first)).reshape(len(positions), -1)
+    return Poses(positions.reshape(len(positions), -1, 3), turns.reshape(len(turns), -1, 4), scales)
 
 
 def _scales(poses: Poses) -> np.ndarray:
