@@ -184,3 +184,17 @@ def soldier(size: float = 0.01) -> Body:
         for joint in range(len(parents))
     ]
     return Body(parents, offsets * 0.01 / size, tracks, size)
+
+
+def curved(size: float = 1.0) -> Body:
+    """Two keys a second, with tangents that are no ones that anybody would guess."""
+    parents, offsets = chain(4, 0.4 / size)
+    random, times = np.random.default_rng(4), np.array([0.0, 0.5, 1.1, 1.5, 2.0])
+    tracks = []
+    for joint in range(4):
+        rows = np.zeros((5, 3, 4))
+        rows[:, 1] = turning(times, 0.8 * np.sin(3 * times + joint), random.permutation(np.eye(3))[0])
+        rows[:, [0, 2]] = random.normal(0.0, 0.8, (5, 2, 4))
+        tracks.append(Track(joint, "rotation", times, rows.reshape(-1, 4), "CUBICSPLINE"))
+    places = random.normal(0.0, 0.3 / size, (15, 3))
+    return Body(parents, offsets, [*tracks, Track(0, "translation", times, places, "CUBICSPLINE")], size)

@@ -11,7 +11,7 @@ from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.trajectories import Trajectory, read_trajectories
 from rigid_motion_batch.trajectories.sampling import CLOSEST, merged
 from tests.scripts.trajectories.blends import FPS, empty, key, rig
-from tests.scripts.trajectories.glbs import Body, Track, chain, mixed_rates, turning
+from tests.scripts.trajectories.glbs import Body, Track, chain, curved, mixed_rates, turning
 
 bpy = pytest.importorskip("bpy")
 anim_utils = pytest.importorskip("bpy_extras.anim_utils")
@@ -96,20 +96,6 @@ def test_parents_of_the_armature_count(tmp_path: Path) -> None:
     still = Body(body.parents, body.offsets, body.tracks[:-1]).places(fast)
     expected = still + 0.5 * np.sin(20 * fast)[None, :, None] * [1.0, 0, 0]
     assert np.abs(at(found, fast) - expected).max() < SINGLE
-
-
-def curved(size: float = 1.0) -> Body:
-    """Two keys a second, with tangents that are no ones that anybody would guess."""
-    parents, offsets = chain(4, 0.4 / size)
-    random, times = np.random.default_rng(4), np.array([0.0, 0.5, 1.1, 1.5, 2.0])
-    tracks = []
-    for joint in range(4):
-        rows = np.zeros((5, 3, 4))
-        rows[:, 1] = turning(times, 0.8 * np.sin(3 * times + joint), random.permutation(np.eye(3))[0])
-        rows[:, [0, 2]] = random.normal(0.0, 0.8, (5, 2, 4))
-        tracks.append(Track(joint, "rotation", times, rows.reshape(-1, 4), "CUBICSPLINE"))
-    places = random.normal(0.0, 0.3 / size, (15, 3))
-    return Body(parents, offsets, [*tracks, Track(0, "translation", times, places, "CUBICSPLINE")], size)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.01])
