@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.comparison.stage.armature import Rest
@@ -23,6 +23,7 @@ from rigid_motion_batch.comparison.stage.physique import figure_size
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.trajectories import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.trajectories.fbx_records import FIRST
+from rigid_motion_batch.trajectories.sampling import CLOSEST
 from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.scripts.trajectories.blends import empty, key, on_frames, rig
@@ -305,6 +306,28 @@ def test_other_peoples_bodies_are_where_their_curves_put_them(scene, name: str, 
     # Blender evaluates in single precision through chains of 20 bones: 1e-7 of the size each.
     assert np.abs(places(walk, walk.figure.joints) - expected).max() < 1e-5 * size
     assert 1.0 < size < 2.0
+
+
+@pytest.mark.recordings
+def test_keys_between_the_frames_of_other_peoples_bodies_are_read_too(scene) -> None:
+    path = RECORDINGS.parent / "rigs" / "pab_run.fbx"
+    run = whole(path)
+    assert run.rate == 30.0
+    with hushed(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    (obj,) = (one for one in bpy.data.objects if one.type == "ARMATURE")
+    data = obj.animation_data
+    curves = anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+    keys = np.unique([point.co.x for fcurve in curves for point in fcurve.keyframe_points])
+    assert np.abs(run.times * 30.0 + 1.0 - keys[:, None]).min(axis=1).max() < CLOSEST
+    between = (keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel()
+    expected = [matrices_of_curves(obj, frame) for frame in between.tolist()]
+    seen = np.array([[matrices[joint][:3, 3] for matrices in expected] for joint in run.figure.joints])
+    local = [interpolate(run.times, own, (between - 1.0) / 30.0, "lerp_slerp") for own in run.poses]
+    poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
+    found = run.figure.skeleton.in_root_space(poses).positions
+    assert np.linalg.norm(found - seen, axis=-1).max() < 1e-3
 
 
 # -- what is open stays -----------------------------------------------------------------------------------------------
