@@ -2,7 +2,7 @@
 
 The importer gets a copy of what makes a skeleton and its skin, in a folder that is gone afterwards: no images, nor
 what extensions and extras say, and buffers only from the folder of the file. Key times are seconds; a skeleton is
-sampled as often as its keys come, or 60 times a second where they tell no rate.
+sampled as often as the keys of its densest track come, or 60 times a second where they tell no rate.
 Source: the glTF 2.0 specification, Khronos 2021.
 """
 

@@ -8,10 +8,14 @@ C).
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
+
+from rigid_motion.motion.repair import LARGEST
 
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 
@@ -32,7 +36,7 @@ MOST_PARTS = 64
 MOST_KEYS = 200_000
 """Of a track that is made; one with more is left to Blender."""
 
-DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
+DAMAGED = (KeyError, IndexError, TypeError, ValueError, AttributeError, ArithmeticError)
 """What damaged files lead to: Blender's importer says what is wrong with them."""
 
 
@@ -54,8 +58,8 @@ def straightened(document: dict[str, Any], bytes_of: Callable[[int], bytes]) -> 
         Seconds at which there are keys now, and no track had one before.
     """
     made = _Made(document, bytes_of)
-    animations = document.get("animations")
-    for animation in animations if isinstance(animations, list) else ():
+    lists = [document.get(name) for name in ("buffers", "bufferViews", "accessors", "animations")]
+    for animation in lists[-1] if all(isinstance(some, list) for some in lists) else ():
         try:
             turns = {
                 (channel["target"]["path"], channel["sampler"])
@@ -68,7 +72,8 @@ def straightened(document: dict[str, Any], bytes_of: Callable[[int], bytes]) -> 
         for path, number in turns:
             try:
                 if path in ("translation", "rotation", "scale"):
-                    samplers[number] = made.sampler(samplers[number], path)
+                    with np.errstate(all="raise", under="ignore"):
+                        samplers[number] = made.sampler(samplers[number], path)
             except DAMAGED:
                 continue
     return made.finish()
@@ -78,7 +83,7 @@ class _Made:
     """The numbers of a document, and those that come to them."""
 
     def __init__(self, document: dict[str, Any], bytes_of: Callable[[int], bytes]) -> None:
-        self._document, self._bytes_of = document, bytes_of
+        self._document, self._bytes_of = document, cache(lambda number: memoryview(bytes_of(number)))
         self._data = bytearray()
         self._length = _usual_length(document)
         self._known: list[np.ndarray] = []
@@ -152,10 +157,11 @@ def _usual_length(document: dict[str, Any]) -> float:
     """How far joints are from their parents, as a rule: the median."""
     try:
         joints = {joint for skin in document["skins"] for joint in skin["joints"]}
-        lengths = [np.linalg.norm(document["nodes"][joint].get("translation", 0.0)) for joint in joints]
-        return float(np.median([length for length in lengths if length > 0.0]))
+        lengths = [math.hypot(*document["nodes"][joint].get("translation", ())) for joint in joints]
     except DAMAGED:
-        return 1.0
+        lengths = []
+    usable = [length for length in lengths if 0.0 < length < LARGEST]
+    return float(np.median(usable)) if usable else 1.0
 
 
 def _of_spline(times: np.ndarray, rows: np.ndarray, tolerance: float, turns: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from rigid_motion.motion import Poses, Skeleton
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import angle_between
 
+from .bvh import MOST_POSES
 from .recordings import Trajectory
 
 WITHIN = 1e-3
@@ -168,7 +169,7 @@ def sampled(
     """
     gaps = _Gaps(look, Skeleton(parents), radius / metres, moments.straight)
     frames, poses = moments.frames, look(moments.frames)
-    allowed, most = SEEN * WITHIN / metres, (1 + MOST_ADDED) * len(frames)
+    allowed, most = SEEN * WITHIN / metres, min((1 + MOST_ADDED) * len(frames), MOST_POSES // len(parents))
     closest, longest = CLOSEST * moments.step, moments.step * (1.0 + SAME)
     unsure, left, before, flips = np.arange(len(frames) - 1), {}, len(frames), 0
     for halving in range(HALVINGS + 1):
