@@ -34,6 +34,9 @@ GROWN_UP = 0.9, 2.3
 TYPICAL = 1.7
 """Metres; where no unit makes a body that large, that is taken which comes nearest."""
 
+BELIEVED = 0.5, 2.5
+"""Metres: children and giants. A body of another size is hardly in the unit that was guessed."""
+
 MOST_NAMED = 5
 """Joints that are named of one kind of fault."""
 
@@ -131,6 +134,17 @@ def unit_of(size: float) -> tuple[str, float]:
         if GROWN_UP[0] <= size * length <= GROWN_UP[1]:
             return name, length
     return min(UNITS, key=lambda unit: abs(np.log(size * unit[1] / TYPICAL)))
+
+
+def sureness(size: float, length: float) -> str:
+    """How sure it is that the unit of a body of this size is so many metres long, which the size alone says."""
+    fitting = [(name, size * metres) for name, metres in UNITS if GROWN_UP[0] <= size * metres <= GROWN_UP[1]]
+    others = [f"{name} ({metres:.3g} m)" for name, metres in fitting if metres != size * length]
+    if others:
+        return f"guessed from the size alone, and may as well be {' or '.join(others)}"
+    if fitting:
+        return "guessed from the size alone, the only usual unit that makes a grown-up of it"
+    return "guessed from the size alone, and no usual unit makes a grown-up of it"
 
 
 def short_names(joints: Sequence[str]) -> list[str]:

@@ -176,3 +176,24 @@ def heads_of(made: Path, source: Path, tmp_path: Path) -> tuple[np.ndarray, np.n
     """Where all bones begin (frames, bones, 3): as two files play, or as Blender itself imports one."""
     on_a_farm(f"source = {str(source)!r}\n{HEADS}", made, tmp_path / "heads")
     return np.load(tmp_path / "heads.npy"), np.load(tmp_path / "heads of source.npy")
+
+
+HEADS_AT = """
+scene = bpy.context.scene
+(rig,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+rows = []
+for time in np.load(found):
+    frame = 1.0 + float(time) * scene.render.fps / scene.render.fps_base
+    scene.frame_set(int(frame // 1), subframe=frame % 1)
+    shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    rows.append([shown.matrix_world @ bone.head for bone in sorted(shown.pose.bones, key=lambda bone: bone.name)])
+np.save(found, np.array(rows))
+"""
+
+
+def heads_at(made: Path, times: np.ndarray) -> np.ndarray:
+    """Where the bones of a reduced recording begin at some seconds of it, by their names, shape (bones, times, 3)."""
+    found = made.with_suffix(".npy")
+    np.save(found, times)
+    on_a_farm(HEADS_AT, made, found)
+    return np.load(found).swapaxes(0, 1)

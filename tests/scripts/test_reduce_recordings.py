@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 
 import bpy
 import numpy as np
@@ -21,6 +22,7 @@ from tests.scripts.reducing import (
     count_keys,
     displacement,
     hand_made,
+    heads_at,
     heads_of,
     object_file,
     read_table,
@@ -28,6 +30,7 @@ from tests.scripts.reducing import (
     worlds_of,
     write_csv,
 )
+from tests.scripts.trajectories.glbs import curved, mixed_rates, soldier
 
 
 @pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])
@@ -99,6 +102,23 @@ def test_a_whole_body_becomes_a_rig_that_plays_like_it_in_any_blender(tmp_path, 
         assert moving
         assert {mode for bone in moving for mode in modes_of(bone, key_frames(bone)[:-1])} == {"motor_spline"}
         assert len(bpy.data.actions) == 1, "the recording has the dense keys, and this file need not"
+
+
+@pytest.mark.parametrize("body", [mixed_rates, curved, soldier])
+def test_the_tolerance_holds_at_every_key_of_every_curve_and_between_them(tmp_path, capsys, body):
+    body = body()
+    source = body.write(tmp_path / "walk.glb")
+    assert run(source) == 0
+    told = re.search(r"(\S+) mm off at most \(5 mm allowed\)", capsys.readouterr().err)
+    assert told is not None
+    assert float(told[1]) <= 5.0
+    names = [f"Joint{joint}" for joint in range(len(body.parents))]
+    order = [names.index(name) for name in sorted(names)]
+    keys = np.unique(np.concatenate([track.times for track in body.tracks]))
+    for times, more in ((keys, 0.0), (body.moments, 1e-3)):
+        found = heads_at(tmp_path / "walk-keys.blend", times)
+        off = np.linalg.norm(found - body.places(times)[order], axis=-1).max()
+        assert off <= 1e-3 * float(told[1]) + more + ROUNDING
 
 
 def test_a_body_that_does_not_move_is_left_alone_and_nothing_is_wrong(tmp_path, capsys):

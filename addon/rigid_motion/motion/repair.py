@@ -64,7 +64,7 @@ class Repair:
         return f"{self.fault} ({len(self.rows)}: row {shown}{', ...' if len(self.rows) > MOST_NAMED else ''})"
 
 
-def repair(times: ArrayLike, poses: Poses) -> tuple[np.ndarray, Poses, list[Repair]]:
+def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[np.ndarray, Poses, list[Repair]]:
     """Make a recording fit for interpolation.
 
     Parameters
@@ -74,6 +74,8 @@ def repair(times: ArrayLike, poses: Poses) -> tuple[np.ndarray, Poses, list[Repa
     poses : Poses, shape (n,) or (joints, n)
         As recorded, in any unit: rows of NaN, quaternions of any length and sign. Of several joints a row is as good as
         its worst.
+    rate : float, optional
+        Samples a second, which longer intervals are gaps in. Without, it is that of the median interval.
 
     Returns
     -------
@@ -152,7 +154,7 @@ def repair(times: ArrayLike, poses: Poses) -> tuple[np.ndarray, Poses, list[Repa
     if (flips := np.diff(turned, prepend=False).any(axis=of_joints)).any():
         repairs.append(Repair("undid sign flips of quaternions", rows[flips]))
     intervals = np.diff(times)
-    if len(intervals) and (gaps := intervals > GAP * np.median(intervals)).any():
+    if len(intervals) and (gaps := intervals > GAP * (1.0 / rate if rate else np.median(intervals))).any():
         longest = f"left gaps as they are, the longest {intervals.max() * 1e3:.0f} ms"
         repairs.append(Repair(longest, rows[1:][gaps]))
     return times, Poses(poses.positions, aligned, poses.scales), repairs

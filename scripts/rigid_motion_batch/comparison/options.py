@@ -49,10 +49,10 @@ inputs:
 
 whole bodies:
   Each joint has its keys in its parent's space, as in a rig, and its error is measured where the chain of joints puts
-  it. The program works out the unit of a body from its size, and reports it; --scale sets another. OUTPUT/metrics.csv
-  has the whole body, its worst joint, and how far feet slide that should stand still; OUTPUT/metrics_joints.csv has
-  every joint. In the film each mode moves a rig of its own; comparison.blend has these rigs, with the modes set on
-  their bones.
+  it. The program works out the unit of a body from its size, and reports it and how sure it is; --scale sets another.
+  OUTPUT/metrics.csv has the whole body, its worst joint, and how far feet slide that should stand still;
+  OUTPUT/metrics_joints.csv has every joint. In the film each mode moves a rig of its
+  own; comparison.blend has these rigs, with the modes set on their bones.
 
 examples:
   python scripts/compare.py

@@ -38,8 +38,8 @@ ARROW = 0.2
 
 
 def rate_of(clip: Clip) -> float:
-    """Frames a second with a sample on every frame; of a recording that is not even, the nearest whole number."""
-    whole = float(np.clip(round(1.0 / float(np.median(np.diff(clip.times)))), *RATES))
+    """Frames a second with a sample on every frame; of one that is not even, the whole number next to its rate."""
+    whole = float(np.clip(round(clip.samples_a_second), *RATES))
     even = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0])
     return even if RATES[0] <= even <= RATES[1] and _are_on_frames(clip, even) > _are_on_frames(clip, whole) else whole
 

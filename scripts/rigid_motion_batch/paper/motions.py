@@ -85,7 +85,7 @@ def read_motion(source: str, name: str, of: str) -> tuple[Motion, Clip | None]:
 
 def sampling_rate(clip: Clip) -> float:
     """Samples a second, between gaps."""
-    return 1.0 / float(np.median(np.diff(clip.times)))
+    return clip.samples_a_second
 
 
 def spread(poses: Poses, radius: float = 0.1) -> float:

@@ -1,4 +1,4 @@
-"""Animated objects, rigs and pose bones of .blend files: where Blender evaluates them on every whole frame.
+"""Animated objects, rigs and pose bones of .blend files: where Blender evaluates them on whole frames and at keys.
 
 The file's data is linked into the running Blender, a probe follows the object, or the bones, in a scene of its own, and
 all of it is taken out again: what is open stays as it is. Python of the file (its text blocks, scripted drivers) is not
@@ -8,7 +8,6 @@ are Blender units, axes are Blender's; those of a bone are its own, y along it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,21 +19,18 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 
+from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, moments_of
+from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed, shown
 from .rigs import LAST_FRAME, whole_body
+from .sampling import LEAD, OF_OBJECTS, Moments, merged, sampled
 from .stages import probe
 
 if TYPE_CHECKING:
     import bpy
 
-TRANSFORMS = ("location", "rotation_", "scale", "delta_")
-"""How the data paths of the channels begin that move an object."""
-
 OF_BONES = "pose.bones["
 """How the data paths of everything begin that a driver may drive in a bone."""
-
-BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
-"""The data paths of the channels that move a pose bone, whose name is escaped in them."""
 
 FEW = 5
 """Bones of a rig that are told where one has to be named."""
@@ -63,17 +59,14 @@ class Body:
         if data is None:
             return None
         ranges = [(strip.frame_start, strip.frame_end) for track in data.nla_tracks for strip in track.strips]
-        for fcurve in fcurves_of(data.action, data.action_slot):
+        for fcurve in curves_that_move(data.action, data.action_slot, bones=self.bone is not None):
             # One that only its modifiers make has no keys, and says that they are on frame 0.
-            has_keys = fcurve.keyframe_points or fcurve.sampled_points
-            if has_keys and (
-                fcurve.data_path.startswith(TRANSFORMS) or (self.bone and BONE_CHANNEL.match(fcurve.data_path))
-            ):
+            if fcurve.keyframe_points or fcurve.sampled_points:
                 ranges.append(tuple(fcurve.range()))
         return (min(first for first, _ in ranges), max(last for _, last in ranges)) if ranges else None
 
 
-def read(path: Path, selection: Selection) -> list[Trajectory]:
+def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
     """The first, by their names, of the animated objects and the rigs whose bones have keys; or all animated objects.
 
     Any other object, and any bone, can be had by its name.
@@ -92,19 +85,19 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
             wanted = selection.wanted or ""
             if wanted not in bodies and (body := _bone_called(path, wanted, objects)):
                 selection.of(animated, unlisted=[wanted])
-                return [_sample(path, body, scenes)]
+                return [_sample(path, body, scenes, options.scale)]
             with_keys = {name: _bones_with_keys(obj) for name, obj in objects.items()}
             few = [f"{name}/{bone}" for name, bones in with_keys.items() for bone in bones[:FEW]]
             more = sum(map(len, with_keys.values())) - len(few)
             if selection.wanted == ALL:
                 taken = selection.of(animated, unlisted=[*few, *still], more=more)
-                return [_sample(path, bodies[name], scenes) for name in taken]
+                return [_sample(path, bodies[name], scenes, options.scale) for name in taken]
             moving = [name for name in objects if name in animated or with_keys[name]]
             still = [name for name in still if name not in moving]
             (name,) = selection.of(moving, unlisted=[*few, *still], more=more)
             if with_keys[name] or _bones_are_moved(objects[name]):
-                return [_sample_whole(path, objects[name], scenes)]
-            return [_sample(path, bodies[name], scenes)]
+                return [_sample_whole(path, objects[name], scenes, options.scale)]
+            return [_sample(path, bodies[name], scenes, options.scale)]
     except (UnicodeDecodeError, SystemError):
         # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
         raise TrajectoryError(path, "a name in this file is no text", "save it again from Blender") from None
@@ -154,31 +147,33 @@ def _nearest(wanted: str, names: list[str]) -> list[str]:
     return sorted(names, key=unlike)[:FEW]
 
 
-def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene]) -> Trajectory:
+def _sample(path: Path, body: Body, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     from rigid_motion.animation import read_poses
 
-    frames, times, metres = _timing(path, body, scenes)
-    with probe() as seen:
-        follow = seen.constraints.new("COPY_TRANSFORMS")
+    moments, metres = _moments(path, body, scenes)
+    with probe() as obj:
+        follow = obj.constraints.new("COPY_TRANSFORMS")
         follow.target = body.obj
         if body.bone is not None:
             follow.subtarget = body.bone
-        poses = read_poses(seen, frames)
-    return Trajectory(body.name, times, poses, metres, _remark(body, poses))
+        seen = sampled(
+            moments, lambda frames: read_poses(obj, frames)[None], np.array([-1]), OF_OBJECTS, scale or metres
+        )
+    poses = seen.poses[0]
+    trajectory = Trajectory(body.name, moments.times(seen.frames), poses, metres, _remark(body, poses))
+    return seen.told(trajectory, moments, scale or metres)
 
 
-def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene]) -> Trajectory:
+def _sample_whole(path: Path, rig: bpy.types.Object, scenes: list[bpy.types.Scene], scale: float | None) -> Trajectory:
     if not rig.data.bones:
         raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "name another object of the file")
     # What moves any bone counts.
-    frames, times, metres = _timing(path, Body(rig, rig.data.bones[0].name), scenes, rig.name)
-    return whole_body(path, rig, rig.name, frames, times, metres)
+    moments, metres = _moments(path, Body(rig, rig.data.bones[0].name), scenes, rig.name)
+    return whole_body(path, rig, rig.name, moments, metres, scale)
 
 
-def _timing(
-    path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = ""
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """The frames that a body is looked at, their times in seconds, and the metres of a unit."""
+def _moments(path: Path, body: Body, scenes: list[bpy.types.Scene], name: str = "") -> tuple[Moments, float]:
+    """When a body is looked at, and the metres of a unit."""
     scene = next((scene for scene in scenes if scene in body.obj.users_scene), scenes[0])
     keyed = body.frames_of_keys()
     first, last = keyed if keyed and keyed[0] < keyed[1] else (scene.frame_start, scene.frame_end)
@@ -188,9 +183,12 @@ def _timing(
     rate, base = scene.render.fps, scene.render.fps_base
     if not (rate > 0 and base > 0.0):
         raise TrajectoryError(path, f"{rate} / {base:g} is no frame rate", "set it in the Output Properties")
-    frames = np.arange(np.floor(first), np.ceil(last) + 1.0)
+    whole = np.arange(np.floor(first), np.ceil(last) + 1.0)
+    keys, straight = moments_of(body.obj, LEAD)
     units = scene.unit_settings
-    return frames, frames * base / rate, 1.0 if units.system == "NONE" else units.scale_length
+    return Moments(
+        merged(whole, keys, 1.0), rate / base, straight=straight
+    ), 1.0 if units.system == "NONE" else units.scale_length
 
 
 def _remark(body: Body, poses: Poses) -> str:
@@ -229,15 +227,6 @@ def _bones_with_keys(obj: bpy.types.Object) -> list[str]:
         if (channel := BONE_CHANNEL.match(fcurve.data_path))
     }
     return [bone.name for bone in obj.data.bones if bone.name in found]
-
-
-def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
-    """What an Action has for one of its slots."""
-    from bpy_extras.anim_utils import action_get_channelbag_for_slot
-
-    if action is not None and slot is not None:
-        channelbag = action_get_channelbag_for_slot(action, slot)
-        yield from channelbag.fcurves if channelbag else ()
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import NoReturn
@@ -31,8 +31,11 @@ from .tables import lines_of, parse_rows
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
-MOST_JOINTS = 100_000
-"""A thousand times what a skeleton has."""
+MOST_JOINTS = 3000
+"""Of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
+
+DEEPEST = 500
+"""Joints that hang on one another: five times what the longest tails have."""
 
 MOST_POSES = 50_000_000
 """Of all joints together: a file may hold any number of joints and frames in little space."""
@@ -63,7 +66,7 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     names = [joint.name for joint in joints]
     as_body = selection.wanted is None and len(joints) > 1
     taken = names if as_body else selection.of(names)
-    values, frame_time = _read_motion(path, motion, joints)
+    values, frame_time, warnings = _read_motion(path, motion, joints)
     if len(taken) * len(values) > MOST_POSES:
         problem = f"{len(taken)} joints in {len(values)} frames are more than {MOST_POSES} poses"
         raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
@@ -71,9 +74,11 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     with np.errstate(invalid="ignore", over="ignore"):
         times = np.arange(len(values)) * frame_time
         if as_body:
-            return [Trajectory(path.stem, times, _local_poses(joints, values), figure=figure_of(joints))]
+            body = Trajectory(path.stem, times, _local_poses(joints, values), figure=figure_of(joints))
+            return [replace(body, warnings=warnings)]
         poses = world_poses(joints, values, taken)
-    return [Trajectory(name, times, poses[name]) for name in taken]
+    first, *others = (Trajectory(name, times, poses[name]) for name in taken)
+    return [replace(first, warnings=warnings), *others]
 
 
 def figure_of(joints: list[Joint]) -> Figure:
@@ -204,8 +209,8 @@ class _Words:
                 self.fail("a { is missing behind a name")
         return "_".join(words)
 
-    def fail(self, problem: str) -> NoReturn:
-        raise TrajectoryError(self.path, problem, "export the BVH again", self.line)
+    def fail(self, problem: str, way_out: str = "export the BVH again") -> NoReturn:
+        raise TrajectoryError(self.path, problem, way_out, self.line)
 
 
 def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
@@ -219,7 +224,9 @@ def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
     opened: list[int | None] = []
     while (word := words.next("MOTION")).upper() != "MOTION":
         if len(joints) > MOST_JOINTS:
-            words.fail(f"more than {MOST_JOINTS} joints")
+            words.fail(f"more than {MOST_JOINTS} joints", "export fewer, such as one body at a time")
+        if len(opened) > DEEPEST:
+            words.fail(f"more than {DEEPEST} joints hang on one another", "export a shorter chain")
         joint = joints[opened[-1]] if opened and opened[-1] is not None else None
         match word.upper():
             case "ROOT" if not opened:
@@ -266,9 +273,19 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
     return channels
 
 
-def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float]:
-    """The channels' values, shape (frames, channels), and the seconds between frames, from behind the line `motion`."""
-    rows = ((number, text.strip()) for number, text in lines_of(path, after=motion) if text.strip())
+def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[str, ...]]:
+    """What is behind the line `motion`.
+
+    Returns
+    -------
+    values : array, shape (frames, channels)
+    frame_time : float
+        Seconds between frames.
+    warnings : tuple of str
+        Where there are more or fewer frames than the file says.
+    """
+    cut: list[tuple[int, str]] = []
+    rows = _finished(lines_of(path, after=motion), cut)
     settings = list(islice(rows, 2))
     count = _read_setting(path, settings[:1], "Frames:", motion)
     frame_time = _read_setting(path, settings[1:], "Frame Time:", motion)
@@ -277,10 +294,45 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
         raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", motion)
     columns = {label: index for index, label in enumerate(labels)}
     values = parse_rows(path, rows, None, columns, len(columns))
+    warnings = []
+    if cut:
+        lost = _is_cut_off(cut[0][1], len(columns))
+        if not lost:
+            last = parse_rows(path, cut, None, columns, len(columns))
+            # Where more were to come, its last number may lack digits.
+            lost = len(values) + 1 < count
+            values = values if lost else np.concatenate((values, last))
+        if lost:
+            warnings.append(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out")
     if count != len(values):
-        problem = f"Frames: says {count:g} and {len(values)} rows follow"
-        raise TrajectoryError(path, problem, "correct the number or export the BVH again", settings[0][0])
-    return values, frame_time
+        told = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
+        warnings.append(f"{path.name}:{settings[0][0]}: {told}; export the BVH again if that is not all")
+    return values, frame_time, tuple(warnings)
+
+
+def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers, without blank ones and blanks around them; a last one without an end goes to a list."""
+    before = None
+    for number, line in lines:
+        if before:
+            yield before
+        before = (number, text) if (text := line.strip()) else None
+    if before:
+        unfinished.append(before)
+
+
+def _is_cut_off(row: str, width: int) -> bool:
+    """Whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
+    *cells, last = row.split()
+    return all(map(_is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not _is_number(last))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:

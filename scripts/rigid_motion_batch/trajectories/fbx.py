@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from .fbx_records import refuse_damaged
 from .importing import read_imported, refuse_too_large
+from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory
 
 if TYPE_CHECKING:
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
 ADDON = "io_scene_fbx"
 
 
-def read(path: Path, selection: Selection) -> list[Trajectory]:
+def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
     """The whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     refuse_damaged(path)
-    return read_imported(path, selection, lambda: _import(path), ADDON, _rate)
+    return read_imported(path, selection, lambda: _import(path), ADDON, _rate, options.scale)
 
 
 def _rate(fps: float, keys: float | None) -> float:

@@ -2,7 +2,7 @@
 
 The importer gets a copy of what makes a skeleton and its skin, in a folder that is gone afterwards: no images, nor
 what extensions and extras say, and buffers only from the folder of the file. Key times are seconds; a skeleton is
-sampled as often as its keys come, or 60 times a second where they tell no rate.
+sampled as often as the keys of its densest track come, or 60 times a second where they tell no rate.
 Source: the glTF 2.0 specification, Khronos 2021.
 """
 
@@ -17,8 +17,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import unquote
 
-from .bvh import MOST_POSES
+import numpy as np
+
+from .bvh import DEEPEST, MOST_JOINTS, MOST_POSES
+from .gltf_tracks import bytes_of_uri, straightened
 from .importing import read_imported, refuse_too_large
+from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError, shown
 
 ADDON = "io_scene_gltf2"
@@ -38,12 +42,18 @@ PARTS = {
 COMPRESSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression", "KHR_draco_mesh_compression")
 """Extensions without which the numbers cannot be read."""
 
+MOST_NODES = 10_000
+"""Of a file, with all that is no joint: Blender takes seconds for so many, and four times as long for twice as many."""
+
+MOST_CHANNELS = 100_000
+"""Of all takes together: each becomes up to four F-curves."""
+
 MAGIC = b"glTF"
 
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 
 
-def read(path: Path, selection: Selection) -> list[Trajectory]:
+def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE_SAYS) -> list[Trajectory]:
     """The whole skeleton; or bones that are named, or all."""
     refuse_too_large(path)
     content = path.read_bytes()
@@ -58,9 +68,10 @@ def read(path: Path, selection: Selection) -> list[Trajectory]:
     others = _buffers(path, document)
     refuse_too_large(path, *others.values())
     _refuse_made_up(path, document)
+    _refuse_too_many(path, document)
     with TemporaryDirectory(prefix="rigid_motion_") as folder:
-        copy = _copy(Path(folder), document, binary, others)
-        return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, FPS)
+        copy, made = _copy(Path(folder), document, binary, others)
+        return read_imported(path, selection, lambda: _import(copy), ADDON, _rate, options.scale, FPS, made * FPS)
 
 
 def _rate(_: float, keys: float | None) -> float:
@@ -128,6 +139,43 @@ def _refuse_made_up(path: Path, document: dict[str, Any]) -> None:
         raise TrajectoryError(path, problem, "export the skeleton without its meshes, or split the recording")
 
 
+def _refuse_too_many(path: Path, document: dict[str, Any]) -> None:
+    """Raise TrajectoryError for more nodes, joints or channels than Blender's importer is done with in seconds."""
+    nodes, skins, animations = (_objects(document.get(name)) for name in ("nodes", "skins", "animations"))
+    joints = max((len(joints) for skin in skins if isinstance(joints := skin.get("joints"), list)), default=0)
+    channels = sum(len(_objects(animation.get("channels"))) for animation in animations)
+    fewer = "export the skeleton alone, without the rest of its scene"
+    for count, most, kind, way_out in (
+        (len(nodes), MOST_NODES, "nodes", fewer),
+        (joints, MOST_JOINTS, "joints of a skin", "export one body at a time"),
+        (channels, MOST_CHANNELS, "animated channels", "export fewer takes"),
+    ):
+        if count > most:
+            raise TrajectoryError(path, f"{count} {kind} are more than the {most} that are read", way_out)
+    if _depth(nodes) > DEEPEST:
+        problem = f"more than {DEEPEST} nodes hang on one another"
+        raise TrajectoryError(path, problem, "export a shorter chain")
+
+
+def _objects(part: Any) -> list[dict[str, Any]]:
+    return [one for one in part if isinstance(one, dict)] if isinstance(part, list) else []
+
+
+def _depth(nodes: list[dict[str, Any]]) -> int:
+    """How many nodes hang on one another at most; `DEEPEST` and one more where they hang on themselves."""
+    children = [node.get("children") for node in nodes]
+    below = [
+        [child for child in own if isinstance(child, int) and child in range(len(nodes))]
+        if isinstance(own, list)
+        else []
+        for own in children
+    ]
+    level, depth = set(range(len(nodes))), 0
+    while level and depth <= DEEPEST:
+        level, depth = {child for node in level for child in below[node]}, depth + 1
+    return depth
+
+
 def _inside(uri: str) -> bool:
     """Whether a path stays in its folder, on whatever system."""
     if SCHEME.match(uri) or PurePosixPath(uri).is_absolute() or PureWindowsPath(uri).anchor:
@@ -140,8 +188,10 @@ def _inside(uri: str) -> bool:
     return True
 
 
-def _copy(folder: Path, document: dict[str, Any], binary: bytes | None, others: dict[int, Path]) -> Path:
-    """What Blender is to import, in a folder."""
+def _copy(
+    folder: Path, document: dict[str, Any], binary: bytes | None, others: dict[int, Path]
+) -> tuple[Path, np.ndarray]:
+    """What Blender is to import, in a folder, and the times of keys in it that are in no track of the file."""
     plain = {name: _plain(part) for name, part in document.items() if name in PARTS}
     for number, other in others.items():
         plain["buffers"][number]["uri"] = name = f"buffer{number}.bin"
@@ -151,9 +201,18 @@ def _copy(folder: Path, document: dict[str, Any], binary: bytes | None, others: 
     if binary is not None and isinstance(first, dict) and first.get("uri") is None:
         (folder / "binary.bin").write_bytes(binary)
         first["uri"] = "binary.bin"
+    more, made = straightened(plain, lambda number: _bytes_of(folder, plain["buffers"][number]))
+    if more:
+        (folder / "more.bin").write_bytes(more)
+        plain["buffers"][-1]["uri"] = "more.bin"
     copy = folder / "copy.gltf"
     copy.write_text(json.dumps(plain), encoding="utf-8")
-    return copy
+    return copy, made
+
+
+def _bytes_of(folder: Path, buffer: dict[str, Any]) -> bytes:
+    uri = buffer["uri"]
+    return bytes_of_uri(uri) if uri[:5].lower() == "data:" else (folder / uri).read_bytes()
 
 
 def _plain(part: Any) -> Any:

@@ -8,7 +8,6 @@ file's. A stranger's file is data: importers are written in Python, fail in any 
 from __future__ import annotations
 
 import io
-import math
 import re
 import warnings
 from collections.abc import Callable, Iterator
@@ -21,9 +20,10 @@ import numpy as np
 
 from rigid_motion_batch.hushing import hushed
 
-from .blend import BONE_CHANNEL, TRANSFORMS, fcurves_of
+from .key_moments import BONE_CHANNEL, curves_that_move, fcurves_of, keys_of, moments_of, with_parents
 from .recordings import ALL, Selection, Trajectory, TrajectoryError, listed
 from .rigs import LAST_FRAME, joints_of, refuse_too_many, single_joints, whole_body
+from .sampling import LEAD, SAME, Moments, away, merged
 from .tables import LARGEST_FILE
 
 if TYPE_CHECKING:
@@ -37,6 +37,17 @@ ROUND = 2e-4
 
 ON_A_FRAME = 1e-4
 """What is as near to a whole frame is on it."""
+
+FINE = 1e-3
+"""By how much less fine that is for each frame from the first: F-curves keep frames in single precision."""
+
+NONE = np.empty(0)
+
+MULTIPLE = 0.05
+"""By how much of the least gap between keys others may miss its multiples."""
+
+THINNED = 4.0
+"""How many samples a key may stand for where keys were thinned."""
 
 FEW = 5
 """Names of a kind that a remark tells."""
@@ -62,7 +73,9 @@ def read_imported(
     importer: Callable[[], None],
     addon: str,
     rate_of: Callable[[float, float | None], float],
+    scale: float | None,
     fps: int = 24,
+    made: np.ndarray = NONE,
 ) -> list[Trajectory]:
     """The whole skeleton of a file; or bones that are named, or all.
 
@@ -77,8 +90,12 @@ def read_imported(
     rate_of : callable
         Given the frames a second of the scene, and how many keys there are in one where that can be believed: the
         rate to sample at.
+    scale : float or None
+        Metres of a unit, where the user says them.
     fps : int
         Frames a second of the scene to import into.
+    made : array, shape (n,)
+        Frames, rising, at which curves have keys that the file has not.
 
     Raises
     ------
@@ -92,7 +109,7 @@ def read_imported(
     try:
         with _imported(path, importer, addon, fps) as (scene, names):
             rigs = {name: obj for obj, name in names.items() if obj.type == "ARMATURE" and obj.pose}
-            return _read(path, selection, rigs, scene, rate_of)
+            return _read(path, selection, rigs, scene, rate_of, scale, made)
     except (UnicodeDecodeError, SystemError):
         raise TrajectoryError(path, "a name in this file is no text", "export it again") from None
     except MemoryError:
@@ -105,6 +122,8 @@ def _read(
     rigs: dict[str, bpy.types.Object],
     scene: bpy.types.Scene,
     rate_of: Callable[[float, float | None], float],
+    scale: float | None,
+    made: np.ndarray,
 ) -> list[Trajectory]:
     moving = {name: span for name, obj in rigs.items() if (span := _frames_of_keys(obj)) is not None}
     if not moving:
@@ -113,26 +132,23 @@ def _read(
     name, bone = _wanted(rigs, moving, selection.wanted)
     rig, fps = rigs[name], scene.render.fps / scene.render.fps_base
     first, last = moving.get(name) or next(iter(moving.values()))
-    rate = rate_of(fps, _rate_of_keys(rig, fps))
-    step = fps / rate
+    rate = rate_of(fps, _rate_of_keys(rig, fps, made))
     if not (abs(first) <= LAST_FRAME and abs(last) <= LAST_FRAME):
         refuse_too_many(path, name, 1, np.array([first, last]))
-    frames = first + step * np.arange(max(1, math.ceil((last - first) / step - ON_A_FRAME) + 1))
-    whole = np.rint(frames)
-    frames = np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
-    times = np.arange(len(frames)) / rate
+    moments = _moments(rig, first, last, fps, fps / rate, made)
     remarks = _remarks(scene, rig, name, list(rigs), several=selection.wanted in (None, ALL))
     if bone is None and selection.wanted != ALL:
-        body = whole_body(path, rig, path.stem if selection.wanted is None else name, frames, times)
+        called = path.stem if selection.wanted is None else name
+        body = whole_body(path, rig, called, moments, 1.0, scale, made_up=True)
         return [_with_remarks(body, *remarks)]
     joints = joints_of(rig)
     if bone is None:
         taken = selection.of(joints.names)
-        several = single_joints(path, rig, taken, frames, times)
+        several = single_joints(path, rig, taken, moments, scale)
         return [_with_remarks(several[0], joints.remark, *remarks), *several[1:]]
     known = bone in joints.names or bone in joints.left_out
     selection.of(joints.names, unlisted=[*joints.left_out, *([selection.wanted] if known else [])])
-    (motion,) = single_joints(path, rig, [bone], frames, times)
+    (motion,) = single_joints(path, rig, [bone], moments, scale)
     return [_with_remarks(replace(motion, name=selection.wanted), *remarks)]
 
 
@@ -172,39 +188,54 @@ def _with_remarks(trajectory: Trajectory, *remarks: str) -> Trajectory:
 # -- keys -------------------------------------------------------------------------------------------------------------
 
 
-def _moving_curves(rig: bpy.types.Object) -> Iterator[bpy.types.FCurve]:
-    """What moves the bones, the armature, and what it hangs on."""
-    obj = rig
-    while obj is not None:
+def _keys_of_curves(rig: bpy.types.Object) -> list[np.ndarray]:
+    """The frames of the keys, rising, of each curve that moves the bones, the armature, or what it hangs on."""
+    keys = []
+    for obj in with_parents(rig):
         if data := obj.animation_data:
-            for fcurve in fcurves_of(data.action, data.action_slot):
-                if fcurve.data_path.startswith(TRANSFORMS) or (obj == rig and BONE_CHANNEL.match(fcurve.data_path)):
-                    yield fcurve
-        obj = obj.parent
-
-
-def _keys(fcurve: bpy.types.FCurve) -> np.ndarray:
-    """The frames of the keys, rising."""
-    places = np.empty(2 * len(fcurve.keyframe_points), dtype=np.float32)
-    fcurve.keyframe_points.foreach_get("co", places)
-    return np.sort(places[::2].astype(np.float64))
+            curves = curves_that_move(data.action, data.action_slot, bones=obj == rig)
+            keys += [own.frames for fcurve in curves if len((own := keys_of(fcurve)).frames)]
+    return keys
 
 
 def _frames_of_keys(rig: bpy.types.Object) -> tuple[float, float] | None:
     """The first and last frame of what moves an armature. None where nothing does."""
-    keys = [keys for fcurve in _moving_curves(rig) if len(keys := _keys(fcurve))]
+    keys = _keys_of_curves(rig)
     return (min(own[0] for own in keys), max(own[-1] for own in keys)) if keys else None
 
 
-def _rate_of_keys(rig: bpy.types.Object, fps: float) -> float | None:
-    """How many keys a second there are mostly; None where that is no rate that anything is recorded at."""
-    between = [np.diff(_keys(fcurve)) for fcurve in _moving_curves(rig)]
-    between = np.concatenate(between) if between else np.empty(0)
-    between = between[between > ON_A_FRAME]
-    rate = fps / np.median(between) if len(between) else 0.0
-    if abs(rate - round(rate)) < ROUND * rate:
-        rate = float(round(rate))
-    return rate if SLOWEST <= rate <= FASTEST else None
+def _rate_of_keys(rig: bpy.types.Object, fps: float, made: np.ndarray) -> float | None:
+    """How many keys a second the densest curve has; None where that is no rate that anything is recorded at.
+
+    A curve with even gaps, or a thinned one whose gaps are multiples of the least, goes before uneven ones.
+    """
+    rates: dict[bool, list[float]] = {True: [], False: []}
+    for keys in _keys_of_curves(rig):
+        gaps = np.diff(_less(keys, made))
+        if len(gaps := gaps[gaps > ON_A_FRAME]):
+            times = gaps / gaps.min()
+            even = np.abs(times - np.rint(times)).max() < MULTIPLE and times.mean() < THINNED
+            rate = fps / (gaps.sum() / np.rint(times).sum() if even else float(np.median(gaps)))
+            rates[bool(even)].append(float(round(rate)) if abs(rate - round(rate)) < ROUND * rate else rate)
+    of_recordings = [[rate for rate in some if SLOWEST <= rate <= FASTEST] for some in rates.values()]
+    return max(of_recordings[0] or of_recordings[1], default=None)
+
+
+def _less(keys: np.ndarray, made: np.ndarray) -> np.ndarray:
+    """Frames of keys without those that were made."""
+    return keys[away(keys, made) > ON_A_FRAME * (1.0 + FINE * np.abs(keys))]
+
+
+def _moments(rig: bpy.types.Object, first: float, last: float, fps: float, step: float, made: np.ndarray) -> Moments:
+    """Even frames from the first key to the last one, and all keys between."""
+    even = first + step * np.arange(int((last - first) / step + SAME) + 1)
+    if last - even[-1] > SAME * step:
+        even = np.append(even, last)
+    keys, straight = moments_of(rig, LEAD * step)
+    frames = merged(even, _less(keys, made), step)
+    whole = np.rint(frames)
+    frames = np.where(np.abs(frames - whole) < ON_A_FRAME, whole, frames)
+    return Moments(frames, fps, first, step, straight and not len(made))
 
 
 def _other_takes(rig: bpy.types.Object, scene: bpy.types.Scene) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion.repair import LARGEST
-from rigid_motion_batch.figures import size_of, unit_of
+from rigid_motion_batch.figures import BELIEVED, NOTHING, size_of, sureness, unit_of
 
 from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
 from .options import AS_THE_FILE_SAYS, ReadingOptions
@@ -34,19 +34,22 @@ class Format:
     label: str
     extensions: tuple[str, ...]
     read: Callable[..., list[Trajectory]]
-    """Given the path, the bodies that are wanted and, where it honours any but the scale, the options."""
+    """Given the path, the bodies that are wanted and, where it honours any, the options."""
 
     recognises: Callable[[list[str]], bool] | None = None
     """Given the first lines. None where the extension is enough."""
 
     honours: tuple[str, ...] = ()
-    """The options that it takes besides the scale: for what its files do not say themselves."""
+    """The options that it takes: for what its files do not say themselves. The scale is applied to all formats."""
 
     doubted: bool = True
     """Whether it holds what people recorded, and not what they animated, which may go at any speed."""
 
     axes: str = "blender"
     """The convention of its files, where nobody says otherwise: a name in `axes.AXES`."""
+
+    in_metres: bool = True
+    """Whether its files say, or are bound, how long the unit of a body is. It may be wrong nevertheless."""
 
 
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
@@ -62,10 +65,10 @@ FORMATS = (
         honours=("columns", "time_unit", "euler", "degrees"),
     ),
     Format("A-Frame recording", (".json",), aframe.read),
-    Format("BVH", (".bvh",), bvh.read, axes="opengl"),
-    Format("FBX", (".fbx",), fbx.read, doubted=False),
-    Format("glTF", (".glb", ".gltf"), gltf.read, doubted=False),
-    Format("Blender file", (".blend",), blend.read, doubted=False),
+    Format("BVH", (".bvh",), bvh.read, axes="opengl", in_metres=False),
+    Format("FBX", (".fbx",), fbx.read, honours=("scale",), doubted=False),
+    Format("glTF", (".glb", ".gltf"), gltf.read, honours=("scale",), doubted=False),
+    Format("Blender file", (".blend",), blend.read, honours=("scale",), doubted=False),
 )
 
 
@@ -122,14 +125,14 @@ def _read(found: Format, path: Path, selection: Selection, options: ReadingOptio
     if options.scale is not None:
         trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
     else:
-        trajectories = [_sized(path, trajectory) for trajectory in trajectories]
+        trajectories = [_sized(path, trajectory, told=found.in_metres) for trajectory in trajectories]
     if found.doubted:
         trajectories = [_doubted(trajectory, "time_unit" in found.honours) for trajectory in trajectories]
     return trajectories
 
 
-def _sized(path: Path, trajectory: Trajectory) -> Trajectory:
-    """A whole body whose size tells that it is not in metres, in the unit that it is likely to be in."""
+def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
+    """A whole body in the unit that it is likely to be in by its size, where that is not told or cannot be."""
     if trajectory.figure is None:
         return trajectory
     places = _first_whole(trajectory)
@@ -137,11 +140,18 @@ def _sized(path: Path, trajectory: Trajectory) -> Trajectory:
         return trajectory
     size = size_of(trajectory.figure.parents, places) * trajectory.metres_per_unit
     unit, length = unit_of(size)
-    if length == 1.0:
+    metres = size * length
+    if size < NOTHING or (told and length == 1.0):
         return trajectory
-    taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {size * length:.3g} m"
-    remark = "; ".join(filter(None, (f"{taken} (otherwise: --scale METRES)", trajectory.remark)))
-    return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark)
+    remark, warnings = trajectory.remark, trajectory.warnings
+    if length != 1.0:
+        taken = f"{shown(path.name)} is {size:.4g} units large, which are taken for {unit}: {metres:.3g} m"
+        taken += f", {sureness(size, length)} (otherwise: --scale METRES)"
+        remark = "; ".join(filter(None, (taken, remark)))
+    if not BELIEVED[0] <= metres <= BELIEVED[1]:
+        doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
+        warnings += (f"{doubt}; if not, say how long it is: --scale METRES",)
+    return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
 
 
 def _first_whole(trajectory: Trajectory) -> np.ndarray | None:

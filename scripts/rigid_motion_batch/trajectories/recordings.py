@@ -49,6 +49,9 @@ class Trajectory:
     figure: Figure | None = None
     """Of a whole body, what it is made of."""
 
+    rate: float | None = None
+    """Samples a second, where there may be more between these."""
+
     @property
     def rigid(self) -> Poses:
         """A single rigid body of it, shape (n,): of a whole body its first root."""

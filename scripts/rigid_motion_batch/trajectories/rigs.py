@@ -6,8 +6,9 @@ its axes the direction of the bone (y); x is made square to it, z square to both
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,10 +17,11 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import align_signs, conjugate, rotate
-from rigid_motion_batch.figures import Figure
+from rigid_motion_batch.figures import Figure, size_of, unit_of
 
 from .bvh import MOST_POSES
 from .recordings import Trajectory, TrajectoryError, shown
+from .sampling import OF_JOINTS, Moments, sampled
 from .skins import carried_by, skin_of
 from .stages import probe
 
@@ -53,17 +55,6 @@ class Joints:
         return f"took the {count} bones that deform of {count + len(self.left_out)}" if self.left_out else ""
 
 
-@dataclass(frozen=True, eq=False)
-class Sampled:
-    """What was seen of an armature."""
-
-    poses: Poses
-    """Of bones in the world, shape (bones, n)."""
-
-    matrices: dict[bpy.types.Object, np.ndarray]
-    """Where the armature and what else was followed were at first, shape (4, 4) each."""
-
-
 def joints_of(rig: bpy.types.Object) -> Joints:
     """The bones that deform, if any do, or else all; parents before their children."""
     bones = list(rig.data.bones)  # Blender lists the hierarchy from its roots on.
@@ -79,7 +70,14 @@ def joints_of(rig: bpy.types.Object) -> Joints:
 
 
 def whole_body(
-    path: Path, rig: bpy.types.Object, name: str, frames: np.ndarray, times: np.ndarray, metres_per_unit: float = 1.0
+    path: Path,
+    rig: bpy.types.Object,
+    name: str,
+    moments: Moments,
+    metres_per_unit: float = 1.0,
+    scale: float | None = None,
+    *,
+    made_up: bool = False,
 ) -> Trajectory:
     """The whole skeleton of an armature, and the skin that it carries.
 
@@ -91,11 +89,13 @@ def whole_body(
         An armature, of the open file or linked.
     name : str
         What the body is to be called.
-    frames : array, shape (n,)
-        Where it is looked at; between whole frames too.
-    times : array, shape (n,)
-        When that is, in seconds.
+    moments : Moments
+        Where it is looked at; and between them where it bends.
     metres_per_unit : float
+    scale : float, optional
+        The same as the user says it. Without, a size tells whether it can be.
+    made_up : bool
+        Whether an importer made up where the bones end.
 
     Raises
     ------
@@ -105,45 +105,47 @@ def whole_body(
     joints = joints_of(rig)
     if not joints.names:
         raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "export it again with its skeleton")
-    meshes = carried_by(rig)
-    sampled = sample(path, rig, joints.names, frames, meshes)
+    meshes, metres = carried_by(rig), scale or _metres(rig, metres_per_unit)
+    with looking(path, rig, joints.names, meshes) as look:
+        seen = sampled(moments, look, joints.parents, OF_JOINTS, metres)
     # What a damaged file has beyond all measure is for the repair to say.
     with np.errstate(invalid="ignore", over="ignore"):
-        figure, poses = _figure(rig, joints, sampled, meshes), _in_parents(sampled.poses, joints.parents)
-    return Trajectory(name, times, poses, metres_per_unit, joints.remark, figure=figure)
+        figure = _figure(rig, joints, look.first, meshes, made_up=made_up)
+        poses = _in_parents(_filled(seen.poses), joints.parents)
+    body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, figure=figure)
+    return seen.told(body, moments, metres)
 
 
 def single_joints(
-    path: Path, rig: bpy.types.Object, bones: Sequence[str], frames: np.ndarray, times: np.ndarray
+    path: Path, rig: bpy.types.Object, bones: Sequence[str], moments: Moments, scale: float | None = None
 ) -> list[Trajectory]:
     """The motions of some bones in the world, a trajectory each; otherwise as `whole_body`."""
-    poses = sample(path, rig, bones, frames).poses
-    return [
-        Trajectory(name, times, Poses(poses.positions[joint], align_signs(poses.quaternions[joint])))
+    metres = scale or _metres(rig, 1.0)
+    with looking(path, rig, bones) as look:
+        seen = sampled(moments, look, np.full(len(bones), -1), OF_JOINTS, metres)
+    times, poses = moments.times(seen.frames), _filled(seen.poses)
+    rate = moments.fps / moments.step
+    first, *others = (
+        Trajectory(name, times, Poses(poses.positions[joint], align_signs(poses.quaternions[joint])), rate=rate)
         for joint, name in enumerate(bones)
-    ]
+    )
+    return [seen.told(first, moments, metres), *others]
 
 
-def sample(
-    path: Path,
-    rig: bpy.types.Object,
-    bones: Sequence[str],
-    frames: np.ndarray,
-    followed: Sequence[bpy.types.Object] = (),
-) -> Sampled:
-    """Bones in the world on some frames (n,), with everything that moves them; and where else others are at first.
+def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:
+    """The length of the unit that a rig is likely to be in, from where its joints rest."""
+    joints, there = joints_of(rig), _matrix(rig)
+    with np.errstate(invalid="ignore", over="ignore"):
+        heads = np.array([rig.data.bones[name].head_local for name in joints.names]) @ there[:3, :3].T
+        size = size_of(joints.parents, heads) * metres_per_unit
+    return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
 
-    Raises
-    ------
-    TrajectoryError
-        Where that is too much, or beyond where Blender goes, or where the pose of the armature lacks a bone.
-    """
-    refuse_too_many(path, rig.name, len(bones), frames)
-    poses = Poses(np.empty((len(bones), len(frames), 3)), np.empty((len(bones), len(frames), 4)))
-    matrices = np.empty((min(BLOCK, len(frames)), len(bones), 4, 4))
-    first: dict[bpy.types.Object, np.ndarray] = {}
-    import bpy
 
+@contextmanager
+def looking(
+    path: Path, rig: bpy.types.Object, bones: Sequence[str], followed: Sequence[bpy.types.Object] = ()
+) -> Iterator[_Look]:
+    """Look at bones in the world, with everything that moves them; `followed` are evaluated as well."""
     with probe() as obj:
         # The bones are evaluated that something depends on.
         held = obj.constraints.new("ARMATURE")
@@ -152,16 +154,45 @@ def sample(
             target.target, target.subtarget = rig, bone
         for other in followed:
             obj.constraints.new("COPY_TRANSFORMS").target = other
+        yield _Look(path, rig, bones, followed)
+
+
+@dataclass(eq=False)
+class _Look:
+    """What is seen of the bones of an armature."""
+
+    path: Path
+    rig: bpy.types.Object
+    bones: Sequence[str]
+    followed: Sequence[bpy.types.Object]
+    first: dict[bpy.types.Object, np.ndarray] = field(default_factory=dict)
+    """Where the armature and what else is followed were at first, shape (4, 4) each."""
+
+    def __call__(self, frames: np.ndarray) -> Poses:
+        """The bones on some frames (n,), shape (bones, n): NaN is the quaternion of one that has no direction.
+
+        Raises
+        ------
+        TrajectoryError
+            Where that is too much, or beyond where Blender goes, or where the pose of the armature lacks a bone.
+        """
+        import bpy
+
+        refuse_too_many(self.path, self.rig.name, len(self.bones), frames)
+        count = len(self.bones)
+        poses = Poses(np.empty((count, len(frames), 3)), np.empty((count, len(frames), 4)))
+        matrices = np.empty((min(BLOCK, len(frames)), count, 4, 4))
         scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
         rows = None
         for number, frame in enumerate(frames.tolist()):
             whole = int(np.floor(frame))
             scene.frame_set(whole, subframe=frame - whole)
-            seen = rig.evaluated_get(depsgraph)
+            seen = self.rig.evaluated_get(depsgraph)
             if rows is None:
-                rows = _rows(path, seen, bones)
+                rows = _rows(self.path, seen, self.bones)
                 raw = np.empty(16 * len(seen.pose.bones), dtype=np.float32)
-                first = {one: _matrix(one.evaluated_get(depsgraph)) for one in (rig, *followed)}
+                for one in (self.rig, *self.followed):
+                    self.first.setdefault(one, _matrix(one.evaluated_get(depsgraph)))
             seen.pose.bones.foreach_get("matrix", raw)
             row = number % BLOCK
             # They come column by column.
@@ -170,7 +201,7 @@ def sample(
                 matrices[row] = _matrix(seen) @ columns.transpose(0, 2, 1)
             if row == BLOCK - 1 or number == len(frames) - 1:
                 poses[:, number - row : number + 1] = rigid(matrices[: row + 1].transpose(1, 0, 2, 3))
-    return Sampled(Poses(poses.positions, _filled(poses.quaternions)), first)
+        return poses
 
 
 def _matrix(obj: bpy.types.Object) -> np.ndarray:
@@ -220,9 +251,9 @@ def _quaternions(rotations: np.ndarray) -> np.ndarray:
     return taken / np.linalg.norm(taken, axis=-1, keepdims=True)
 
 
-def _filled(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (bones, n, 4), those that are none being the last before, or else the first after, or no turn."""
-    for own in quaternions:
+def _filled(poses: Poses) -> Poses:
+    """Poses (bones, n) in which quaternions that are none are the last before, or else the first after, or no turn."""
+    for own in poses.quaternions:
         good = np.isfinite(own).all(axis=-1)
         if good.all():
             continue
@@ -231,7 +262,7 @@ def _filled(quaternions: np.ndarray) -> np.ndarray:
             continue
         last = np.maximum.accumulate(np.where(good, np.arange(len(own)), -1))
         own[:] = own[np.where(last >= 0, last, np.argmax(good))]
-    return quaternions
+    return poses
 
 
 def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarray:
@@ -253,11 +284,36 @@ def _in_parents(world: Poses, parents: np.ndarray) -> Poses:
     return local
 
 
-def _figure(rig: bpy.types.Object, joints: Joints, sampled: Sampled, meshes: Sequence[bpy.types.Object]) -> Figure:
-    bones, there = rig.data.bones, sampled.matrices[rig]
+def _figure(
+    rig: bpy.types.Object,
+    joints: Joints,
+    matrices: dict[bpy.types.Object, np.ndarray],
+    meshes: Sequence[bpy.types.Object],
+    *,
+    made_up: bool,
+) -> Figure:
+    bones, there = rig.data.bones, matrices[rig]
     rest = rigid(there @ np.array([bones[name].matrix_local for name in joints.names]))
-    rest = Poses(rest.positions, _filled(rest.quaternions[:, None])[:, 0])
+    rest = _filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
     ends = np.array([bones[name].tail_local for name in joints.names]) @ there[:3, :3].T + there[:3, 3]
     tails = rotate(conjugate(rest.quaternions), ends - rest.positions)
-    skin = skin_of(meshes, joints.names, sampled.matrices)
+    largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
+    tails = _shortened(tails, rest.positions, joints.parents, largest)
+    skin = skin_of(meshes, joints.names, matrices)
     return Figure(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin)
+
+
+def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:
+    """Tails (joints, 3) of bones that reach no farther than to their children, or else as far as from their parents.
+
+    Bones up to the largest length stay: longer ones than a body is large are an importer's, where it took other units.
+    """
+    hanging = np.flatnonzero(parents >= 0)
+    gaps = np.linalg.norm(heads[hanging] - heads[parents[hanging]], axis=-1)
+    reach = np.zeros(len(parents))
+    np.maximum.at(reach, parents[hanging], gaps)
+    ends = reach[hanging] == 0.0
+    reach[hanging[ends]] = gaps[ends]
+    lengths = np.linalg.norm(tails, axis=-1)
+    longer = (reach > 0.0) & (lengths > np.maximum(reach, largest))
+    return np.where(longer[:, None], tails * (reach / np.where(longer, lengths, 1.0))[:, None], tails)

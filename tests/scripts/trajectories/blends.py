@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+import numpy as np
 import pytest
+
+from rigid_motion_batch.trajectories import Trajectory
 
 bpy = pytest.importorskip("bpy")
 
@@ -41,3 +45,10 @@ def key(animated: bpy.types.Object | bpy.types.PoseBone, frame: float, **channel
     for channel, value in channels.items():
         setattr(animated, channel, value)
         animated.keyframe_insert(channel, frame=frame)
+
+
+def on_frames(trajectory: Trajectory) -> Trajectory:
+    """A trajectory without what was sampled between even frames."""
+    frames = trajectory.times * trajectory.rate
+    rows = np.abs(frames - np.rint(frames)) < 1e-6
+    return replace(trajectory, times=trajectory.times[rows], poses=trajectory.poses[..., rows])

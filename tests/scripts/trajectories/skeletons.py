@@ -47,7 +47,7 @@ def body(name: str = "Body", fps: int = 24, size: tuple[float, float, float] = U
         half = 0.02 * frame
         key(obj, frame, location=(0.01 * frame, 0.1, 0.2), rotation_quaternion=(np.cos(half), 0, 0, np.sin(half)))
         for number, bone in enumerate(obj.pose.bones):
-            key(bone, frame, rotation_euler=(0.3 * np.sin(0.3 * frame + number), 0.005 * number * frame, 0.2))
+            key(bone, frame, rotation_euler=(0.3 * np.sin(0.1 * frame + number), 0.005 * number * frame, 0.2))
     scene.frame_set(FRAMES[0])
     return obj
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.trajectories import read_trajectories
-from tests.scripts.trajectories.blends import FPS, empty, key
+from tests.scripts.trajectories.blends import FPS, empty, key, on_frames
 
 bpy = pytest.importorskip("bpy")
 anim_utils = pytest.importorskip("bpy_extras.anim_utils")
@@ -22,7 +22,7 @@ def test_an_object_is_sampled_on_every_frame_of_its_action(saved) -> None:
     for frame in range(11, 22):
         bpy.context.scene.frame_set(frame)
         expected.append(drill.location[1])
-    (trajectory,) = read_trajectories(saved()).trajectories
+    (trajectory,) = map(on_frames, read_trajectories(saved()).trajectories)
     assert trajectory.name == "Drill"
     np.testing.assert_allclose(trajectory.times, np.arange(11, 22) / FPS, rtol=1e-15)
     np.testing.assert_allclose(trajectory.poses.positions[:, 1], expected, atol=1e-6)
@@ -39,7 +39,7 @@ def test_parents_constraints_and_hidden_objects_are_evaluated(saved) -> None:
     empty("Follower").constraints.new("COPY_TRANSFORMS").target = child
     path = saved()
     for name in ("Child", "Follower"):
-        (trajectory,) = read_trajectories(f"{path}:{name}").trajectories
+        (trajectory,) = map(on_frames, read_trajectories(f"{path}:{name}").trajectories)
         assert len(trajectory.times) == 30, "the scene's frames, for want of an Action of its own"
         np.testing.assert_allclose(trajectory.poses.positions[[0, -1]], [[2, 0, 0], [0, 2, 0]], atol=1e-6)
     (trajectory,) = read_trajectories(f"{path}:Parent").trajectories

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.trajectories import read_trajectories
+from rigid_motion_batch.trajectories import ReadingOptions, read_trajectories
 from tests.scripts.trajectories import seeds
 
 ARM = f"""{seeds.ARM}Frames: 2
@@ -96,6 +96,65 @@ def test_position_channels_take_the_place_of_the_offset(write) -> None:
     text = text.replace("0 0 0  0 0 0  0 0 0", "0 0 0  0 0 0  3 2 1  0 0 0")
     _, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
     np.testing.assert_allclose(elbow.poses.positions, [[1, 2, 3], [1 - 2, 5 + 1, 3]], atol=1e-15)
+
+
+@pytest.mark.parametrize("count", [1, 3, 60])
+def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, count: int) -> None:
+    path = write("arm.bvh", ARM.replace("Frames: 2", f"Frames: {count}"))
+    (body,) = read_trajectories(path).trajectories
+    (warning,) = body.warnings
+    assert warning.startswith(f"arm.bvh:17: Frames: says {count} and 2 whole rows follow")
+    np.testing.assert_array_equal(body.times, [0.0, 0.04])
+    assert read_trajectories(write("arm.bvh", ARM)).trajectories[0].warnings == ()
+    shoulder, elbow = read_trajectories(write("arm.bvh", ARM.replace("Frames: 2", "Frames: 3")) + ":*").trajectories
+    assert (len(shoulder.warnings), len(elbow.warnings)) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "metres", "told"),
+    [
+        (1.7, "", 1.7, ""),
+        (4.0, "", 4.0, ""),
+        (170.0, "centimetres", 1.7, "the only usual unit that makes a grown-up of it"),
+        (7.0, "feet", 2.13, "the only usual unit that makes a grown-up of it"),
+        (17.0, "units of CMU's motion capture", 0.96, "may as well be decimetres (1.7 m)"),
+        (5.5, "feet", 1.68, "the only usual"),
+        (0.1, "", 0.1, ""),
+        (60.0, "inches", 1.52, ""),
+    ],
+)
+def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: str, metres: float, told: str) -> None:
+    text = ARM.replace("2.0 0.0 0.0", f"{size} 0.0 0.0")
+    (body,) = read_trajectories(path := write("arm.bvh", text)).trajectories
+    found = size * body.metres_per_unit
+    assert unit in body.remark
+    assert told in body.remark
+    doubted = "; if not, say how long it is: --scale METRES" in " ".join(body.warnings)
+    assert doubted == (not 0.5 <= found <= 2.5)
+    if doubted:
+        assert f"it is {found:.3g} m large" in body.warnings[-1]
+    if size > 1.0:
+        assert found == pytest.approx(metres, abs=5e-3)
+    (scaled,) = read_trajectories(path, ReadingOptions(scale=0.5)).trajectories
+    assert (scaled.metres_per_unit, scaled.remark, scaled.warnings) == (0.5, "", ())
+
+
+ROW = "2 5 0  90 0 0  -91 0 12.5"
+
+
+@pytest.mark.parametrize("kept", [1, 6, 9, 10, 17, 21, 22, 24, 25])
+def test_a_file_that_is_cut_off_in_a_row_loses_that_row_with_a_warning(write, kept: int) -> None:
+    path = write("arm.bvh", ARM.replace("Frames: 2", "Frames: 60") + ROW[:kept])
+    (body,) = read_trajectories(path).trajectories
+    assert len(body.times) == 2
+    cut, short = body.warnings
+    assert cut == "arm.bvh:21: the file is cut off in this row, which is left out"
+    assert short.startswith("arm.bvh:17: Frames: says 60 and 2 whole rows follow")
+
+
+def test_the_last_row_needs_no_end_of_line(write) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM.rstrip())).trajectories
+    assert (len(body.times), body.warnings) == (2, ())
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "1e308"])
@@ -187,15 +246,21 @@ def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
         (ARM.split("Frames")[0], 16, "'' where Frames: and a positive number are expected"),
         (ARM.split("Frame Time")[0], 16, "'' where Frame Time: and a positive number are expected"),
         (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
-        (ARM.replace("Frames: 2", "Frames: 3"), 17, "Frames: says 3 and 2 rows follow"),
-        (ARM.replace("Frames: 2", "Frames: 1"), 17, "Frames: says 1 and 2 rows follow"),
         (ARM.replace("Time: 0.04", "Time: 0"), 18, "'Frame Time: 0' where Frame Time: and a positive number"),
         (ARM.replace("1 5 0 ", "1 5 "), 20, "8 columns where 9 are needed"),
         (ARM.replace("1 5 0 ", "1 5 0 0 "), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0 ", "1 5 0 0 ").rstrip(), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0  90", "1 5 0  9O").rstrip(), 20, "Shoulder Zrotation is '9O', not a number"),
         (ARM.replace("1 5 0  90", "1 5 0  9O"), 20, "Shoulder Zrotation is '9O', not a number"),
         (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
         ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
-        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "the file ends where MOTION is expected"),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
+        (
+            "HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000,
+            2,
+            "more than 3000 joints; export fewer, such as one body",
+        ),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 400, 2, "the file ends where MOTION is expected"),
         (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
     ],
 )

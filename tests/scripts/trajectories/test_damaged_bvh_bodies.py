@@ -68,7 +68,7 @@ def seed(
     for name in ("Hips", "Prop")[:roots]:
         body = hierarchy(name, 2, channels, 2)
         text += body.replace("JOINT", "ROOT", 1).replace(channels, f"6 {places} {turns}", 1)
-    sizes = np.array([30.0 if kind == "rotation" else 0.05 for kind in re.findall("[XYZ](position|rotation)", text)])
+    sizes = np.array([30.0 if kind == "rotation" else 0.4 for kind in re.findall("[XYZ](position|rotation)", text)])
     text += f"MOTION\nFrames: {frames}\nFrame Time: 0.0333333\n"
     for frame in range(frames):
         values = sizes * (1.0 + np.sin(speed * frame + np.arange(len(sizes))))

@@ -6,22 +6,28 @@ import base64
 import json
 import os
 import struct
+import time
 import warnings
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.comparison.stage.armature import Rest
+from rigid_motion_batch.comparison.stage.physique import figure_size
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.trajectories import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
 from rigid_motion_batch.trajectories.fbx_records import FIRST
+from rigid_motion_batch.trajectories.sampling import CLOSEST
 from tests.blank import blank
 from tests.recordings import RECORDINGS
-from tests.scripts.trajectories.blends import empty, key, rig
+from tests.scripts.trajectories.blends import empty, key, on_frames, rig
+from tests.scripts.trajectories.glbs import soldier
 from tests.scripts.trajectories.skeletons import (
     BONES,
     CARRYING,
@@ -100,7 +106,7 @@ def test_the_skin_moves_with_its_joints_as_in_blender(scene, tmp_path: Path, end
         blank()
     else:
         export(path)
-    walk = whole(path)
+    walk = on_frames(whole(path))
     skin, rest = walk.figure.skin, walk.figure.rest
     moved = placed(in_world(walk), inverse(rest[:, None]))
     carried = moved.positions[skin.joints] + np.stack(
@@ -120,10 +126,10 @@ def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) ->
     path, seen = exported(ending)
     world = in_world(walk := whole(path))
     for source in ("Hand", "Body/Hand"):
-        (hand,) = read_trajectories(f"{path}:{source}").trajectories
+        (hand,) = map(on_frames, read_trajectories(f"{path}:{source}").trajectories)
         assert (hand.name, hand.figure) == (source, None)
         np.testing.assert_allclose(hand.poses.positions, seen[-1], atol=SINGLE)
-    everything = read_trajectories(f"{path}:*").trajectories
+    everything = [*map(on_frames, read_trajectories(f"{path}:*").trajectories)]
     assert tuple(one.name for one in everything) == walk.figure.joints
     for joint, one in enumerate(everything):
         np.testing.assert_allclose(one.poses.positions, world.positions[joint], atol=1e-12)
@@ -143,11 +149,34 @@ def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: s
     recording = read_trajectories(str(export(tmp_path / f"walk{ending}")))
     assert recording.trajectories[0].metres_per_unit == 0.01
     assert "taken for centimetres" in recording.note
+    assert recording.trajectories[0].warnings == ()
+
+
+@pytest.mark.parametrize("ending", [".glb", ".blend"])
+def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
+    path = soldier().write(tmp_path / "soldier.glb")
+    if ending == ".blend":
+        with hushed():
+            bpy.ops.import_scene.gltf(filepath=str(path))
+        path = path.with_suffix(".blend")
+        (obj,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+        assert max(obj.dimensions) > 20.0, "Blender has the bones of joints without children end far away"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        blank()
+    recording = read_trajectories(str(path))
+    (found,) = recording.trajectories
+    assert (found.metres_per_unit, recording.note, found.warnings) == (1.0, "", ())
+    assert np.linalg.norm(found.figure.tails, axis=-1).max() < 1.0
+    rest = Rest.of(found.figure, 1.0, "blender")
+    assert figure_size(rest) == pytest.approx(1.73, abs=0.01)
+    assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
+    far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
+    assert figure_size(far) == figure_size(rest)
 
 
 def test_keys_that_come_closer_than_the_frames_of_an_fbx_count(exported, monkeypatch: pytest.MonkeyPatch) -> None:
     path, seen = exported(".fbx", fps=60)
-    monkeypatch.setattr(importing, "_rate_of_keys", lambda rig, fps: None)
+    monkeypatch.setattr(importing, "_rate_of_keys", lambda *_: None)
     assert len(whole(path).times) == len(FRAMES)
     monkeypatch.undo()
     content = path.read_bytes()
@@ -168,7 +197,7 @@ def test_a_gltf_without_a_rate_is_sampled_60_times_a_second(scene, tmp_path: Pat
         key(obj.pose.bones["Upper"], frame, rotation_euler=(0.1 * frame, 0, 0))
     bpy.context.scene.render.fps, bpy.context.scene.frame_start, bpy.context.scene.frame_end = 24, 0, 40
     path = export(tmp_path / "walk.glb", export_force_sampling=False)
-    assert 1.0 / np.diff(whole(path).times).mean() == pytest.approx(rate)
+    assert 1.0 / np.diff(on_frames(whole(path)).times).mean() == pytest.approx(rate)
 
 
 def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) -> None:
@@ -264,7 +293,7 @@ def matrices_of_curves(obj: bpy.types.Object, frame: float) -> dict[str, np.ndar
 @pytest.mark.parametrize(("name", "count"), [("pab_run", 21), ("pab_walk", 41)])
 def test_other_peoples_bodies_are_where_their_curves_put_them(scene, name: str, count: int) -> None:
     path = RECORDINGS.parent / "rigs" / f"{name}.fbx"
-    walk = whole(path)
+    walk = on_frames(whole(path))
     assert walk.poses.shape == (66, count)
     np.testing.assert_allclose(walk.times, np.arange(count) / 30.0)
     with hushed(), warnings.catch_warnings():
@@ -277,6 +306,28 @@ def test_other_peoples_bodies_are_where_their_curves_put_them(scene, name: str, 
     # Blender evaluates in single precision through chains of 20 bones: 1e-7 of the size each.
     assert np.abs(places(walk, walk.figure.joints) - expected).max() < 1e-5 * size
     assert 1.0 < size < 2.0
+
+
+@pytest.mark.recordings
+def test_keys_between_the_frames_of_other_peoples_bodies_are_read_too(scene) -> None:
+    path = RECORDINGS.parent / "rigs" / "pab_run.fbx"
+    run = whole(path)
+    assert run.rate == 30.0
+    with hushed(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    (obj,) = (one for one in bpy.data.objects if one.type == "ARMATURE")
+    data = obj.animation_data
+    curves = anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+    keys = np.unique([point.co.x for fcurve in curves for point in fcurve.keyframe_points])
+    assert np.abs(run.times * 30.0 + 1.0 - keys[:, None]).min(axis=1).max() < CLOSEST
+    between = (keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel()
+    expected = [matrices_of_curves(obj, frame) for frame in between.tolist()]
+    seen = np.array([[matrices[joint][:3, 3] for matrices in expected] for joint in run.figure.joints])
+    local = [interpolate(run.times, own, (between - 1.0) / 30.0, "lerp_slerp") for own in run.poses]
+    poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
+    found = run.figure.skeleton.in_root_space(poses).positions
+    assert np.linalg.norm(found - seen, axis=-1).max() < 1e-3
 
 
 # -- what is open stays -----------------------------------------------------------------------------------------------
@@ -386,6 +437,40 @@ def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_fo
         assert " is not as long as it says" in (said := refusal(str(path))[1]) or "more than" in said
     path.write_bytes(record(zlib.compress(bytes(1 << 26)), 1 << 23))
     assert refusal(str(path))[1].startswith("Blender cannot import this file ("), "which is sound, and no skeleton"
+
+
+def with_more(path: Path, **more: list) -> str:
+    """The same glTF with more parts at the end of its lists."""
+    document = json.loads(path.read_text())
+    for name, parts in more.items():
+        document[name] = document.get(name, []) + parts
+    path.write_text(json.dumps(document))
+    return str(path)
+
+
+def test_more_nodes_joints_and_channels_than_blender_takes_in_seconds_are_refused_at_once(exported, refusal) -> None:
+    path, _ = exported(".gltf")
+    whole(path)
+    count = len(json.loads(path.read_text())["nodes"])
+    started = time.perf_counter()
+    chain = [{"children": [count + number + 1]} for number in range(5000)]
+    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith("more than 500 nodes hang on one another; export")
+    assert refusal(with_more(path, nodes=[{}] * 200_000))[1].startswith(
+        f"{count + 205_001} nodes are more than the 10000"
+    )
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps(document | {"nodes": document["nodes"][:count]}))
+    whole(path)
+    skin = {"joints": list(range(4000))}
+    assert refusal(with_more(path, skins=[skin]))[1].startswith("4000 joints of a skin are more than the 3000 that")
+    document["skins"], document["nodes"] = document["skins"][:1], document["nodes"][:count]
+    path.write_text(json.dumps(document))
+    take = {"channels": [{}] * 200_000}
+    assert (
+        "animated channels are more than the 100000 that are read; export fewer"
+        in refusal(with_more(path, animations=[take]))[1]
+    )
+    assert time.perf_counter() - started < 20.0
 
 
 OUTSIDE = [

@@ -125,9 +125,14 @@ def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarra
 
 
 def figure_size(rest: Rest) -> float:
-    """The largest extent of a figure at rest, without what only carries it about."""
+    """The largest extent of the joints of a figure at rest, without what only carries it about.
+
+    Where bones end is often made up by importers, and counts for a single joint alone.
+    """
     seen = seen_bones(rest)
-    return max(float(np.ptp(np.concatenate((rest.joints.positions[seen], rest.tails[seen])), axis=0).max()), 1e-6)
+    heads = rest.joints.positions[seen]
+    extent = float(np.ptp(heads, axis=0).max())
+    return max(extent or float(np.ptp(np.concatenate((heads, rest.tails[seen])), axis=0).max()), 1e-6)
 
 
 def seen_bones(rest: Rest) -> list[int]:

@@ -45,6 +45,14 @@ class Clip:
     figure: Figure | None = None
     """What a whole body is made of; None for a single rigid body."""
 
+    rate: float | None = None
+    """Samples a second, where there may be more between these."""
+
+    @property
+    def samples_a_second(self) -> float:
+        """The rate of the recording, which tells it or has it between most samples."""
+        return self.rate or 1.0 / float(np.median(np.diff(self.times)))
+
     def in_metres(self, poses: Poses) -> Poses:
         """Poses of this clip with positions in metres."""
         if self.metres_per_unit == 1.0:

@@ -92,13 +92,15 @@ def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_
 
 def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip:
     """A trajectory, repaired. Raises TrajectoryError where fewer than two poses are left of it."""
-    times, poses, repairs = repair(trajectory.times, trajectory.poses)
+    times, poses, repairs = repair(trajectory.times, trajectory.poses, trajectory.rate)
     if len(times) < 2:
         found = "; ".join(map(str, repairs))
         raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
     figure, drawn = repaired(trajectory.figure) if trajectory.figure else (None, ())
     notes = (*trajectory.warnings, *map(str, repairs), *map(printable, drawn))
-    return Clip(name, source, axes, times, poses, notes, trajectory.metres_per_unit, figure=figure)
+    return Clip(
+        name, source, axes, times, poses, notes, trajectory.metres_per_unit, figure=figure, rate=trajectory.rate
+    )
 
 
 def clip_names(wanted: Sequence[tuple[str, str]]) -> list[str]:

@@ -76,7 +76,7 @@ def write_recording(arrays: Path, facts: Path, clips: Sequence[Clip], note: str)
         np.savez(beside, **content)
     listed = [
         {"name": clip.name, "source": clip.source, "axes": clip.axes, "repairs": clip.repairs}
-        | {"metres_per_unit": clip.metres_per_unit, "body": clip.body}
+        | {"metres_per_unit": clip.metres_per_unit, "body": clip.body, "rate": clip.rate}
         | {"joints": list(clip.figure.joints) if clip.figure else []}
         for clip in clips
     ]
@@ -136,6 +136,7 @@ def read_clip(output: Path, reference: ClipReference) -> Clip:
         facts["metres_per_unit"],
         facts["body"],
         _figure_of(facts["joints"], of_figure) if of_figure else None,
+        facts["rate"],
     )
 
 

@@ -116,21 +116,37 @@ def read_bvh(path: Path, metres: float) -> Body:
     return Body(joints, parents, np.arange(len(values)) * frame_time, local, up=1)
 
 
+def frames_and_keys(rig: bpy.types.Object) -> np.ndarray:
+    """Whole frames, and the keys that are farther than an eightieth of a frame from these and from one another."""
+    first, last = map(round, rig.animation_data.action.frame_range)
+    found = list(range(first, last + 1))
+    keys = set()
+    while rig:
+        for layer in rig.animation_data.action.layers if rig.animation_data else ():
+            bag = layer.strips[0].channelbag(rig.animation_data.action_slot)
+            keys |= {point.co.x for fcurve in bag.fcurves for point in fcurve.keyframe_points}
+        rig = rig.parent
+    for key in sorted(keys):
+        if min(abs(key - frame) for frame in found) >= 0.0125:
+            found.append(key)
+    return np.array(sorted(found), dtype=float)
+
+
 def read_fbx(path: Path) -> Body:
-    """What an armature shows on every frame, as Blender imports it by default."""
+    """What an armature shows on every frame and at every key, as Blender imports it by default."""
     blank()
     with hushed(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         bpy.ops.import_scene.fbx(filepath=str(path))
     (rig,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
     scene, bones = bpy.context.scene, list(rig.data.bones)
-    first, last = map(round, rig.animation_data.action.frame_range)
-    seen = np.empty((len(bones), last - first + 1, 4, 4))
-    for frame in range(first, last + 1):
-        scene.frame_set(frame)
+    frames = frames_and_keys(rig)
+    seen = np.empty((len(bones), len(frames), 4, 4))
+    for sample, frame in enumerate(frames.tolist()):
+        scene.frame_set(int(frame // 1), subframe=frame % 1)
         there = np.array(rig.matrix_world, dtype=float)
         for number, bone in enumerate(bones):
-            seen[number, frame - first] = there @ np.array(rig.pose.bones[bone.name].matrix, dtype=float)
+            seen[number, sample] = there @ np.array(rig.pose.bones[bone.name].matrix, dtype=float)
     # A bone goes along its y axis; x is what is left of it across.
     axes, triangle = np.linalg.qr(seen[..., :3, [1, 0]])
     y, x = np.moveaxis(axes * np.sign(np.einsum("...ii->...i", triangle))[..., None, :], -1, 0)
@@ -145,7 +161,7 @@ def read_fbx(path: Path) -> Body:
     rate = scene.render.fps / scene.render.fps_base
     names = [bone.name for bone in bones]
     blank()
-    return Body(names, parents, np.arange(last - first + 1) / rate, local, up=2)
+    return Body(names, parents, (frames - frames[0]) / rate, local, up=2)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,140 @@
+"""When the keys come that move an object or the bones of a rig: of its Action, its NLA strips and its parents.
+
+Frames are those of the scene: keys in strips are where the strips put them, scaled, repeated and reversed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import bpy
+
+TRANSFORMS = ("location", "rotation_", "scale", "delta_")
+"""How the data paths of the channels begin that move an object."""
+
+BONE_CHANNEL = re.compile(r'pose\.bones\["(?P<name>(?:\\.|[^"\\])*)"\]\.(?:location|rotation_|scale)', re.DOTALL)
+"""The data paths of the channels that move a pose bone, whose name is escaped in them."""
+
+CONSTANT, LINEAR = 0, 1
+"""Blender's numbers of the interpolations of keys."""
+
+MOST_KEYS = 1_000_000
+"""Of a strip with all of its repeats; keys of one with more are left to looking between samples."""
+
+
+NOISE = 1e-5
+"""By how much values may differ that are one and the same: of the largest of a curve, or of 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """The keys of an F-curve."""
+
+    frames: np.ndarray
+    """Shape (n,), rising."""
+
+    jumps: np.ndarray
+    """Shape (n,): whether the curve jumps to that key, from a constant value before it to another one."""
+
+    straight: bool
+    """Whether there are straight lines or constant values between them."""
+
+
+def fcurves_of(action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None) -> Iterator[bpy.types.FCurve]:
+    """What an Action has for one of its slots."""
+    from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+    if action is not None and slot is not None:
+        channelbag = action_get_channelbag_for_slot(action, slot)
+        yield from channelbag.fcurves if channelbag else ()
+
+
+def curves_that_move(
+    action: bpy.types.Action | None, slot: bpy.types.ActionSlot | None, *, bones: bool
+) -> Iterator[bpy.types.FCurve]:
+    """The F-curves of a slot that move its object, and with `bones` those that move the bones of its pose."""
+    for fcurve in fcurves_of(action, slot):
+        if fcurve.data_path.startswith(TRANSFORMS) or (bones and BONE_CHANNEL.match(fcurve.data_path)):
+            yield fcurve
+
+
+def keys_of(fcurve: bpy.types.FCurve) -> Keys:
+    """The keys of an F-curve, by their frames."""
+    points = fcurve.keyframe_points
+    places, kinds = np.empty(2 * len(points), dtype=np.float32), np.empty(len(points), dtype=np.int32)
+    points.foreach_get("co", places)
+    points.foreach_get("interpolation", kinds)
+    frames, values = places.reshape(-1, 2).T.astype(np.float64)
+    order = np.argsort(frames, kind="stable")
+    frames, values, kinds = frames[order], values[order], kinds[order]
+    changes = np.abs(np.diff(values)) > NOISE * np.abs(values).max(initial=1.0)
+    jumps = np.append(False, (kinds[:-1] == CONSTANT) & changes)[: len(frames)]
+    return Keys(frames, jumps, bool(np.isin(kinds, (CONSTANT, LINEAR)).all()))
+
+
+def with_parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """An object, and what it hangs on."""
+    while obj is not None:
+        yield obj
+        obj = obj.parent
+
+
+def moments_of(obj: bpy.types.Object, lead: float) -> tuple[np.ndarray, bool]:
+    """The frames at which a curve may bend or jump that moves an object, its bones or its parents.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    lead : float
+        So many frames before a jump there is another moment.
+
+    Returns
+    -------
+    frames : array, shape (n,)
+        In any order, some of them several times.
+    straight : bool
+        Whether there is nothing but straight lines and steps between them.
+    """
+    found, straight = [np.empty(0)], True
+    for one in with_parents(obj):
+        if data := one.animation_data:
+            for fcurve in curves_that_move(data.action, data.action_slot, bones=True):
+                keys = keys_of(fcurve)
+                found += [keys.frames, keys.frames[keys.jumps] - lead]
+                straight &= keys.straight and not fcurve.modifiers
+            for track in data.nla_tracks:
+                found += _of_strips(track.strips, lead)
+                straight = False
+    return np.concatenate(found), straight
+
+
+def _of_strips(strips: bpy.types.NlaStrips, lead: float) -> Iterator[np.ndarray]:
+    for strip in strips:
+        yield np.array([strip.frame_start - lead, strip.frame_start, strip.frame_end])
+        yield np.array([strip.frame_start + strip.blend_in, strip.frame_end - strip.blend_out])
+        if strip.type == "META":
+            yield from _of_strips(strip.strips, lead)
+        elif strip.action is not None and not strip.use_animated_time:
+            for fcurve in curves_that_move(strip.action, strip.action_slot, bones=True):
+                yield _in_strip(strip, keys_of(fcurve), lead)
+
+
+def _in_strip(strip: bpy.types.NlaStrip, keys: Keys, lead: float) -> np.ndarray:
+    """Where a strip puts the keys of its Action, in each of its repeats, which begin with a jump as a rule."""
+    first, last, scale = strip.action_frame_start, strip.action_frame_end, abs(strip.scale)
+    length = (last - first) * scale
+    rows = (keys.frames >= first) & (keys.frames <= last)
+    if not length > 0.0 or strip.repeat * np.count_nonzero(rows) > MOST_KEYS:
+        return np.empty(0)
+    begins = strip.frame_start + length * np.arange(np.ceil(strip.repeat))
+    frames, jumps = keys.frames[rows], keys.frames[rows & keys.jumps]
+    places = (last - frames if strip.use_reverse else frames - first) * scale
+    around = (last - jumps) * scale + lead if strip.use_reverse else (jumps - first) * scale - lead
+    moments = np.add.outer(begins, np.concatenate((places, around, [0.0, -lead]))).ravel()
+    return moments[(moments >= strip.frame_start - lead) & (moments <= strip.frame_end)]

@@ -1,0 +1,278 @@
+"""Which moments of a motion become samples: so many that what lies between them is on a straight way.
+
+A recording is looked at on even frames, and at every key of every curve. Where Blender then shows something else
+between two samples than lines and even turns (`lerp_slerp`) from the one to the other, the gap between them is halved,
+and its halves again. Everyday recordings, with a key on every frame, stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import angle_between
+
+from .bvh import MOST_POSES
+from .recordings import Trajectory
+
+WITHIN = 1e-3
+"""Metres: how far off what lies between two samples may be."""
+
+OF_JOINTS, OF_OBJECTS = 0.03, 0.1
+"""Metres around a joint and an object in which all points count, as in comparisons."""
+
+SEEN = 0.6
+"""The share of that at which a gap is halved: of a cubic curve, the looks see at least three quarters of the most."""
+
+LOOKS = np.array([0.25, 0.75])
+"""Where in a gap is looked. Half-way an ease in and out would seem to be a straight line."""
+
+HALF_WAY = np.array([0.5])
+"""Where curves of straight lines are looked at: what several of them make together bends to one side."""
+
+WIDE = np.radians(20.0)
+"""A turn from sample to sample that is wider is looked at as if it were eased: quaternions on a line ease it."""
+
+HALVINGS = 8
+"""How often a gap may be halved."""
+
+CLOSEST = 0.0125
+"""Keys that are closer, in steps of the recording, are one: to Blender a hundredth of a frame is none."""
+
+LEAD = 2.0 * CLOSEST
+"""How long a jump takes, in steps."""
+
+SAME = 2e-3
+"""By how much gaps may differ, in steps, that are the same: F-curves keep frames in single precision."""
+
+LEAST = 1e-6
+"""Radians: a smaller turn is divided like a line."""
+
+FLIP = np.radians(60.0)
+"""What is turned farther off between two frames, and back, are angles that jump by a whole turn."""
+
+MOST_ADDED = 20
+"""Samples for each that there is without; noise may ask for any number."""
+
+BLOCK = 256
+"""Gaps that are looked into at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """When to look at a recording at first."""
+
+    frames: np.ndarray
+    """Shape (n,), rising; between whole frames too."""
+
+    fps: float
+    """Frames a second."""
+
+    begin: float = 0.0
+    """The frame at which the time is 0."""
+
+    step: float = 1.0
+    """Frames between two samples of the recording."""
+
+    straight: bool = False
+    """Whether all keys are joined by straight lines or steps."""
+
+    def times(self, frames: np.ndarray) -> np.ndarray:
+        """Seconds."""
+        return (frames - self.begin) / self.fps
+
+
+def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
+    """Even frames (n,), rising, and the keys between the first and the last of them, less those as good as one.
+
+    A key that is near to an even frame is on it, and of several near to one another the first is taken.
+    """
+    keys = np.unique(keys[(keys > even[0]) & (keys < even[-1])])
+    kept: list[float] = []
+    for key in keys[away(keys, even) >= CLOSEST * step].tolist():
+        if not kept or key - kept[-1] >= CLOSEST * step:
+            kept.append(key)
+    return np.sort(np.concatenate((even, kept)))
+
+
+def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """How far the nearest of others, which rise, is from each of some frames; shape of the frames."""
+    if not len(others):
+        return np.full(len(frames), np.inf)
+    behind = np.searchsorted(others, frames).clip(1, max(len(others) - 1, 1))
+    return np.minimum(np.abs(frames - others[behind - 1]), np.abs(frames - others[behind.clip(max=len(others) - 1)]))
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Samples, and what there is to say of the gaps between them."""
+
+    frames: np.ndarray
+    """Shape (n,), rising."""
+
+    poses: Poses
+    """In the world, shape (joints, n)."""
+
+    added: int = 0
+    """How many samples halved a gap."""
+
+    off: float = 0.0
+    """How far off what lies between two samples is where halving does not help, in the unit of the poses; else 0."""
+
+    gaps: tuple[float, ...] = ()
+    """The frames where these gaps begin."""
+
+    flips: int = 0
+    """Gaps in which something turns over and back."""
+
+    def told(self, trajectory: Trajectory, moments: Moments, metres: float) -> Trajectory:
+        """A trajectory of these samples with its rate and what there is to say; its unit is of so many metres."""
+        remarks, warnings = [trajectory.remark], trajectory.warnings
+        if self.added:
+            remarks.append(f"added {self.added} samples between frames, where it bends by more than a millimetre")
+        if self.flips:
+            remarks.append(
+                f"between {self.flips} pairs of samples a joint turns over and back, as angles do that jump by a turn; "
+                "taken to go the short way"
+            )
+        if self.gaps:
+            first, count = moments.times(np.array(self.gaps[:1]))[0], len(self.gaps)
+            warnings += (
+                f"it jumps, or swings too fast, in {count} gap{'s' * (count > 1)} between samples, first at "
+                f"{first:.4g} s: what lies there is up to {1e3 * metres * self.off:.3g} mm off a straight way; "
+                "give it keys at such moments, or smooth the curves",
+            )
+        rate = moments.fps / moments.step
+        return replace(trajectory, remark="; ".join(filter(None, remarks)), warnings=warnings, rate=rate)
+
+
+def sampled(
+    moments: Moments, look: Callable[[np.ndarray], Poses], parents: np.ndarray, radius: float, metres: float
+) -> Sampled:
+    """Look at a motion, and again between samples where it is off a straight way.
+
+    Parameters
+    ----------
+    moments : Moments
+    look : callable
+        Given frames (n,), rising: the poses in the world, shape (joints, n). What is not finite is no matter.
+    parents : array of int, shape (joints,)
+        Joints go a straight way in the space of their parents.
+    radius : float
+        Of the ball around each joint in which all points count; metres.
+    metres : float
+        The length of the unit that the poses are in.
+    """
+    gaps = _Gaps(look, Skeleton(parents), radius / metres, moments.straight)
+    frames, poses = moments.frames, look(moments.frames)
+    allowed, most = SEEN * WITHIN / metres, min((1 + MOST_ADDED) * len(frames), MOST_POSES // len(parents))
+    closest, longest = CLOSEST * moments.step, moments.step * (1.0 + SAME)
+    unsure, left, before, flips = np.arange(len(frames) - 1), {}, len(frames), 0
+    for halving in range(HALVINGS + 1):
+        errors, turned = gaps.errors(frames, poses, unsure)
+        lengths = np.diff(frames)[unsure]
+        over = (turned > FLIP) & (lengths <= longest) if halving == 0 else np.zeros(len(unsure), dtype=bool)
+        flips += np.count_nonzero(over)
+        off = (errors > allowed) & ~over
+        halved = off & (lengths > 2.1 * closest) & (halving < HALVINGS)
+        if len(frames) + np.count_nonzero(halved) > most:
+            halved[:] = False
+        left |= dict(zip(frames[unsure[off & ~halved]].tolist(), errors[off & ~halved].tolist(), strict=True))
+        split = unsure[halved]
+        if not len(split):
+            break
+        middles = (frames[split] + frames[split + 1]) / 2.0
+        poses = _with(poses, split + 1, look(middles))
+        frames = np.insert(frames, split + 1, middles)
+        begins = split + np.arange(len(split))
+        unsure = np.ravel((begins, begins + 1), order="F")
+    off = {frame: error for frame, error in left.items() if error > WITHIN / metres}
+    return Sampled(frames, poses, len(frames) - before, max(off.values(), default=0.0), tuple(sorted(off)), flips)
+
+
+@dataclass(frozen=True, eq=False)
+class _Gaps:
+    """How far off what lies between samples is."""
+
+    look: Callable[[np.ndarray], Poses]
+    skeleton: Skeleton
+    radius: float
+    straight: bool
+
+    def errors(self, frames: np.ndarray, poses: Poses, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of these gaps (n,) between samples, the largest distance and angle of any joint, shape (n,) each."""
+        errors, angles = np.zeros(len(gaps)), np.zeros(len(gaps))
+        for first in range(0, len(gaps), BLOCK):
+            rows = np.arange(first, min(first + BLOCK, len(gaps)))
+            begin, end = poses[:, gaps[rows]], poses[:, gaps[rows] + 1]
+            with np.errstate(invalid="ignore", over="ignore"):
+                turns = angle_between(begin.quaternions, end.quaternions)
+            eased = ~(np.nan_to_num(turns).max(axis=0) < WIDE) | (not self.straight)
+            for some, looks in ((eased, LOOKS), (~eased, HALF_WAY)):
+                if some.any():
+                    places = frames[gaps[rows[some]]], frames[gaps[rows[some]] + 1]
+                    found = self._off(*places, begin[:, some], end[:, some], looks)
+                    errors[rows[some]], angles[rows[some]] = found
+        return errors, angles
+
+    def _off(
+        self, first: np.ndarray, last: np.ndarray, begin: Poses, end: Poses, looks: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same of gaps from the first frames (n,) to the last ones, and from poses (joints, n) to others."""
+        seen = self.look((first[:, None] + (last - first)[:, None] * looks).ravel())
+        # What is damaged, or has no direction, is no reason for more samples.
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            straight = self.skeleton.in_root_space(_between(self._in_parents(begin), self._in_parents(end), looks))
+            angle = angle_between(seen.quaternions, straight.quaternions)
+            error = np.linalg.norm(seen.positions - straight.positions, axis=-1)
+            error += 2.0 * self.radius * np.sin(angle / 2.0)
+            if seen.scales is not None or straight.scales is not None:
+                error += self.radius * np.abs(_scales(seen) - _scales(straight))
+        error, angle = (np.where(np.isfinite(some), some, 0.0).max(axis=0) for some in (error, angle))
+        return error.reshape(-1, len(looks)).max(axis=1), angle.reshape(-1, len(looks)).max(axis=1)
+
+    def _in_parents(self, world: Poses) -> Poses:
+        parents = self.skeleton.parents
+        hanging = np.flatnonzero(parents >= 0)
+        if not len(hanging):
+            return world
+        local = Poses(world.positions.copy(), world.quaternions.copy(), world.scales)
+        own = placed(inverse(world[parents[hanging]]), world[hanging])
+        local.positions[hanging], local.quaternions[hanging] = own.positions, own.quaternions
+        return local
+
+
+def _between(a: Poses, b: Poses, looks: np.ndarray) -> Poses:
+    """From poses (joints, n) on lines and even turns to others, so far as the looks (k,) say: shape (joints, n k)."""
+    share = looks[:, None]
+    positions = a.positions[..., None, :] + share * (b.positions - a.positions)[..., None, :]
+    dots = np.sum(a.quaternions * b.quaternions, axis=-1, keepdims=True)[..., None, :]
+    half = np.arccos(np.minimum(np.abs(dots), 1.0))
+    parts = [np.where(half > LEAST, np.sin(part * half) / np.sin(half), part) for part in (1.0 - share, share)]
+    signs = np.where(dots < 0.0, -1.0, 1.0)
+    turns = parts[0] * a.quaternions[..., None, :] + parts[1] * signs * b.quaternions[..., None, :]
+    scales = None
+    if a.scales is not None or b.scales is not None:
+        first, last = _scales(a)[..., None], _scales(b)[..., None]
+        scales = (first + looks * (last - first)).reshape(len(positions), -1)
+    return Poses(positions.reshape(len(positions), -1, 3), turns.reshape(len(turns), -1, 4), scales)
+
+
+def _scales(poses: Poses) -> np.ndarray:
+    return np.ones(poses.shape) if poses.scales is None else poses.scales
+
+
+def _with(poses: Poses, places: np.ndarray, more: Poses) -> Poses:
+    """Poses (joints, n) with more of them (joints, k) before these places (k,)."""
+    scales = None
+    if poses.scales is not None or more.scales is not None:
+        scales = np.insert(_scales(poses), places, _scales(more), axis=1)
+    return Poses(
+        np.insert(poses.positions, places, more.positions, axis=1),
+        np.insert(poses.quaternions, places, more.quaternions, axis=1),
+        scales,
+    )
