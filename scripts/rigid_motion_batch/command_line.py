@@ -86,6 +86,13 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
+def complain(program: str, problem: object, place: object = "") -> None:
+    """Say on the standard error what is wrong, in a line: of an error of the system with its file, or else a place."""
+    if isinstance(problem, OSError):
+        problem = f"{problem.filename or place}: {problem.strerror or problem}"
+    print(f"{program}: {printable(str(problem))}", file=sys.stderr)
+
+
 def path_line(path: str | os.PathLike[str]) -> str:
     """A path as a line of output: as it is, or as JSON where that would break the line or reach into a terminal."""
     text = os.fspath(path)
