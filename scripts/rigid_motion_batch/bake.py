@@ -10,7 +10,7 @@ import argparse
 import math
 from pathlib import Path
 
-from rigid_motion_batch.command_line import number, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "bake.py"
@@ -68,7 +68,7 @@ exit code:
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.blend", help="files to bake")
+    parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     add_target_options(parser, "modes")
     keys = parser.add_argument_group("keys")
@@ -93,7 +93,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     options.action = unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last)
     try:
         refuse_odd_places(options)
-        options.jobs = jobs_of(options.files, options.action.suffix, options.output, in_place=options.in_place)
+        options.jobs = jobs_of(
+            list(map(Path, options.files)), options.action.suffix, options.output, in_place=options.in_place
+        )
     except ValueError as error:
         parser.error(str(error))
     return options

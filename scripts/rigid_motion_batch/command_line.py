@@ -81,6 +81,20 @@ def number(text: str) -> float:
         return math.nan
 
 
+def folder_path(text: str) -> Path:
+    """The folder that an option says."""
+    if not text.strip() or "\0" in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
+    return Path(text)
+
+
+def not_empty(text: str) -> str:
+    """The file that an argument says."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} is no file: a variable of a script may be empty")
+    return text
+
+
 def printable(text: str) -> str:
     """The text in one line, with control characters and the like as Python writes them: a line break as \\n."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion_batch.command_line import number, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -34,7 +34,7 @@ from rigid_motion_batch.keying.jobs import (
     refuse_odd_places,
 )
 from rigid_motion_batch.keying.keyed_files import RATES
-from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing
+from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing, place_and_body
 from rigid_motion_batch.keying.reducing import Wishes, reducing
 from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
@@ -89,7 +89,7 @@ exit code:
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("inputs", nargs="+", metavar="INPUT", help=".blend files and recordings")
+    parser.add_argument("inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files and recordings")
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")
     keys.add_argument(
@@ -162,8 +162,11 @@ def _doing(options: argparse.Namespace, note: Note, stop_if_asked: StopIfAsked) 
 def _sorted(inputs: list[str]) -> tuple[list[Path], list[Recorded]]:
     """The .blend files and the recordings, each of these once. A body of a .blend file is a recording."""
     files = [Path(source) for source in inputs if source.lower().endswith(".blend")]
-    recorded = dict.fromkeys(source for source in inputs if not source.lower().endswith(".blend"))
-    return files, [Recorded(source) for source in recorded]
+    recorded: dict[tuple[str, str | None], str] = {}
+    for source in inputs:
+        if not source.lower().endswith(".blend"):
+            recorded.setdefault(place_and_body(source), source)
+    return files, list(map(Recorded, recorded.values()))
 
 
 def _tolerance(text: str) -> Tolerance:

@@ -281,6 +281,16 @@ def test_ctrl_c_while_a_file_is_written_leaves_no_trace_of_it(tmp_path, monkeypa
     assert path.read_bytes() == before
 
 
+def test_a_recording_that_is_named_twice_is_done_once_and_a_folder_is_told_of(tmp_path, capsys, monkeypatch):
+    write_csv(tmp_path / "hand.csv")
+    (tmp_path / "link.csv").symlink_to("hand.csv")
+    monkeypatch.chdir(tmp_path)
+    assert run("hand.csv", "./hand.csv", tmp_path / "hand.csv", "link.csv", tmp_path) == 1
+    said = capsys.readouterr()
+    assert said.out == "hand-keys.csv\n"
+    assert f"{tmp_path}: this is a folder: name the files in it, as in {tmp_path / '*.bvh'}" in said.err.splitlines()
+
+
 @pytest.mark.parametrize("kind", ["blend", "body", "table"])
 def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypatch, kind):
     if kind == "table":
@@ -298,12 +308,11 @@ def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypa
         return real(*arguments)
 
     monkeypatch.setattr(place, step, write_first)
+    capsys.readouterr()
     assert run(source) == 1
     said = capsys.readouterr()
-    line = (
-        f"{source}: {result} has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
-    )
-    assert line in said.err.splitlines()
+    problem = "has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
+    assert f"{source}: {result} {problem}" in said.err.splitlines()
     assert said.out == ""
     assert result.read_text() == "of the other run"
     assert sorted(os.listdir(tmp_path)) == sorted([source.name, result.name])
@@ -372,6 +381,8 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
         (["a.csv", "--objects", "Hand"], "name one body with FILE:BODY"),
         (["a.blend", "--in-place", "--output", "x"], "give one of them"),
         (["shot.blend", "shot-reduced.blend"], "would be written over shot-reduced.blend"),
+        (["shot.blend", ""], "'' is no file: a variable of a script may be empty"),
+        (["shot.blend", "--output", ""], "'' is no folder"),
     ],
 )
 def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):

@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from rigid_motion.animation.transforms import BoneTransform, Transform
+from rigid_motion_batch.command_line import folder_path
 from rigid_motion_batch.keying.blend_files import (
     HERE,
     FileProblem,
@@ -90,7 +91,7 @@ def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
 def add_file_options(parser: argparse.ArgumentParser) -> None:
     """Add a group of options that say where to write."""
     places = parser.add_argument_group("files")
-    places.add_argument("--output", type=Path, metavar="FOLDER", help="where to write (beside each file)")
+    places.add_argument("--output", type=folder_path, metavar="FOLDER", help="where to write (beside each file)")
     places.add_argument("--overwrite", action="store_true", help="replace files of an earlier run")
     places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
 

@@ -107,6 +107,9 @@ class RecordingRun:
     def do(self, job: Recorded) -> Outcome:
         """Read a recording, and write the keys of each of its bodies."""
         outcome = Outcome()
+        if os.path.isdir(job.source):
+            self._note(f"{job.source}: this is a folder: name the files in it, as in {Path(job.source) / '*.bvh'}")
+            return Outcome(failed=True, unreadable=True)
         try:
             clips, note = read_source(job.source, self.reading.axes, self.reading.options)
         except TrajectoryError as error:
@@ -210,6 +213,15 @@ class RecordingRun:
     def _tell_written(self, title: str, path: Path, outcome: Outcome) -> None:
         self._note(f"{title}: {self._would}written to {path}")
         outcome.add_written(path)
+
+
+def place_and_body(source: str) -> tuple[str, str | None]:
+    """Where the file of a recording is, the same however it is written, and which body of it is meant."""
+    try:
+        file, body = split_source(source)
+    except TrajectoryError:
+        file, body = Path(source), None
+    return place_of(file), body
 
 
 def _file_of(source: str) -> Path:
