@@ -70,19 +70,22 @@ recordings:
 
 what is written:
   NAME-reduced.blend for a .blend file, NAME-keys.csv and NAME-keys.blend for a recording, beside it or in --output. A
-  file is moved into place when it is complete, and replaces an existing one only with --overwrite. With --in-place the
-  program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were
-  written are printed on standard output, one a line. Everything else goes to standard error: for each object and rig
-  the number of keys before and after, and the largest error.
+  file is moved into place when it is complete, and replaces an existing one only with --overwrite, also where another
+  run has written that meanwhile. With --in-place the program replaces a .blend file itself, and keeps the one before
+  as NAME.blend1. At the end the paths that were written are printed on standard output, one a line; a path with a line
+  break or another control character is printed as JSON, "a\\nb.csv". Everything else goes to standard error: for each
+  object and rig the number of keys before and after, and the largest error.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off.
 
 exit code:
   0    all done, or nothing to do
-  1    some objects, bones or files could not be done, and are named with the reason. The others are done.
+  1    some objects, bones or files could not be done, and are named with the reason. The others are done. Or Blender
+       crashed at a file, which is named: the files before it are done.
   2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM: the files written by then are complete, nothing else was changed
+  130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
+       changed
 """
 
 

@@ -103,7 +103,7 @@ many clips:
   that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
   processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
-stopped by Ctrl-C; the report then holds what was ready.
+stopped by Ctrl-C, and 143 by SIGTERM; the report then holds what was ready.
 """
 
 
