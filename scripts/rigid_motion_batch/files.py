@@ -36,7 +36,7 @@ def written_beside(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     """
     made = _make_folders(path.parent)
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
-    beside = target.with_name(f".{secrets.token_hex(4)}{_ending(target)}")
+    beside = target.with_name(f".{secrets.token_hex(4)}{ending_beside(target)}")
     report(making=os.path.abspath(beside))
     try:
         yield beside
@@ -56,7 +56,7 @@ def written_beside(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
         raise
 
 
-def _ending(path: Path) -> str:
+def ending_beside(path: Path) -> str:
     """What the names of files that are written beside a path end with: a digest of its name, and its suffix."""
     suffix = path.suffix if len(os.fsencode(path.suffix)) <= LONGEST_SUFFIX else ""
     return f".{zlib.crc32(os.fsencode(path.name)):08x}{suffix}"
@@ -100,7 +100,7 @@ def replacing(path: Path, *, overwrite: bool = True) -> Iterator[TextIO]:
 
 def clear_beside(path: Path) -> None:
     """Delete what processes that were killed left of `path`: nobody may be writing it."""
-    remains = re.compile(rf"\.[0-9a-f]{{8}}{re.escape(_ending(path))}")
+    remains = re.compile(rf"\.[0-9a-f]{{8}}{re.escape(ending_beside(path))}")
     for name in os.listdir(path.parent) if path.parent.is_dir() else ():
         if remains.fullmatch(name):
             with suppress(OSError):

@@ -191,12 +191,13 @@ class _Journal:
         """Print what the child can no longer say."""
         if self.ended:
             return
+        errors = _writable(sys.stderr)
+        if errors and self.at and sys.stderr.isatty():
+            print(file=sys.stderr, flush=True)  # The cursor is behind the progress bar.
         if _writable(sys.stdout):
             for path in self.written:
                 print(path_line(path), flush=True)
-        if _writable(sys.stderr):
-            if self.at and sys.stderr.isatty():
-                print(file=sys.stderr)  # The cursor is behind the progress bar.
+        if errors:
             for line in filter(None, (crash, self.summary.removeprefix("Stopped. ") if crash else self.summary)):
                 print(line, file=sys.stderr, flush=True)
 

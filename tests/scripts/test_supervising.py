@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.trajectories import importing
 from tests.scripts.baking import one_object_file
 from tests.scripts.reducing import object_file, write_csv
 from tests.scripts.stopping import CRASH, alive, descendants, start
@@ -149,3 +150,12 @@ def test_what_is_ignored_goes_on_being_ignored(tmp_path):
     run.process.send_signal(signal.SIGHUP)
     printed, said, _ = run.end()
     assert (run.process.returncode, printed) == (0, "hand-keys.csv\n"), said
+
+
+def test_ctrl_c_within_an_importer_is_no_fault_of_the_file(tmp_path):
+    def importer() -> None:
+        # As bpy.ops puts it.
+        raise RuntimeError("Error: Python: Traceback (most recent call last):\n  File ...\nKeyboardInterrupt\n")
+
+    with pytest.raises(KeyboardInterrupt):
+        importing._import(tmp_path / "walk.fbx", importer)
