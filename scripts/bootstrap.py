@@ -85,7 +85,15 @@ def main(arguments: list[str]) -> int:
     variables = environment(os.environ)
     if command in ("dask", "tasks"):
         variables["PYTHONPATH"] = os.pathsep.join([str(ROOT / "scripts"), *filter(None, [variables.get("PYTHONPATH")])])
-    return subprocess.call([python, *run, *rest], cwd=folder, env=variables)
+    return _become([python, *run, *rest], folder, variables)
+
+
+def _become(command: list, folder: Path | None, variables: Mapping[str, str]) -> int:
+    """Run a command in the place of this process, so that signals reach it, or wait for it where that is not known."""
+    if os.name != "nt":
+        os.chdir(folder or ".")
+        os.execve(command[0], list(map(str, command)), variables)
+    return subprocess.call(command, cwd=folder, env=variables)
 
 
 def environment(environ: Mapping[str, str]) -> dict[str, str]:

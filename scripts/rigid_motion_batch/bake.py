@@ -10,7 +10,7 @@ import argparse
 import math
 from pathlib import Path
 
-from rigid_motion_batch.command_line import number, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "bake.py"
@@ -37,10 +37,11 @@ examples:
 
 what is written:
   NAME-baked.blend or NAME-unbaked.blend, beside the file or in --output. The program opens the new file again to check
-  it, and then moves it into place. It replaces an existing file only with --overwrite, and never one that is
-  read-only. With --in-place it replaces the file itself in the same way, and keeps the one before as NAME.blend1. A
-  file in which there is nothing to do is not written. At the end the paths that were written are printed on standard
-  output, one a line; everything else goes to standard error.
+  it, and then moves it into place. It replaces an existing file only with --overwrite, also where another run has
+  written that meanwhile, and never one that is read-only. With --in-place it replaces the file itself in the same way,
+  and keeps the one before as NAME.blend1. A file in which there is nothing to do is not written. At the end the paths
+  that were written are printed on standard output, one a line; a path with a line break or another control character
+  is printed as JSON, "a\\nb.blend". Everything else goes to standard error.
   Textures and libraries are found from the new place, too. A relative output path of the render, and disk caches of
   simulations (blendcache_NAME), depend on the place and the name of the file, as after Save As.
 
@@ -59,16 +60,17 @@ exit code:
        python scripts/bake.py shot.blend --output farm && blender --background farm/shot-baked.blend --render-anim
   1    some objects, bones or files could not be done, and are named with the reason: a driven channel, an infinite
        key, a missing library, one damaged file of many, a full disk, an --objects NAME that nothing has. The others
-       are done.
+       are done. Or Blender crashed at a file, which is named: the files before it are done.
   2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM: the files written by then are complete, nothing else was changed
+  130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
+       changed
 """
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.blend", help="files to bake")
+    parser.add_argument("files", nargs="+", type=not_empty, metavar="FILE.blend", help="files to bake")
     parser.add_argument("--unbake", action="store_true", help="give baked objects and bones their own keys back")
     add_target_options(parser, "modes")
     keys = parser.add_argument_group("keys")
@@ -93,7 +95,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     options.action = unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last)
     try:
         refuse_odd_places(options)
-        options.jobs = jobs_of(options.files, options.action.suffix, options.output, in_place=options.in_place)
+        options.jobs = jobs_of(
+            list(map(Path, options.files)), options.action.suffix, options.output, in_place=options.in_place
+        )
     except ValueError as error:
         parser.error(str(error))
     return options

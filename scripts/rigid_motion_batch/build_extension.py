@@ -14,7 +14,7 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-from rigid_motion_batch.command_line import parser_of, program_of
+from rigid_motion_batch.command_line import complain, parser_of, path_line, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "build_extension.py"
@@ -114,10 +114,10 @@ def main(arguments: list[str]) -> int:
     try:
         package = build(options.output.expanduser())
     except BuildError as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        complain(PROGRAM, error)
         return 2
     except OSError as error:
-        print(f"{PROGRAM}: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        complain(PROGRAM, error, options.output)
         return 2
-    print(package)
+    print(path_line(package))
     return 0

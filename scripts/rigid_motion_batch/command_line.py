@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
+import os
 import shlex
 import sys
+import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 INSTALLED = "rigid-motion"
 """The command that pip installs."""
 
 MOST_INPUTS = 12
 """Inputs of a command that are worth being read again."""
+
+BREAK_LINES = ("Cc", "Cs", "Zl", "Zp")
+"""Categories of Unicode: control characters, bytes that are no text, and what separates lines and paragraphs."""
 
 
 def own_arguments(script: str) -> list[str]:
@@ -42,9 +48,16 @@ def as_called(text: str, script: str) -> str:
     return "\n".join(lines).replace(f"python scripts/{script}", program)
 
 
-def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> argparse.ArgumentParser:
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, whatever was typed."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message))
+
+
+def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> Parser:
     """The parser of a command. Its help has these texts as they are written, and examples as they are typed here."""
-    return argparse.ArgumentParser(
+    return Parser(
         prog=program_of(script),
         description=as_called(description, script),
         epilog=as_called(epilog, script),
@@ -68,6 +81,34 @@ def number(text: str) -> float:
         return math.nan
 
 
+def folder_path(text: str) -> Path:
+    """The folder that an option says."""
+    if not text.strip() or "\0" in text:
+        raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
+    return Path(text)
+
+
+def not_empty(text: str) -> str:
+    """The file that an argument says."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} is no file: a variable of a script may be empty")
+    return text
+
+
 def printable(text: str) -> str:
-    """The text in one line, without the control characters that a file could smuggle into a terminal."""
-    return "".join(character if character.isprintable() else " " for character in text)
+    """The text in one line, with control characters and the like as Python writes them: a line break as \\n."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def complain(program: str, problem: object, place: object = "") -> None:
+    """Say on the standard error what is wrong, in a line: of an error of the system with its file, or else a place."""
+    if isinstance(problem, OSError):
+        problem = f"{problem.filename or place}: {problem.strerror or problem}"
+    print(f"{program}: {printable(str(problem))}", file=sys.stderr)
+
+
+def path_line(path: str | os.PathLike[str]) -> str:
+    """A path as a line of output: as it is, or as JSON where that would break the line or reach into a terminal."""
+    text = os.fspath(path)
+    odd = text.startswith('"') or any(unicodedata.category(c) in BREAK_LINES for c in text)
+    return json.dumps(text) if odd else text

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from .command_line import INSTALLED, own_arguments
+from . import standard_streams
+from .command_line import INSTALLED, own_arguments, program_of
 from .places import NAMED, manifest
+from .supervising import begin_child, ended_at_once, stop_signals, supervise
 
 
 @dataclass(frozen=True)
@@ -39,8 +42,26 @@ COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run `rigid-motion COMMAND ...`, and return the exit code."""
-    name, *rest = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    """Run `rigid-motion COMMAND ...`, and return the exit code.
+
+    Without arguments given, those of this process are taken, and the work is done in a child of it: see `supervising`.
+    """
+    if arguments is not None:
+        return _main(list(arguments))
+    given = sys.argv[1:]
+    if given and given[0] in COMMANDS:
+        return _as_program(f"{INSTALLED} {given[0]}", lambda: _main(given))
+    return _as_program(INSTALLED, lambda: _main(given), alone=True)
+
+
+def launch(script: str) -> None:
+    """Run the command of a script, given its `__file__`, and end with its exit code."""
+    name = Path(script).name
+    sys.exit(_as_program(program_of(name), lambda: _run(Path(script).stem, own_arguments(script))))
+
+
+def _main(arguments: list[str]) -> int:
+    name, *rest = arguments or ["--help"]
     if name in ("-h", "--help"):
         print(_help())
         return 0
@@ -61,16 +82,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
 
 
-def launch(script: str) -> None:
-    """Run the command of a script, given its `__file__`, and end with its exit code."""
-    sys.exit(_run(Path(script).stem, own_arguments(script)))
+def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> int:
+    """Do something as a process of its own, with what that has to see to, and return the exit code."""
+    standard_streams.prepare()
+    try:
+        code = do() if begin_child() or alone else supervise(program)
+    except SystemExit as ended:
+        code = ended.code or 0
+    return standard_streams.finish(program, code)
 
 
 def _run(module: str, arguments: Sequence[str]) -> int:
+    received: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
     try:
-        return import_module(f"{__package__}.{module}").main(list(arguments))
+        with ended_at_once():
+            command = import_module(f"{__package__}.{module}").main
+        for one in stop_signals():
+            signal.signal(one, interrupt)
+        return command(list(arguments))
     except KeyboardInterrupt:
-        return 130
+        return 128 + (received or [signal.SIGINT])[0]
 
 
 def _help() -> str:

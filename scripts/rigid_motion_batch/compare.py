@@ -9,7 +9,7 @@ import argparse
 import sys
 import time
 
-from rigid_motion_batch.command_line import as_typed, program_of
+from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.explaining import explain_comparison
 from rigid_motion_batch.comparison.options import ALL, SCRIPT, parse
@@ -27,6 +27,7 @@ from rigid_motion_batch.comparison.steps import DECIMATED, FILM, JOINT_METRICS, 
 from rigid_motion_batch.comparison.version import blender_version, program_version
 from rigid_motion_batch.places import CHECKOUT, manifest
 from rigid_motion_batch.progress import Progress
+from rigid_motion_batch.supervising import report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out
 from rigid_motion_batch.workplan import (
     Executor,
@@ -74,9 +75,9 @@ def main(arguments: list[str]) -> int:
     except ImportError as error:
         print(f"{PROGRAM}: {error}\n{way_out(str(error))}", file=sys.stderr)
     except (SubjectError, FolderInUse, ManifestError, ExecutorError, OutputError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        complain(PROGRAM, error)
     except OSError as error:
-        print(f"{PROGRAM}: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        complain(PROGRAM, error, options.output)
     return 2
 
 
@@ -177,8 +178,8 @@ class _Run:
             measured = self._do(plan_of(without_films(plan.tasks.values()), self.version), "Measuring")
             if measured.interrupted or measured.problem:
                 return 130 if measured.interrupted else 2
-            report = self.workspace.output / REPORT
-            self.progress.note(f"All numbers are there, and films come as they are made: {report}")
+            page = self.workspace.output / REPORT
+            self.progress.note(f"All numbers are there, and films come as they are made: {page}")
         outcome = self._do(plan, "Filming" if asked.stage else "Comparing")
         outcome.states |= read.states
         self._say(outcome, time.perf_counter() - started)
@@ -214,14 +215,15 @@ class _Run:
                 work, rendering = work + record.seconds, rendering + record.facts.get("rendering", 0.0)
         share = f", {rendering:.1f} s ({rendering / work:.0%}) of them Blender's rendering" if rendering else ""
         lines = [f"{seconds:.1f} s in all; {work:.1f} s of work{share}.", f"Tasks: {outcome}."]
-        report = self.workspace.output / REPORT
+        page = self.workspace.output / REPORT
         if outcome.interrupted:
             holds = "the report holds what was ready" if outcome.states[REPORT].there else "there is no new report yet"
             lines.append(f"Stopped; {holds}. The same command goes on from here.")
+        report(ended=True)
         for line in lines:
             print(line, file=sys.stderr)
         if outcome.states[REPORT].there:
-            print(report, flush=True)
+            print(path_line(page), flush=True)
 
 
 def wanted(options: argparse.Namespace, command: str) -> Wanted:

@@ -7,49 +7,100 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
+from rigid_motion_batch.supervising import report
+
+LONGEST_SUFFIX = 8
+"""Bytes of a suffix that is kept."""
+
 
 @contextmanager
-def written_beside(path: Path) -> Iterator[Path]:
+def written_beside(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     """A path next to `path` for a file that takes its place when the block ends well, and leaves no trace otherwise.
 
-    It ends as `path` does. Folders that are missing on the way are made.
+    It ends as `path` does, and is short however long that is. Folders that are missing on the way are made.
 
     Raises
     ------
+    FileExistsError
+        Without `overwrite`, where there is something at `path` by then; it stays.
     OSError
         Where the folder cannot be written, or (on Windows) another program has `path` open. It names `path`, and not
         what is written meanwhile.
     """
-    if not path.parent.is_dir():
-        path.parent.mkdir(parents=True, exist_ok=True)
+    made = _make_folders(path.parent)
     target = Path(os.path.realpath(path)) if path.is_symlink() else path
-    beside = target.with_name(f".{os.getpid()}.{target.name}")
+    beside = target.with_name(f".{secrets.token_hex(4)}{ending_beside(target)}")
+    report(making=os.path.abspath(beside))
     try:
         yield beside
-        beside.replace(target)
+        if overwrite:
+            beside.replace(target)
+        else:
+            _move_to_free(beside, path)
     except BaseException as error:
-        with suppress(OSError):  # What went wrong before is what counts.
+        # What went wrong before is what counts.
+        with suppress(OSError):
             beside.unlink()
+        for folder in reversed(made):
+            with suppress(OSError):
+                folder.rmdir()
         if isinstance(error, OSError) and error.filename == str(beside):
             error.filename, error.filename2 = str(path), None
         raise
 
 
+def ending_beside(path: Path) -> str:
+    """What the names of files that are written beside a path end with: a digest of its name, and its suffix."""
+    suffix = path.suffix if len(os.fsencode(path.suffix)) <= LONGEST_SUFFIX else ""
+    return f".{zlib.crc32(os.fsencode(path.name)):08x}{suffix}"
+
+
+def _make_folders(folder: Path) -> list[Path]:
+    """Make a folder, and return those that were missing on the way, the outermost first."""
+    made: list[Path] = []
+    while not os.path.isdir(folder) and folder != folder.parent:
+        made.insert(0, folder)
+        folder = folder.parent
+    if made:
+        for one in made:
+            report(making=os.path.abspath(one))
+        made[-1].mkdir(parents=True, exist_ok=True)
+    return made
+
+
+def _move_to_free(source: Path, target: Path) -> None:
+    """Move a file to a path where there is nothing. Raises FileExistsError where there is something."""
+    try:
+        os.link(source, target)
+    except FileExistsError:
+        raise
+    except OSError:  # This file system has no hard links: the name is taken first, and then what is to be there.
+        os.close(os.open(target, os.O_CREAT | os.O_EXCL))
+        source.replace(target)
+    else:
+        source.unlink()
+
+
 @contextmanager
-def replacing(path: Path) -> Iterator[TextIO]:
+def replacing(path: Path, *, overwrite: bool = True) -> Iterator[TextIO]:
     """Open a text file that takes the place of `path` when the block ends well: see `written_beside`."""
-    with written_beside(path) as beside, beside.open("w", encoding="utf-8", newline="\n") as stream:
+    with (
+        written_beside(path, overwrite=overwrite) as beside,
+        beside.open("w", encoding="utf-8", newline="\n") as stream,
+    ):
         yield stream
 
 
 def clear_beside(path: Path) -> None:
     """Delete what processes that were killed left of `path`: nobody may be writing it."""
-    remains = re.compile(rf"\.\d+\.{re.escape(path.name)}")
+    remains = re.compile(rf"\.[0-9a-f]{{8}}{re.escape(ending_beside(path))}")
     for name in os.listdir(path.parent) if path.parent.is_dir() else ():
         if remains.fullmatch(name):
             with suppress(OSError):

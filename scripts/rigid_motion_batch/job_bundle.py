@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_motion_batch import compare
-from rigid_motion_batch.command_line import as_typed, parser_of, program_of
+from rigid_motion_batch.command_line import as_typed, complain, parser_of, program_of
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.planning import comparison_tasks, look_into, plan_of, reading_tasks
 from rigid_motion_batch.comparison.stage.settings import MODELS, SubjectError, place_of_subject
@@ -114,10 +114,10 @@ def main(arguments: list[str]) -> int:
         print(f"{PROGRAM}: {error}\n{way_out(str(error), 'job_bundle.py')}", file=sys.stderr)
         return 2
     except (SubjectError, ValueError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        complain(PROGRAM, error)
         return 2
     except OSError as error:
-        print(f"{PROGRAM}: {error.filename or own.bundle}: {error.strerror or error}", file=sys.stderr)
+        complain(PROGRAM, error, own.bundle)
         return 2
     values = (f"-p {shlex.quote(f'{name}={value}')}" for name, value in parameter_values(plan, options.output).items())
     print("openjd run", shlex.quote(str(own.bundle / "template.json")), *values)

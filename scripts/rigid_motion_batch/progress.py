@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Self, TextIO
 
+from rigid_motion_batch.command_line import printable
+
 BAR_COLUMNS = 24
 TERMINAL_INTERVAL = 0.1
 LOG_INTERVAL = 10.0
@@ -199,9 +201,9 @@ def _encodes(stream: TextIO | None, text: str) -> bool:
 
 
 def _fitting(text: str, stream: TextIO | None) -> str:
-    """The text without what would break the line or the terminal: control characters, and those it cannot show."""
+    """The text in one line, with what a terminal must not get or cannot show escaped."""
     encoding = getattr(stream, "encoding", None) or "ascii"
-    return "".join(c if c.isprintable() else "?" for c in text).encode(encoding, "replace").decode(encoding)
+    return printable(text).encode(encoding, "backslashreplace").decode(encoding)
 
 
 def _columns_of(text: str) -> int:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from rigid_motion_batch.command_line import number, parser_of, program_of
+from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
 from rigid_motion_batch.system_libraries import require_blender
 
 SCRIPT = "reduce.py"
@@ -34,7 +34,7 @@ from rigid_motion_batch.keying.jobs import (
     refuse_odd_places,
 )
 from rigid_motion_batch.keying.keyed_files import RATES
-from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing
+from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing, place_and_body
 from rigid_motion_batch.keying.reducing import Wishes, reducing
 from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
@@ -70,26 +70,29 @@ recordings:
 
 what is written:
   NAME-reduced.blend for a .blend file, NAME-keys.csv and NAME-keys.blend for a recording, beside it or in --output. A
-  file is moved into place when it is complete, and replaces an existing one only with --overwrite. With --in-place the
-  program replaces a .blend file itself, and keeps the one before as NAME.blend1. At the end the paths that were
-  written are printed on standard output, one a line. Everything else goes to standard error: for each object and rig
-  the number of keys before and after, and the largest error.
+  file is moved into place when it is complete, and replaces an existing one only with --overwrite, also where another
+  run has written that meanwhile. With --in-place the program replaces a .blend file itself, and keeps the one before
+  as NAME.blend1. At the end the paths that were written are printed on standard output, one a line; a path with a line
+  break or another control character is printed as JSON, "a\\nb.csv". Everything else goes to standard error: for each
+  object and rig the number of keys before and after, and the largest error.
 
 what is run:
   Nothing in the files: scripts and Python expressions stay in them, switched off.
 
 exit code:
   0    all done, or nothing to do
-  1    some objects, bones or files could not be done, and are named with the reason. The others are done.
+  1    some objects, bones or files could not be done, and are named with the reason. The others are done. Or Blender
+       crashed at a file, which is named: the files before it are done.
   2    a wrong option, or none of the files could be read: nothing was done
-  130  stopped by Ctrl-C, and 143 by SIGTERM: the files written by then are complete, nothing else was changed
+  130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
+       changed
 """
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     parser = parser_of(SCRIPT, __doc__, EPILOG)
-    parser.add_argument("inputs", nargs="+", metavar="INPUT", help=".blend files and recordings")
+    parser.add_argument("inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files and recordings")
     add_target_options(parser, "keys")
     keys = parser.add_argument_group("keys")
     keys.add_argument(
@@ -162,8 +165,11 @@ def _doing(options: argparse.Namespace, note: Note, stop_if_asked: StopIfAsked) 
 def _sorted(inputs: list[str]) -> tuple[list[Path], list[Recorded]]:
     """The .blend files and the recordings, each of these once. A body of a .blend file is a recording."""
     files = [Path(source) for source in inputs if source.lower().endswith(".blend")]
-    recorded = dict.fromkeys(source for source in inputs if not source.lower().endswith(".blend"))
-    return files, [Recorded(source) for source in recorded]
+    recorded: dict[tuple[str, str | None], str] = {}
+    for source in inputs:
+        if not source.lower().endswith(".blend"):
+            recorded.setdefault(place_and_body(source), source)
+    return files, list(map(Recorded, recorded.values()))
 
 
 def _tolerance(text: str) -> Tolerance:

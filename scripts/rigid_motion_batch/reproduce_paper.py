@@ -12,7 +12,7 @@ import shutil
 import sys
 from pathlib import Path
 
-from rigid_motion_batch.command_line import parser_of, program_of
+from rigid_motion_batch.command_line import complain, parser_of, path_line, program_of
 from rigid_motion_batch.system_libraries import missing_for_rendering, require_blender, way_out
 
 SCRIPT = "reproduce_paper.py"
@@ -31,6 +31,7 @@ from rigid_motion_batch.paper.steps import PAGE, SECTIONS, plan, plan_bodies, pl
 from rigid_motion_batch.paper.timing import ROUNDS
 from rigid_motion_batch.places import ASSETS, CHECKOUT, from_here, output_folder
 from rigid_motion_batch.progress import Progress
+from rigid_motion_batch.supervising import report
 from rigid_motion_batch.trajectories import TrajectoryError
 from rigid_motion_batch.workplan import FolderInUse, Outcome, Plan, SerialExecutor, State, Workspace, code_version, run
 from rigid_motion_batch.workplan.manifest import ManifestError
@@ -123,10 +124,10 @@ def main(arguments: list[str]) -> int:
                 copy_page(work, outcome, options.output, options.docs)
             page = options.docs / PAGE
     except (TrajectoryError, ValueError, FolderInUse, ManifestError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        complain(PROGRAM, error)
         return 2
     except OSError as error:
-        print(f"{PROGRAM}: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+        complain(PROGRAM, error, options.output)
         return 2
     return _report(outcome, page)
 
@@ -168,15 +169,16 @@ def _plan(options: argparse.Namespace) -> Plan:
 def _report(outcome: Outcome, page: Path) -> int:
     """Say how it went, and where the page is."""
     for name, problem in outcome.failures.items():
-        print(f"{PROGRAM}: {name}: {problem}", file=sys.stderr)
+        complain(PROGRAM, f"{name}: {problem}")
     print(f"{outcome}.", file=sys.stderr)
     if outcome.problem:
-        print(f"{PROGRAM}: {outcome.problem}", file=sys.stderr)
+        complain(PROGRAM, outcome.problem)
         return 2
     if outcome.interrupted:
+        report(ended=True)
         print("Stopped; the same call goes on from here.", file=sys.stderr)
     if page.is_file():
-        print(page.resolve(), flush=True)
+        print(path_line(page.resolve()), flush=True)
     return 130 if outcome.interrupted else int(outcome.count(State.FAILED) > 0)
 
 

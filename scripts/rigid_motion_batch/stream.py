@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import secrets
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -19,7 +18,7 @@ from typing import TextIO
 
 from rigid_motion.motion import MODES, Poses
 from rigid_motion_batch.axes import AXES, to_blender
-from rigid_motion_batch.command_line import as_called, number, program_of
+from rigid_motion_batch.command_line import Parser, as_called, complain, number, path_line, program_of
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.comparison.study.clips import Clip
 from rigid_motion_batch.comparison.study.metrics import lines_of_poses
@@ -41,6 +40,7 @@ from rigid_motion_batch.streaming.needed import NeededSender
 from rigid_motion_batch.streaming.playing import HEARTBEAT, Playing
 from rigid_motion_batch.streaming.relay import Outgoing, Relay
 from rigid_motion_batch.streaming.sources import EvenSource, NeededSource, Source
+from rigid_motion_batch.supervising import report
 from rigid_motion_batch.trajectories import TrajectoryError
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
 
@@ -119,7 +119,7 @@ class StreamError(ValueError):
 def parse(arguments: list[str]) -> argparse.Namespace:
     """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
     style = {"formatter_class": argparse.RawDescriptionHelpFormatter}
-    parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__, epilog=as_called(EPILOG, SCRIPT), **style)
+    parser = Parser(prog=PROGRAM, description=__doc__, epilog=as_called(EPILOG, SCRIPT), **style)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     sending = commands.add_parser("send", help="play a recording", epilog=as_called(SEND_EPILOG, SCRIPT), **style)
@@ -208,12 +208,12 @@ def main(arguments: list[str]) -> int:
     try:
         with stopping() as stopped:
             command(options, stopped)
+        report(ended=True)
         return 128 + stopped[0] if stopped else 0
     except (StreamError, EndpointError, TrajectoryError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
+        complain(PROGRAM, error)
     except OSError as error:
-        where = getattr(options, "output", None) or options.command
-        print(f"{PROGRAM}: {error.filename or where}: {error.strerror or error}", file=sys.stderr)
+        complain(PROGRAM, error, getattr(options, "output", None) or options.command)
     return 128 + stopped[0] if stopped else 2
 
 
@@ -289,7 +289,7 @@ def receive(options: argparse.Namespace, stopped: list[int]) -> None:
                 _say(f"damaged: {hearing.damaged} datagrams", f"refused: {hearing.refused} datagrams")
             if not hearing.shown:
                 raise StreamError(_nobody(options, hearing))
-    _say(str(options.output))
+    _say(path_line(options.output))
 
 
 def relay(options: argparse.Namespace, stopped: list[int]) -> None:
@@ -354,7 +354,7 @@ def read_one(recording: str, options: argparse.Namespace) -> Clip:
     """The one body of a recording. Raises TrajectoryError and StreamError."""
     clips, notes = read_clips([recording], options.axes, options.reading)
     for note in notes:
-        print(f"{PROGRAM}: {note}", file=sys.stderr)
+        complain(PROGRAM, note)
     if len(clips) > 1:
         names = ", ".join(clip.name for clip in clips[:12])
         raise StreamError(

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import re
-import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from rigid_motion_batch.command_line import program_of
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.supervising import ended_at_once
 
 DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 libgl1 libegl1 libgl1-mesa-dri"
 """Packages of Debian and Ubuntu."""
@@ -40,25 +37,11 @@ def missing_for_rendering() -> str | None:
 def require_blender(script: str) -> None:
     """Load Blender, or end the command of a script with code 2 and what to do about it."""
     try:
-        with _ended_by_ctrl_c(), hushed():  # Where OCIO is set, it says so.
+        with ended_at_once(), hushed():  # Where OCIO is set, it says so.
             import bpy  # noqa: F401
     except ImportError as error:
         print(f"{program_of(script)}: {error}\n{way_out(str(error), script)}", file=sys.stderr)
         sys.exit(2)
-
-
-@contextmanager
-def _ended_by_ctrl_c() -> Iterator[None]:
-    """Have Ctrl-C end the process at once: an exception would leave Blender half loaded, and it crashes then."""
-    handler = signal.getsignal(signal.SIGINT)
-    if handler != signal.default_int_handler or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
 
 
 def way_out(error: str, script: str = "compare.py") -> str:

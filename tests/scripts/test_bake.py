@@ -412,6 +412,8 @@ def test_no_python_of_a_file_is_run_and_all_of_it_stays(tmp_path):
     ("arguments", "complaint"),
     [
         ([], "FILE.blend"),
+        (["a.blend", ""], "'' is no file: a variable of a script may be empty"),
+        (["a.blend", "--output", " "], "' ' is no folder"),
         (["a.blend", "--step", "0"], "is not a number of frames"),
         (["a.blend", "--step", "nan"], "is not a number of frames"),
         (["a.blend", "--first", "inf"], "is not a frame"),

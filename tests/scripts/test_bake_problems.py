@@ -19,6 +19,7 @@ import bpy
 import pytest
 
 from rigid_motion import animation
+from rigid_motion_batch import supervising
 from rigid_motion_batch.keying import blend_files
 from tests.animation.oracle import curves_of
 from tests.scripts.baking import (
@@ -174,16 +175,24 @@ def test_a_read_only_file_is_not_replaced(tmp_path):
     assert (baked_name(path).read_text(), path.read_bytes()) == ("precious", before)
 
 
-def test_what_blender_says_of_writing_is_told_of_the_name_that_was_asked_for(tmp_path, capsys):
-    path = one_object_file(
-        tmp_path / f"{'long' * 61}.blend"
-    )  # With -baked it is longer than the name of a file may be.
+@pytest.mark.parametrize("options", [(), ("--in-place",)])
+def test_a_name_that_is_too_long_for_the_result_is_told_before_the_work(tmp_path, capsys, options):
+    made = one_object_file(tmp_path / "shot.blend")
+    path = made.rename(tmp_path / f"{'ü' * 124}x.blend")  # With -baked or a 1 behind it is too long.
+    assert len(os.fsencode(path.name)) == 255
     capsys.readouterr()
-    assert run(path) == 1
-    said = capsys.readouterr().err
-    assert f"{baked_name(path)} could not be written (File name too long): write elsewhere with --output" in said
-    assert f".{os.getpid()}." not in said
+    assert run(path, *options) == 1
+    (line,) = (line for line in capsys.readouterr().err.splitlines() if line.startswith(f"{path}: "))
+    assert line.endswith("of which file systems allow 255: give the input a shorter name")
     assert os.listdir(tmp_path) == [path.name]
+
+
+def test_a_name_may_be_as_long_as_file_systems_allow(tmp_path):
+    made = one_object_file(tmp_path / "shot.blend")
+    path = made.rename(tmp_path / f"{'x' * 243}.blend")
+    assert run(path) == 0
+    assert len(baked_name(path).name) == 255
+    assert sorted(os.listdir(tmp_path)) == sorted([path.name, baked_name(path).name])
 
 
 def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
@@ -350,7 +359,7 @@ def test_ctrl_c_while_a_file_is_written_leaves_it_as_it_was(tmp_path, monkeypatc
     assert path.read_bytes() == before
 
 
-def test_ctrl_c_while_blender_is_loaded_ends_it_at_once_and_without_a_word(tmp_path):
+def test_ctrl_c_while_blender_is_loaded_ends_it_at_once(tmp_path):
     path = one_object_file(tmp_path / "shot.blend")
     beside = tmp_path / "modules"
     beside.mkdir()
@@ -358,7 +367,7 @@ def test_ctrl_c_while_blender_is_loaded_ends_it_at_once_and_without_a_word(tmp_p
     done = subprocess.run(
         [*COMMAND, path], capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONPATH": str(beside)}
     )
-    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"{supervising.STOPPED}\n")
 
 
 @pytest.mark.parametrize("stopped_at", [1, 2])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.files import clear_beside, replacing, write_text
+from rigid_motion_batch.files import clear_beside, replacing, write_text, written_beside
 
 
 def test_a_text_is_written_as_utf_8_with_lf_line_ends_and_folders_on_the_way_are_made(tmp_path: Path) -> None:
@@ -53,9 +53,48 @@ def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
 
 
 def test_what_dead_processes_left_of_a_file_is_cleared_away_and_nothing_else(tmp_path: Path) -> None:
-    others = {"plan.json", ".7.plan.json.old", ".x.plan.json", ".8.plan_json", "7.plan.json"}
-    for name in (*others, ".7.plan.json", ".12345.plan.json"):
-        (tmp_path / name).touch()
+    with written_beside(tmp_path / "plan.json") as beside:
+        name = beside.name
+        beside.touch()
+    with written_beside(tmp_path / "plan.csv") as other:
+        other.touch()
+    dead = {f".{number:08x}{name[9:]}" for number in (0, 7, 0xFFFFFFFF)}
+    others = {"plan.json", "plan.csv", f"{name}.old", f".x{name[9:]}", f".0000000{name[9:]}", name[1:], other.name}
+    for made in (*others, *dead):
+        (tmp_path / made).touch()
     clear_beside(tmp_path / "plan.json")
     assert {path.name for path in tmp_path.iterdir()} == others
     clear_beside(tmp_path / "nowhere" / "plan.json")
+
+
+def test_the_name_beside_is_short_however_long_the_name_is(tmp_path: Path) -> None:
+    path = tmp_path / f"{'x' * 247}.blend1"
+    with written_beside(path) as beside:
+        assert len(beside.name) < 30
+        assert beside.suffix == path.suffix
+        beside.write_text("whole")
+    assert [one.name for one in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_what_has_come_meanwhile_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool) -> None:
+    if not links:
+        monkeypatch.setattr("os.link", refuse_links)
+    path = tmp_path / "keys.csv"
+    with replacing(path, overwrite=False) as stream:
+        stream.write("first")
+    with pytest.raises(FileExistsError) as raised, replacing(path, overwrite=False) as stream:
+        stream.write("second")
+    assert raised.value.filename == str(path)
+    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("keys.csv", "first")]
+
+
+def refuse_links(*_: object) -> None:
+    raise PermissionError(1, "Operation not permitted")
+
+
+def test_folders_that_were_made_for_nothing_are_gone(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    with pytest.raises(ZeroDivisionError), written_beside(tmp_path / "there" / "new" / "folder" / "keys.csv"):
+        raise ZeroDivisionError
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]

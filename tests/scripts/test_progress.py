@@ -150,7 +150,7 @@ def test_a_console_that_cannot_show_blocks_gets_ascii() -> None:
     with Progress(terminal, clock=clock, environ=PLAIN) as progress, progress.stage("Rendering 手術", 2) as stage:
         clock.now += 1.0
         stage.advance()
-        assert " 50% [############------------]  0:01, 0:01 left  Rendering ??" in terminal.lines()
+        assert " 50% [############------------]  0:01, 0:01 left  Rendering \\u624b\\u8853" in terminal.lines()
     terminal.getvalue().encode("cp1252")
 
 
@@ -179,7 +179,7 @@ def test_the_line_never_reaches_the_last_column(columns: int, doing: str) -> Non
 def test_control_characters_in_names_reach_no_terminal() -> None:
     terminal = Terminal()
     with Progress(terminal, environ=PLAIN) as progress, progress.stage("evil\x1b[2J\nname", 1):
-        assert terminal.lines()[0].endswith("evil?[2J?name")
+        assert terminal.lines()[0].endswith("evil\\x1b[2J\\nname")
 
 
 def test_work_of_no_steps_is_done_at_once() -> None:

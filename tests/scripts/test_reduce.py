@@ -15,7 +15,7 @@ import pytest
 from rigid_motion import animation
 from rigid_motion.animation import MODE_IDS, key_frames, modes_of
 from rigid_motion_batch import reduce
-from rigid_motion_batch.keying import blend_files
+from rigid_motion_batch.keying import blend_files, recordings
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.scripts.baking import extension, new_file, open_again, save
@@ -281,6 +281,77 @@ def test_ctrl_c_while_a_file_is_written_leaves_no_trace_of_it(tmp_path, monkeypa
     assert path.read_bytes() == before
 
 
+def test_a_recording_that_is_named_twice_is_done_once_and_a_folder_is_told_of(tmp_path, capsys, monkeypatch):
+    write_csv(tmp_path / "hand.csv")
+    (tmp_path / "link.csv").symlink_to("hand.csv")
+    monkeypatch.chdir(tmp_path)
+    assert run("hand.csv", "./hand.csv", tmp_path / "hand.csv", "link.csv", tmp_path) == 1
+    said = capsys.readouterr()
+    assert said.out == "hand-keys.csv\n"
+    assert f"{tmp_path}: this is a folder: name the files in it, as in {tmp_path / '*.bvh'}" in said.err.splitlines()
+
+
+@pytest.mark.parametrize("kind", ["blend", "body", "table"])
+def test_what_another_run_has_written_meanwhile_stays(tmp_path, capsys, monkeypatch, kind):
+    if kind == "table":
+        write_csv(tmp_path / "hand.csv")
+        source, result = tmp_path / "hand.csv", tmp_path / "hand-keys.csv"
+        place, step = recordings, "fill_in"
+    else:
+        source = object_file(tmp_path / "shot.blend") if kind == "blend" else hand_made(tmp_path)
+        result = reduced_name(source) if kind == "blend" else tmp_path / "body-keys.blend"
+        place, step = blend_files, "refuse_cut_off"
+    real = getattr(place, step)
+
+    def write_first(*arguments: object) -> object:
+        result.write_text("of the other run")
+        return real(*arguments)
+
+    monkeypatch.setattr(place, step, write_first)
+    capsys.readouterr()
+    assert run(source) == 1
+    said = capsys.readouterr()
+    problem = "has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
+    assert f"{source}: {result} {problem}" in said.err.splitlines()
+    assert said.out == ""
+    assert result.read_text() == "of the other run"
+    assert sorted(os.listdir(tmp_path)) == sorted([source.name, result.name])
+    result.unlink()
+    assert run(source, "--overwrite") == 0
+    assert result.stat().st_size > 1000
+
+
+def test_a_file_that_was_saved_meanwhile_is_not_replaced_in_place(tmp_path, capsys, monkeypatch):
+    path, real = object_file(tmp_path / "shot.blend"), blend_files.refuse_cut_off
+
+    def save_first(written: Path) -> None:
+        path.write_bytes(b"saved by an animator")
+        real(written)
+
+    monkeypatch.setattr(blend_files, "refuse_cut_off", save_first)
+    assert run(path, "--in-place") == 1
+    assert f"{path}: it was changed while this program was at it" in capsys.readouterr().err
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [(path.name, b"saved by an animator")]
+
+
+def test_a_stop_between_bodies_tells_of_the_files_that_are_complete(tmp_path, capsys, monkeypatch):
+    write_csv(tmp_path / "log.csv")
+    rows = (tmp_path / "log.csv").read_text(encoding="utf-8").splitlines()
+    lines = [f"device,{rows[0]}", *(f"{name},{row}" for name in ("left", "right") for row in rows[1:])]
+    (tmp_path / "log.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    real = recordings.write_poses
+
+    def write_and_press(*arguments: object, **options: object) -> None:
+        real(*arguments, **options)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(recordings, "write_poses", write_and_press)
+    assert run(f"{tmp_path / 'log.csv'}:*") == 130
+    said = capsys.readouterr()
+    assert said.out == f"{tmp_path / 'log-left-keys.csv'}\n"
+    assert said.err.splitlines()[-1] == "Stopped. 1 object reduced; 1 file: 1 written, 0 not reached."
+
+
 def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, capsys, monkeypatch):
     paths = [object_file(tmp_path / f"{name}.blend") for name in ("a", "b")]
     real = animation.reduce_keys_of
@@ -310,6 +381,8 @@ def test_an_error_that_nobody_foresaw_is_told_and_the_others_go_on(tmp_path, cap
         (["a.csv", "--objects", "Hand"], "name one body with FILE:BODY"),
         (["a.blend", "--in-place", "--output", "x"], "give one of them"),
         (["shot.blend", "shot-reduced.blend"], "would be written over shot-reduced.blend"),
+        (["shot.blend", ""], "'' is no file: a variable of a script may be empty"),
+        (["shot.blend", "--output", ""], "'' is no folder"),
     ],
 )
 def test_a_wrong_option_ends_with_code_2_and_a_way_out(arguments, complaint, capsys):

@@ -6,11 +6,10 @@ import argparse
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.command_line import number, parser_of
+from rigid_motion_batch.command_line import folder_path, number, parser_of
 from rigid_motion_batch.places import ASSETS, from_here, output_folder
 from rigid_motion_batch.trajectories import files_of
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
@@ -104,7 +103,7 @@ many clips:
   that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
   processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
-stopped by Ctrl-C; the report then holds what was ready.
+stopped by Ctrl-C, and 143 by SIGTERM; the report then holds what was ready.
 """
 
 
@@ -128,7 +127,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument(
         "-o",
         "--output",
-        type=_folder,
+        type=folder_path,
         default=output_folder("comparison"),
         help="folder to write to (renders/comparison)",
     )
@@ -298,12 +297,6 @@ def _modes(text: str) -> Modes:
             f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
         )
     return Modes((*modes, BEST_OF), share)
-
-
-def _folder(text: str) -> Path:
-    if not text.strip() or "\0" in text:
-        raise argparse.ArgumentTypeError(f"{text!r} is no folder; give one such as renders/hand, or . for this one")
-    return Path(text)
 
 
 def _jobs(text: str) -> int:

@@ -19,6 +19,9 @@ HERE = bpy.app.version[:2]
 MAGIC = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 """What .blend files begin with: as they are, compressed, and compressed by a Blender before 3.0."""
 
+LONGEST_NAME = 255
+"""Bytes of the name of a file."""
+
 CUT_OFF = "it broke off half-way, the disk may be full"
 
 NAMED = 5
@@ -79,6 +82,14 @@ def open_file(path: Path) -> None:
         )
 
 
+def changed_at(path: Path) -> int | None:
+    """When a file was changed last, in nanoseconds; None where there is none."""
+    try:
+        return os.stat(path).st_mtime_ns
+    except OSError:
+        return None
+
+
 def missing_data() -> Missing:
     """What the open file wants of libraries and cannot have, which Blender puts nothing but names in the place of."""
     found = Missing()
@@ -127,11 +138,22 @@ def only_overridden() -> set[bpy.types.Object]:
 
 
 def refuse_to_replace(path: Path, *, overwrite: bool) -> None:
-    """Raise `FileProblem` where there is something already that is not to be replaced."""
+    """Raise `FileProblem` where there is something already that is not to be replaced, or the name is too long."""
+    refuse_long_name(path)
     if os.path.isdir(path):
         raise FileProblem(f"{path} is a folder: rename it, or give another --output")
     if os.path.lexists(path) and not overwrite:
         raise FileProblem(f"{path} is there already: add --overwrite, or another --output")
+
+
+def refuse_long_name(path: Path) -> None:
+    """Raise `FileProblem` where a file system allows no name that is as long as this one."""
+    length = len(os.fsencode(path.name))
+    if length > LONGEST_NAME:
+        raise FileProblem(
+            f"the name {path.name} has {length} bytes, of which file systems allow {LONGEST_NAME}: "
+            "give the input a shorter name"
+        )
 
 
 def refuse_read_only(path: Path) -> None:
@@ -149,16 +171,27 @@ def refuse_read_only(path: Path) -> None:
         )
 
 
-def write_file(source: Path, output: Path, stop_if_asked: Callable[[], None]) -> None:
+def write_file(
+    source: Path, output: Path, stop_if_asked: Callable[[], None], *, overwrite: bool, opened: int | None = None
+) -> None:
     """Save what is open, whole or not at all; where it is `source` itself, that is kept as NAME.blend1.
+
+    Parameters
+    ----------
+    source, output : Path
+    stop_if_asked : callable
+    overwrite : bool
+        Whether to replace what is at `output`.
+    opened : int, optional
+        When `source` was changed last before it was opened, in nanoseconds, where it is to be replaced.
 
     Raises
     ------
     FileProblem
-        Where it cannot be written.
+        Where it cannot be written, or `source` was changed meanwhile.
     """
     try:
-        with hushed(errors=True), written_beside(output) as beside:
+        with hushed(errors=True), written_beside(output, overwrite=overwrite) as beside:
             # Blender 4.5 takes a relative one to be one of $PWD, wherever it runs.
             bpy.ops.wm.save_as_mainfile(
                 filepath=str(beside.absolute()), copy=True, check_existing=False, relative_remap=True
@@ -166,6 +199,8 @@ def write_file(source: Path, output: Path, stop_if_asked: Callable[[], None]) ->
             refuse_cut_off(beside)
             stop_if_asked()
             if output == source:
+                if changed_at(source) != opened:
+                    raise FileProblem("it was changed while this program was at it, and stays so: do it again")
                 kept = Path(os.path.realpath(source))
                 with written_beside(kept.with_name(f"{kept.name}1")) as copy:
                     shutil.copy2(source, copy)
@@ -175,8 +210,17 @@ def write_file(source: Path, output: Path, stop_if_asked: Callable[[], None]) ->
         reason = said.rpartition(": ")[2].replace(beside.name, output.name) if ": " in said else CUT_OFF
         raise FileProblem(f"{output} could not be written ({reason}): write elsewhere with --output") from None
     except OSError as error:
+        refuse_came_meanwhile(output, error)
         place, reason = error.filename or output, error.strerror or error
         raise FileProblem(f"{place} could not be written ({reason}): write elsewhere with --output") from None
+
+
+def refuse_came_meanwhile(path: Path, error: OSError) -> None:
+    """Raise `FileProblem` where an error of writing a file is that there is one by now."""
+    if isinstance(error, FileExistsError) and error.filename == str(path):
+        raise FileProblem(
+            f"{path} has come there meanwhile, from another run perhaps: add --overwrite, or another --output"
+        ) from None
 
 
 def refuse_cut_off(path: Path) -> None:

@@ -11,15 +11,18 @@ from pathlib import Path
 import bpy
 
 from rigid_motion.animation.transforms import BoneTransform, Transform
+from rigid_motion_batch.command_line import folder_path
 from rigid_motion_batch.keying.blend_files import (
     HERE,
     FileProblem,
     Missing,
     Unreadable,
+    changed_at,
     missing_data,
     named,
     only_overridden,
     open_file,
+    refuse_long_name,
     refuse_read_only,
     refuse_to_replace,
     write_file,
@@ -88,7 +91,7 @@ def add_target_options(parser: argparse.ArgumentParser, which: str) -> None:
 def add_file_options(parser: argparse.ArgumentParser) -> None:
     """Add a group of options that say where to write."""
     places = parser.add_argument_group("files")
-    places.add_argument("--output", type=Path, metavar="FOLDER", help="where to write (beside each file)")
+    places.add_argument("--output", type=folder_path, metavar="FOLDER", help="where to write (beside each file)")
     places.add_argument("--overwrite", action="store_true", help="replace files of an earlier run")
     places.add_argument("--in-place", action="store_true", help="save the .blend files themselves")
 
@@ -115,13 +118,17 @@ class BlendRun:
         self.options, self.action = options, action
         self._note, self._stop_if_asked = note, stop_if_asked
         self._would = "would be " if options.dry_run else ""
+        self._changed: int | None = None
 
     def do(self, job: Job) -> Outcome:
         """Open a file, do what is in it, and write it."""
         outcome = Outcome()
         try:
-            if job.output != job.source:
+            if job.output == job.source:
+                refuse_long_name(job.source.with_name(f"{job.source.name}1"))
+            else:
                 refuse_to_replace(job.output, overwrite=self.options.overwrite)
+            self._changed = changed_at(job.source)
             open_file(job.source)
             self._stop_if_asked()
             missing = missing_data()
@@ -209,6 +216,7 @@ class BlendRun:
                 f"{job.source}: was saved by Blender {named(before)}; what is written is of Blender {named(HERE)}"
             )
         if not self.options.dry_run:
-            write_file(job.source, job.output, self._stop_if_asked)
+            overwrite = self.options.overwrite or job.output == job.source
+            write_file(job.source, job.output, self._stop_if_asked, overwrite=overwrite, opened=self._changed)
         self._note(f"{job.source}: {self._would}written to {job.output}")
-        outcome.written.append(job.output)
+        outcome.add_written(job.output)

@@ -17,11 +17,17 @@ from rigid_motion_batch.comparison.study.metrics import write_poses
 from rigid_motion_batch.comparison.study.radii import RIGID
 from rigid_motion_batch.comparison.study.reading import folder_names, read_source
 from rigid_motion_batch.comparison.study.reconstructions import fill_in
-from rigid_motion_batch.keying.blend_files import FileProblem, refuse_read_only, refuse_to_replace, write_file
+from rigid_motion_batch.keying.blend_files import (
+    FileProblem,
+    refuse_came_meanwhile,
+    refuse_read_only,
+    refuse_to_replace,
+    write_file,
+)
 from rigid_motion_batch.keying.jobs import place_of
 from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
 from rigid_motion_batch.keying.reducing import Wishes, fewer, off
-from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, counted, tell_failure
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Stopped, counted, tell_failure
 from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
 from rigid_motion_batch.trajectories.reading import split_source
 
@@ -101,6 +107,9 @@ class RecordingRun:
     def do(self, job: Recorded) -> Outcome:
         """Read a recording, and write the keys of each of its bodies."""
         outcome = Outcome()
+        if os.path.isdir(job.source):
+            self._note(f"{job.source}: this is a folder: name the files in it, as in {Path(job.source) / '*.bvh'}")
+            return Outcome(failed=True, unreadable=True)
         try:
             clips, note = read_source(job.source, self.reading.axes, self.reading.options)
         except TrajectoryError as error:
@@ -113,10 +122,13 @@ class RecordingRun:
             self._note(note)
         file = _file_of(job.source)
         for clip, name in zip(clips, _names(file, clips), strict=True):
-            self._stop_if_asked()
             title = job.source if len(clips) == 1 else f"{job.source} ({clip.name})"
             try:
+                self._stop_if_asked()
                 self._do_clip(title, clip, file, name, outcome)
+            except Stopped as stopped:
+                stopped.partly = outcome
+                raise
             except FileProblem as problem:
                 outcome.failed = True
                 self._note(f"{title}: {problem}")
@@ -150,16 +162,17 @@ class RecordingRun:
             key_object(clip, keys, frames, mode, name)
         told = fewer(len(clip.times), len(keys)) + off(tolerance, largest, clip.metres_per_unit)
         self._note(f"{title}: {self._would}reduced{told}")
-        if scene:
-            self._save(file, scene)
         if not self.writing.dry_run:
             try:
-                write_poses(table, clip.times[keys], clip.poses[keys])
+                write_poses(table, clip.times[keys], clip.poses[keys], overwrite=self.writing.overwrite)
             except OSError as error:
+                refuse_came_meanwhile(table, error)
                 raise FileProblem(f"{table} could not be written ({error.strerror}): use another --output") from None
         outcome.objects += 1
-        for path in filter(None, (table, scene)):
-            self._tell_written(title, path, outcome)
+        self._tell_written(title, table, outcome)
+        if scene:
+            self._save(file, scene)
+            self._tell_written(title, scene, outcome)
 
     def _do_body(self, title: str, clip: Clip, file: Path, name: str, scene: Path, outcome: Outcome) -> None:
         self._refuse(title, scene)
@@ -195,11 +208,20 @@ class RecordingRun:
 
     def _save(self, file: Path, scene: Path) -> None:
         if not self.writing.dry_run:
-            write_file(file, scene, self._stop_if_asked)
+            write_file(file, scene, self._stop_if_asked, overwrite=self.writing.overwrite)
 
     def _tell_written(self, title: str, path: Path, outcome: Outcome) -> None:
         self._note(f"{title}: {self._would}written to {path}")
-        outcome.written.append(path)
+        outcome.add_written(path)
+
+
+def place_and_body(source: str) -> tuple[str, str | None]:
+    """Where the file of a recording is, the same however it is written, and which body of it is meant."""
+    try:
+        file, body = split_source(source)
+    except TrajectoryError:
+        file, body = Path(source), None
+    return place_of(file), body
 
 
 def _file_of(source: str) -> Path:

@@ -1,10 +1,12 @@
 """A session in Blender: inputs done one after another, each wholly or not at all, and summed up in a line.
 
-Ctrl-C ends it between two steps: what was written by then is whole, and nothing else was touched.
+Ctrl-C ends it between two steps: what was written by then is whole, and nothing else was touched. `supervising` has
+what is between them ended, from outside.
 """
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import traceback
@@ -18,10 +20,9 @@ import addon_utils
 import bpy
 
 from rigid_motion import animation
+from rigid_motion_batch.command_line import path_line
 from rigid_motion_batch.progress import Progress
-
-STOPPING = (signal.SIGINT, signal.SIGTERM)
-"""What Ctrl-C sends, and what a farm does that takes a job back."""
+from rigid_motion_batch.supervising import report, stop_signals
 
 EXTENSION = "rigid_motion"
 """The id in blender_manifest.toml, which the name of the installed module ends with."""
@@ -35,6 +36,10 @@ StopIfAsked = Callable[[], None]
 
 class Input(Protocol):
     """What is to be done."""
+
+    @property
+    def source(self) -> str | os.PathLike[str]:
+        """The file, as the user has named it."""
 
     @property
     def title(self) -> str:
@@ -83,6 +88,11 @@ class Outcome:
     matched: set[str] = field(default_factory=set)
     """Of the names and patterns that were asked for, those that there was an object or a bone for."""
 
+    def add_written(self, path: Path) -> None:
+        """Note that a file is complete at its place."""
+        self.written.append(path)
+        report(written=os.fspath(path))
+
     @property
     def done(self) -> int:
         return self.objects + self.bones
@@ -108,10 +118,13 @@ def do_all(
             with progress.stage(work.doing, len(inputs)) as stage:
                 for one in inputs:
                     stage.say(one.title)
+                    summary = _summary(outcomes, len(inputs), work, interrupted=True)
+                    report(at=os.fspath(one.source), summary=summary)
                     outcomes.append(do(one))
                     stage.advance()
         except Stopped as signalled:
             stopped = signalled.args[0]
+            outcomes += [signalled.partly] if signalled.partly and signalled.partly.written else []
         else:
             seen = [one for one in outcomes if not one.failed]
             unmatched = set(work.asked or ()).difference(*(one.matched for one in outcomes)) if seen else set()
@@ -119,9 +132,10 @@ def do_all(
                 progress.note(
                     f"{work.program}: --objects {name}: no object or bone of that name has anything to be {work.done}"
                 )
+    report(ended=True)
     if not work.dry_run:
         for path in (path for one in outcomes for path in one.written):
-            print(path, flush=True)
+            print(path_line(path), flush=True)
     print(_summary(outcomes, len(inputs), work, interrupted=stopped is not None), file=sys.stderr, flush=True)
     if stopped is not None:
         return 128 + stopped
@@ -178,12 +192,18 @@ def _extension() -> Iterator[None]:
 class Stopped(KeyboardInterrupt):
     """By Ctrl-C or SIGTERM. `args` are the number of the signal."""
 
+    partly: Outcome | None = None
+    """What became of the input that it came in."""
+
 
 @contextmanager
 def _stopped_between_steps() -> Iterator[StopIfAsked]:
-    """A function that raises `Stopped` after Ctrl-C or SIGTERM. Blender swallows what is raised while it works."""
+    """A function that raises `Stopped` after Ctrl-C or SIGTERM. Blender swallows what is raised while it works.
+
+    A step that takes too long is ended by the parent of this process: see `supervising`.
+    """
     received: list[int] = []
-    before = {one: signal.signal(one, lambda number, _: received.append(number)) for one in STOPPING}
+    before = {one: signal.signal(one, lambda number, _: received.append(number)) for one in stop_signals()}
 
     def stop_if_asked() -> None:
         if received:

@@ -292,6 +292,8 @@ def _import(path: Path, importer: Callable[[], None]) -> None:
     except TrajectoryError:
         raise
     except Exception as error:
+        if "KeyboardInterrupt" in str(error):  # Blender makes an error of it.
+            raise KeyboardInterrupt from None
         problem = f"Blender cannot import this file ({_reason(path, error)})"
         raise TrajectoryError(path, problem, "export it again") from None
 

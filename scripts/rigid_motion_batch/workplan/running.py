@@ -30,7 +30,7 @@ RETRIES = 2
 PATIENCE = 0.5
 """Seconds between two looks at the clock while nothing happens."""
 
-AFTER_CTRL_C = 1.5
+AFTER_CTRL_C = 1.0
 """Seconds for everything that is done after Ctrl-C."""
 
 

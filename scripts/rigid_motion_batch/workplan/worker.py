@@ -20,6 +20,7 @@ PROGRAM = str(Path(__file__).resolve().parents[2])
 if PROGRAM not in sys.path:
     sys.path.insert(0, PROGRAM)
 
+from rigid_motion_batch.supervising import end_with_parent
 from rigid_motion_batch.workplan.performing import Message, Noted, Order, Told, as_json, perform
 
 PREFIX = "work plan: "
@@ -36,6 +37,8 @@ def main() -> None:
     faulthandler.enable()
     # Ctrl-C goes to all processes of a terminal. What becomes of it is the parent's to decide.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The end of the input is not seen while Blender is at work.
+    end_with_parent()
     orders: queue.SimpleQueue[Order] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(orders,), daemon=True).start()
 

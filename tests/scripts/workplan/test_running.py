@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch import files
 from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.workplan import (
     FolderInUse,
@@ -344,7 +345,14 @@ def test_the_lock_of_a_dead_process_is_none(output: Path) -> None:
     assert states(run_in(output, task("a"))) == done("a")
 
 
-@pytest.mark.parametrize("left", [".workplan/scratch/0123/a.txt", ".workplan/.7904.plan.json", ".7904.manifest.json"])
+@pytest.mark.parametrize(
+    "left",
+    [
+        ".workplan/scratch/0123/a.txt",
+        f".workplan/.00007904{files.ending_beside(Path('plan.json'))}",
+        f".00007904{files.ending_beside(Path('manifest.json'))}",
+    ],
+)
 def test_what_dead_processes_left_is_cleared_away(output: Path, left: str) -> None:
     half = output / left
     half.parent.mkdir(parents=True, exist_ok=True)

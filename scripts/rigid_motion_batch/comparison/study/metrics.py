@@ -148,7 +148,9 @@ def write_metrics(path: Path, rows: Iterable[Metrics]) -> None:
     write_rows(path, Metrics, rows)
 
 
-def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = ()) -> None:
+def write_poses(
+    path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str] = (), *, overwrite: bool = True
+) -> None:
     """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
 
     Parameters
@@ -158,13 +160,15 @@ def write_poses(path: Path, times: np.ndarray, poses: Poses, modes: Sequence[str
     poses : Poses, shape (n,)
     modes : sequence of str, n - 1 of them, optional
         Of the segments that the poses begin, for a last column, `mode`. The last pose begins none.
+    overwrite : bool
+        Whether to replace what is there. Otherwise FileExistsError is raised.
     """
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
     if poses.scales is not None:
         columns.append(poses.scales)
         header += ",s"
-    with replacing(path) as stream:
+    with replacing(path, overwrite=overwrite) as stream:
         stream.write(f"{header},mode\n" if modes else f"{header}\n")
         for first, lines in lines_of_poses(columns):
             if modes:

@@ -1,0 +1,246 @@
+"""A command as two processes: a small one, which stops in time, and its child, which does the work.
+
+Python cannot interrupt an importer of Blender, the opening of a large file, or a long computation in NumPy. So the
+process that was started runs its own command line once more as a child, in the same terminal and with the same
+streams. It passes signals on, gives the child a moment to end between two steps, then kills it, removes what it has
+half written, and says what is complete. It imports neither Blender nor NumPy.
+
+The child reports in a journal, a file in a temporary folder that both share: see `report`. The folder goes with the
+command, and with it what Blender keeps in temporary files.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from .command_line import path_line, printable
+
+VARIABLE = "RIGID_MOTION_SESSION"
+"""Of the environment: the temporary folder of a child; empty where none could be made."""
+
+JOURNAL = "journal"
+
+GRACE = 1.2
+"""Seconds that the child has after a signal to end by itself."""
+
+LAST = 1.7
+"""Seconds after which nobody waits for it, though it was killed: the system may be reading from a disk that is gone."""
+
+LOOK = 0.1
+"""Seconds between two looks at the clock."""
+
+STOPPED = "Stopped. What was written by then is complete."
+"""What is said where the child had nothing better to say."""
+
+PR_SET_PDEATHSIG = 1
+"""See prctl(2)."""
+
+_journal: int | None = None
+
+
+def stop_signals() -> list[signal.Signals]:
+    """The signals that stop a command. Those that are ignored, as by nohup, go on being ignored."""
+    names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+    known = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    return [one for one in known if signal.getsignal(one) is not signal.SIG_IGN]
+
+
+@contextmanager
+def ended_at_once() -> Iterator[None]:
+    """Have the signals that stop a command end the process at once: modules that are half loaded do not bear more."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {one: signal.signal(one, signal.SIG_DFL) for one in stop_signals()}
+    try:
+        yield
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, signal.SIG_DFL if handler is None else handler)
+
+
+def supervise(program: str) -> int:
+    """Run this command line once more as a child, and return its exit code, or 128 and the signal that stopped it."""
+    folder = _temporary_folder()
+    received: list[tuple[int, float]] = []
+    child: subprocess.Popen | None = None
+
+    def handle(number: int, _: object) -> None:
+        received.append((number, time.monotonic()))
+        if child is not None:
+            _pass_on(child, number)
+
+    before = {one: signal.signal(one, handle) for one in stop_signals()}
+    try:
+        child = subprocess.Popen(_this_command(), env=_environment(folder))
+        for number, _ in list(received):
+            _pass_on(child, number)
+        while child.poll() is None:
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(LOOK)
+            since = time.monotonic() - received[0][1] if received else 0.0
+            if since > GRACE:
+                child.kill()
+            if since > LAST:
+                break
+        code = -9 if child.returncode is None else child.returncode
+        journal = _Journal(folder)
+        by = received[0][0] if received else -code if -code in before else 0
+        stopped = bool(by) and code != 0
+        if code < 0 or (stopped and not journal.ended):
+            journal.remove_half_written()
+            journal.say_last_words(None if stopped else f"{program}: {_death(code, journal.at)}")
+        return 128 + by if stopped else 1 if code < 0 else code
+    finally:
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+        for one, handler in before.items():
+            signal.signal(one, signal.SIG_DFL if handler is None else handler)
+
+
+def begin_child() -> bool:
+    """Whether this process is the child. It then reports in the journal, and does not outlive its parent."""
+    global _journal
+    # Programs that the child starts are not to take themselves for children.
+    folder = os.environ.pop(VARIABLE, None)
+    if folder is None:
+        return False
+    if folder:
+        with suppress(OSError):
+            _journal = os.open(Path(folder) / JOURNAL, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+    end_with_parent()
+    return True
+
+
+def end_with_parent() -> None:
+    """Have this process killed when its parent ends, however that ends, where the system can (Linux)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+
+
+def report(**facts: Any) -> None:
+    """Write facts into the journal, if there is one.
+
+    Parameters
+    ----------
+    at : str
+        The input that is done next.
+    making : str
+        A file that is being written, or a folder that was made for one; it is removed if the process is killed.
+    written : str
+        A file that is complete, and to be printed at the end.
+    summary : str
+        What would be said if the process were stopped now.
+    ended : bool
+        Whether all of that was printed.
+    """
+    if _journal is not None:
+        with suppress(OSError):
+            os.write(_journal, f"{json.dumps(facts)}\n".encode())
+
+
+class _Journal:
+    """What the child reported."""
+
+    def __init__(self, folder: str | None) -> None:
+        self.at = ""
+        self.summary = STOPPED
+        self.ended = False
+        self.written: list[str] = []
+        self._making: list[Path] = []
+        try:
+            lines = (Path(folder or os.devnull) / JOURNAL).read_text(encoding="utf-8").splitlines()
+        except OSError:
+            return
+        for line in lines:
+            with suppress(ValueError):  # The last one may be cut off.
+                facts = json.loads(line)
+                self.at = facts.get("at", self.at)
+                self.summary = facts.get("summary", self.summary)
+                self.ended = facts.get("ended", self.ended)
+                self.written += [facts["written"]] if "written" in facts else []
+                self._making += [Path(facts["making"])] if "making" in facts else []
+
+    def remove_half_written(self) -> None:
+        """Remove what was being written, and folders that were made for it and are empty."""
+        for place in reversed(self._making):
+            with suppress(OSError):
+                if place.is_dir():
+                    place.rmdir()
+                    continue
+                # Blender writes beside it again, to NAME@.
+                for name in os.listdir(place.parent):
+                    if name in (place.name, f"{place.name}@"):
+                        place.with_name(name).unlink()
+
+    def say_last_words(self, crash: str | None) -> None:
+        """Print what the child can no longer say."""
+        if self.ended:
+            return
+        errors = _writable(sys.stderr)
+        if errors and self.at and sys.stderr.isatty():
+            print(file=sys.stderr, flush=True)  # The cursor is behind the progress bar.
+        if _writable(sys.stdout):
+            for path in self.written:
+                print(path_line(path), flush=True)
+        if errors:
+            for line in filter(None, (crash, self.summary.removeprefix("Stopped. ") if crash else self.summary)):
+                print(line, file=sys.stderr, flush=True)
+
+
+def _temporary_folder() -> str | None:
+    try:
+        return tempfile.mkdtemp(prefix="rigid-motion-")
+    except OSError:  # Without one, Blender says itself what it cannot do.
+        return None
+
+
+def _environment(folder: str | None) -> dict[str, str]:
+    temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder) if folder else {}
+    return {**os.environ, **temporary, VARIABLE: folder or ""}
+
+
+def _this_command() -> Sequence[str]:
+    """What this process was started with: Python, or a Blender that runs a script."""
+    blender = getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
+    return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
+
+
+def _pass_on(child: subprocess.Popen, number: int) -> None:
+    if os.name != "nt":  # There the console sends Ctrl-C to both.
+        child.send_signal(number)
+
+
+def _death(code: int, at: str) -> str:
+    """How a child ended that nobody stopped, and the way out."""
+    how = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+    how += ", perhaps for want of memory" if how == "SIGKILL" else ""
+    if not at:
+        return f"the process died ({how}) before it had done anything"
+    return f"the process died ({how}) at {printable(at)}: leave that out, or see whether Blender opens it"
+
+
+def _writable(stream: Any) -> bool:
+    """Whether a stream takes a line now: who reads a pipe may have stopped to."""
+    if stream is None:
+        return False
+    if os.name == "nt":
+        return True
+    try:
+        return bool(select.select([], [stream], [], 0.1)[1])
+    except (OSError, ValueError):
+        return True

@@ -1,0 +1,97 @@
+"""What the tests of stopped commands share: starting one that gets stuck where Python cannot interrupt it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+STUCK = """
+import ctypes, io, os, pathlib, signal
+
+def stick(what):
+    if {where!r} in os.path.basename(os.fspath(what)) and os.path.exists({marker!r}) is False:
+        pathlib.Path({marker!r}).write_bytes(b"")
+        {act}
+
+real_open, real_link = io.open, os.link
+
+def open_and_stick(file, *arguments, **options):
+    if isinstance(file, (str, os.PathLike)):
+        stick(file)
+    return real_open(file, *arguments, **options)
+
+def stick_and_link(source, target, **options):
+    stick(target)
+    return real_link(source, target, **options)
+
+io.open, os.link = open_and_stick, stick_and_link
+"""
+"""A sitecustomize.py: the process is stuck as soon as a file of that name is opened, or moved into place."""
+
+HANG = "lock, mutex = ctypes.PyDLL(None).pthread_mutex_lock, ctypes.create_string_buffer(64); lock(mutex); lock(mutex)"
+"""As Blender at work: it keeps the interpreter's lock, and no signal wakes it."""
+
+CRASH = "signal.signal(signal.SIGSEGV, signal.SIG_DFL); os.kill(os.getpid(), signal.SIGSEGV)"
+
+
+@dataclass
+class Started:
+    """A command at work."""
+
+    process: subprocess.Popen
+    temporary: Path
+    """Its folder for temporary files."""
+
+    marker: Path
+    """There once it is stuck."""
+
+    def wait_until_stuck(self) -> None:
+        deadline = time.monotonic() + 60.0
+        while not self.marker.exists():
+            assert self.process.poll() is None, self.process.communicate()
+            assert time.monotonic() < deadline, "it was never stuck"
+            time.sleep(0.01)
+
+    def end(self) -> tuple[str, str, float]:
+        """What it printed and said, and the seconds until its end."""
+        started = time.monotonic()
+        printed, said = self.process.communicate(timeout=60)
+        return printed, said, time.monotonic() - started
+
+
+def start(folder: Path, command: str, *arguments: object, where: str, act: str = HANG, **options: object) -> Started:
+    """Start a script that is stuck where it opens a file, or moves one into place, with `where` in its name."""
+    own = folder / "stuck"
+    temporary, marker = own / "temporary", own / "marker"
+    temporary.mkdir(parents=True)
+    content = STUCK.format(where=where, marker=str(marker), act=act)
+    (own / "sitecustomize.py").write_text(content, encoding="utf-8")
+    line = [sys.executable, str(ROOT / "scripts" / command), *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(own), "TMPDIR": str(temporary)}
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
+    process = subprocess.Popen(line, env=environment, cwd=folder, start_new_session=True, **streams)
+    return Started(process, temporary, marker)
+
+
+def descendants(process: int) -> Sequence[int]:
+    """The processes that a process has started, and that these have."""
+    try:
+        children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    except FileNotFoundError:
+        return []
+    return [found for child in map(int, children) for found in (child, *descendants(child))]
+
+
+def alive(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"

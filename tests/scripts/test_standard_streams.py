@@ -1,0 +1,110 @@
+"""Commands whose output nobody reads, has no place, or cannot be shown: one line or silence, and no traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.command_line import path_line
+from rigid_motion_batch.commands import COMMANDS
+from tests.scripts.reducing import write_csv
+
+ROOT = Path(__file__).resolve().parents[2]
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="shells, and devices of Unix")
+
+ODD = "a\nb\t\x1b[2J \u00fc\u624b.csv"
+"""What a file may be called."""
+
+
+def shell(line: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a line of Bash, in which `reduce` and `rigid-motion` are commands."""
+    package = f"PYTHONPATH={ROOT / 'scripts'} {sys.executable} -m rigid_motion_batch"
+    reduce, compare = (f"{sys.executable} {ROOT / 'scripts'}/{name}.py" for name in ("reduce", "compare"))
+    functions = f'reduce() {{ {reduce} "$@"; }}; compare() {{ {compare} "$@"; }}; program() {{ {package} "$@"; }}'
+    command = ["bash", "-c", f"{functions}; {line}"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, env=os.environ | variables)
+
+
+@pytest.mark.parametrize(
+    ("line", "codes"),
+    [
+        ("reduce hand.csv | true", "0 0"),
+        ("reduce hand.csv 2>&1 | head -1 >/dev/null", "0 0"),
+        ("reduce --help | true", "0 0"),
+        ("program | true", "0 0"),
+        ("program --version | true", "0 0"),
+        ("reduce --tolerance no 2>&1 | true", "2 0"),
+        ("compare hand.csv --no-video --rates 5 --modes lerp_slerp --output made --jobs 0 | true", "0 0"),
+    ],
+)
+def test_who_has_read_enough_hears_nothing(tmp_path, line, codes):
+    write_csv(tmp_path / "hand.csv")
+    done = shell(f'{line}; echo "${{PIPESTATUS[@]}}"', tmp_path)
+    assert done.stdout == f"{codes}\n", done.stderr
+    assert "rror" not in done.stderr
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_every_command_may_be_cut_short(tmp_path, command):
+    done = shell(f'program {command} --help | true; echo "${{PIPESTATUS[@]}}"', tmp_path)
+    assert (done.stdout, done.stderr) == ("0 0\n", "")
+
+
+@pytest.mark.parametrize("line", ["reduce hand.csv >/dev/full", "reduce --help >/dev/full", "program >/dev/full"])
+def test_a_full_disk_is_told_of(tmp_path, line):
+    write_csv(tmp_path / "hand.csv")
+    done = shell(line, tmp_path)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert last.endswith(": standard output: No space left on device; what is printed there is lost")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "2>/dev/full", "<&-", "<&- >&- 2>&-"])
+def test_closed_streams_keep_nothing_from_being_done(tmp_path, closed):
+    write_csv(tmp_path / "hand.csv")
+    done = shell(f"reduce hand.csv --blend {closed}", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert sorted(os.listdir(tmp_path)) == ["hand-keys.blend", "hand-keys.csv", "hand.csv"]
+    assert done.stdout == ("" if ">&-" in closed.replace("2>&-", "") else "hand-keys.csv\nhand-keys.blend\n")
+
+
+def test_complaints_do_not_go_to_the_output_where_the_errors_have_no_place(tmp_path):
+    done = shell("program nothing 2>&-", tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+@pytest.mark.parametrize("encoding", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C"}, {"LC_ALL": "C.UTF-8"}])
+def test_every_name_is_told_in_a_line_whatever_the_encoding(tmp_path, encoding):
+    write_csv(tmp_path / ODD)
+    done = shell("reduce *.csv && cp -- *keys.csv found", tmp_path, **encoding)
+    assert done.returncode == 0, done.stderr
+    (line,) = done.stdout.splitlines()
+    assert (tmp_path / json.loads(line)).read_bytes() == (tmp_path / "found").read_bytes()
+    assert len([told for told in done.stderr.splitlines() if "\\n" in told]) == 2
+    assert "\x1b" not in done.stderr
+    assert "\t" not in done.stderr
+
+
+def test_names_in_complaints_are_told_in_a_line(tmp_path):
+    for line in ("reduce no.csv --output $'no\\nfolder'", "reduce no.csv --axes $'no\\naxes'"):
+        (tmp_path / "no\nfolder").touch()
+        done = shell(line, tmp_path)
+        assert done.returncode == 2
+        assert done.stderr.splitlines()[-1].startswith("reduce.py: error: ")
+
+
+def test_paths_are_lines_that_can_be_told_from_one_another():
+    plain = ["shots/shot-keys.csv", "gr\u00fc\u00dfe.csv", "\u624b\u3000.csv", "C:\\shot.blend", "it's.csv"]
+    assert list(map(path_line, plain)) == plain
+    odd = ["a\nb", "\x1b[2J", "a\u2028b", "\udcff", '"a"', "a\x7f"]
+    for path in odd:
+        (line,) = path_line(path).splitlines()
+        assert line.isascii()
+        assert json.loads(line) == path

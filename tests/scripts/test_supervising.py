@@ -1,0 +1,161 @@
+"""Commands that are stopped, or crash, while something is at work that Python cannot interrupt."""
+
+from __future__ import annotations
+
+import os
+import pty
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.trajectories import importing
+from tests.scripts.baking import one_object_file
+from tests.scripts.reducing import object_file, write_csv
+from tests.scripts.stopping import CRASH, alive, descendants, start
+
+SOON = 5.0
+"""Seconds: on a machine with nothing else to do it is 1.3."""
+
+BOTH = pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux has them")
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir() if path.name != "stuck")
+
+
+@BOTH
+def test_a_reader_at_work_does_not_keep_reduce_from_its_end(tmp_path, by, code):
+    write_csv(tmp_path / "hand.csv")
+    write_csv(tmp_path / "slow.csv")
+    run = start(tmp_path, "reduce.py", "hand.csv", "slow.csv", "hand.csv", where="slow.csv")
+    run.wait_until_stuck()
+    processes = descendants(run.process.pid)
+    run.process.send_signal(by)
+    printed, said, seconds = run.end()
+    assert (run.process.returncode, printed) == (code, "hand-keys.csv\n"), said
+    assert said.splitlines()[-1] == "Stopped. 1 object reduced; 2 files: 1 written, 1 not reached."
+    assert "Traceback" not in said
+    assert seconds < SOON
+    assert files(tmp_path) == ["hand-keys.csv", "hand.csv", "slow.csv"]
+    assert list(run.temporary.iterdir()) == []
+    assert processes
+    assert not any(map(alive, processes))
+
+
+@BOTH
+@pytest.mark.parametrize("command", ["reduce.py", "bake.py"])
+def test_what_is_half_written_is_gone(tmp_path, command, by, code):
+    make = object_file if command == "reduce.py" else one_object_file
+    make(tmp_path / "shot.blend")
+    run = start(tmp_path, command, "shot.blend", "--output", "new/farm", where="shot-")
+    run.wait_until_stuck()
+    assert len(list((tmp_path / "new" / "farm").iterdir())) == 1
+    run.process.send_signal(by)
+    printed, said, seconds = run.end()
+    assert (run.process.returncode, printed) == (code, ""), said
+    assert said.splitlines()[-1].startswith("Stopped. 0 objects")
+    assert seconds < SOON
+    assert files(tmp_path) == ["shot.blend"]
+    assert list(run.temporary.iterdir()) == []
+
+
+@BOTH
+@pytest.mark.parametrize("jobs", [0, 2])
+def test_a_reader_at_work_does_not_keep_compare_from_its_end(tmp_path, jobs, by, code):
+    write_csv(tmp_path / "slow.csv")
+    options = ("--no-video", "--output", "made", "--jobs", jobs)
+    run = start(tmp_path, "compare.py", "slow.csv", *options, where="slow.csv")
+    run.wait_until_stuck()
+    processes = descendants(run.process.pid)
+    run.process.send_signal(by)
+    printed, said, seconds = run.end()
+    assert (run.process.returncode, printed) == (code, ""), said
+    assert said.splitlines()[-1].startswith("Stopped. ")
+    assert "Traceback" not in said
+    assert seconds < SOON
+    assert list(run.temporary.iterdir()) == []
+    time.sleep(0.2)
+    assert not any(map(alive, processes))
+
+
+@BOTH
+def test_a_reader_at_work_does_not_keep_a_sender_from_its_end(tmp_path, by, code):
+    write_csv(tmp_path / "slow.csv")
+    run = start(tmp_path, "stream.py", "send", "slow.csv", "--to", "127.0.0.1:9", where="slow.csv")
+    run.wait_until_stuck()
+    run.process.send_signal(by)
+    _, said, seconds = run.end()
+    assert run.process.returncode == code
+    assert said.startswith("Stopped. ")
+    assert seconds < SOON
+
+
+def test_ctrl_c_in_a_terminal_pressed_again_and_again_leaves_nothing_behind(tmp_path):
+    write_csv(tmp_path / "slow.csv")
+    ours, theirs = pty.openpty()
+    run = start(tmp_path, "reduce.py", "slow.csv", where="slow.csv", stdin=theirs, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    run.wait_until_stuck()
+    processes = descendants(run.process.pid)
+    for _ in range(3):
+        # What a terminal does at Ctrl-C: all processes get it.
+        os.killpg(run.process.pid, signal.SIGINT)
+        time.sleep(0.1)
+    assert run.process.wait(SOON) == 130
+    shown = os.read(ours, 1 << 16).decode()
+    os.close(ours)
+    assert shown.splitlines()[-1] == "Stopped. 0 objects reduced; 1 file: 0 written, 1 not reached."
+    assert files(tmp_path) == ["slow.csv"]
+    assert list(run.temporary.iterdir()) == []
+    assert not any(map(alive, processes))
+
+
+def test_a_crash_names_the_file_that_it_came_at_and_what_is_complete(tmp_path):
+    for name in ("hand", "slow", "last"):
+        write_csv(tmp_path / f"{name}.csv")
+    run = start(tmp_path, "reduce.py", "hand.csv", "slow.csv", "last.csv", where="slow.csv", act=CRASH)
+    printed, said, _ = run.end()
+    assert (run.process.returncode, printed) == (1, "hand-keys.csv\n")
+    assert said.splitlines()[-2:] == [
+        "reduce.py: the process died (SIGSEGV) at slow.csv: leave that out, or see whether Blender opens it",
+        "1 object reduced; 3 files: 1 written, 2 not reached.",
+    ]
+    assert "Traceback" not in said
+    assert list(run.temporary.iterdir()) == []
+
+
+def test_no_child_outlives_a_command_that_is_killed(tmp_path):
+    write_csv(tmp_path / "slow.csv")
+    run = start(tmp_path, "reduce.py", "slow.csv", where="slow.csv")
+    run.wait_until_stuck()
+    processes = descendants(run.process.pid)
+    run.process.kill()
+    run.end()
+    deadline = time.monotonic() + SOON
+    while any(map(alive, processes)) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert processes
+    assert not any(map(alive, processes))
+
+
+def test_what_is_ignored_goes_on_being_ignored(tmp_path):
+    write_csv(tmp_path / "hand.csv", seconds=20.0)
+    ignore = {"preexec_fn": lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)}
+    run = start(tmp_path, "reduce.py", "hand.csv", where="no such file", **ignore)
+    time.sleep(0.3)
+    run.process.send_signal(signal.SIGHUP)
+    printed, said, _ = run.end()
+    assert (run.process.returncode, printed) == (0, "hand-keys.csv\n"), said
+
+
+def test_ctrl_c_within_an_importer_is_no_fault_of_the_file(tmp_path):
+    def importer() -> None:
+        # As bpy.ops puts it.
+        raise RuntimeError("Error: Python: Traceback (most recent call last):\n  File ...\nKeyboardInterrupt\n")
+
+    with pytest.raises(KeyboardInterrupt):
+        importing._import(tmp_path / "walk.fbx", importer)
