@@ -153,7 +153,7 @@ def _move(rig: bpy.types.Object, case: RigCase, random: np.random.Generator) -> 
         parent.location, parent.rotation_euler = random.normal(size=3), random.normal(size=3)
         rig.parent = parent
     if case.object_keys:
-        frames = frames_of(1.0)
+        rig.rotation_mode, frames = "XYZ", frames_of(1.0)
         write_channel(rig, "location", frames, 0.3 * _waves(random, frames, 3))
         write_channel(rig, "rotation_euler", frames, 0.3 * _waves(random, frames, 3))
     data = rig.animation_data

@@ -13,6 +13,7 @@ from ...motion.affine import AffineMaps
 from ...motion.eulers import ORDERS
 from ...motion.quaternions import matrices, multiply
 from ..actions.sources import Source
+from ..curves import LARGEST
 from ..inbetweens.bodies import turn_into_quaternions
 from ..inbetweens.differences import in_betweens
 from ..transforms import LOCATION, ROTATION, ROWS, SCALE, Channel, Transform
@@ -61,7 +62,7 @@ def evaluated(
             has_say = fcurve is not None and not fcurve.mute and not fcurve.is_empty
             columns.append([fcurve.evaluate(frame) for frame in frame_list] if has_say else [value] * len(frame_list))
         found = np.array(columns, dtype=np.float64).T
-        return found if np.isfinite(found).all() else np.tile(np.array(stands), (len(frame_list), 1))
+        return found if (np.abs(found) < LARGEST).all() else np.tile(np.array(stands), (len(frame_list), 1))
 
     mode = bone.rotation_mode
     if mode in ORDERS:
