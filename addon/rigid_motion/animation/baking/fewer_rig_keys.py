@@ -96,8 +96,13 @@ def fewer_keys_of_rigs(
         try:
             rig = _Rig(obj, members, tolerance, radius, hold=hold)
             if own is not None:
-                plans.setdefault(transform_of(obj), []).append(rig.reduce_own_keys(transform_of(obj), *own, mode, best_of=best_of))
+                of_object = plans.setdefault(transform_of(obj), [])
+                of_object.append(rig.reduce_own_keys(transform_of(obj), *own, mode, best_of=best_of))
             fewer = rig.fewer_keys(mode, shared=shared, best_of=best_of)
+            if own is not None and fewer:
+                # How far it is off counts at the bones, which is known by now.
+                whole = next(iter(fewer.values())).rig
+                of_object[-1] = replace(of_object[-1], largest_error=whole.largest_error)
         except Refused as refusal:
             plans.update(dict.fromkeys(members, refusal))
             continue

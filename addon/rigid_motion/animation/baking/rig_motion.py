@@ -7,6 +7,7 @@ among them. Poses are those that the channels give: constraints and drivers have
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 
 import bpy
 import numpy as np
@@ -16,7 +17,7 @@ from ..actions.reading import sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import Slot, transforms_in
 from ..actions.sources import Source
-from ..transforms import Channel, Refused, Transform, transform_of
+from ..transforms import Channel, Refused, split_path, transform_of
 from ..transforms.posing import Hierarchy
 from .channel_maps import evaluated, shown
 from .sizes import into_scene, reach_of, scale_in_scene
@@ -53,11 +54,11 @@ class RigMotion:
         self.transforms = [transform_of(bone) for bone in self.bones]
         self.hierarchy, scale = Hierarchy(self.bones), scale_in_scene(transform_of(rig))
         self.radii = np.array([radius / scale if radius else reach_of(bone) for bone in self.bones])
-        self.own, others, curves = _keyed_in(rig, slot)
+        keyed, curves = _keyed_in(rig, slot)
         found = [
             shown(transform, source, frames)
-            if (source := sources.get(number) or others.get(transform)) is not None
-            else evaluated(transform, curves.get(transform, {}), frames)
+            if (source := sources.get(number) or keyed.get(transform.prefix)) is not None
+            else evaluated(transform, curves.get(transform.prefix, {}), frames)
             for number, transform in enumerate(self.transforms)
         ]
         self.poses = [poses for poses, _ in found]
@@ -68,7 +69,7 @@ class RigMotion:
         self._recorded_channels = self._channels.copy()
         self._posed = self.hierarchy.posed(self._channels)
         recorded = self._posed.copy()
-        self.world = self.carried_by(self.own)
+        self.world = self.carried_by(keyed.get(""))
         """Where the rig is, shape (m,) or (1,)."""
         self._carried = self.world
         self.truth = self.world @ recorded
@@ -149,24 +150,18 @@ class RigMotion:
         return float(ball_displacement(now[may], truth[may], np.full(len(may), radius)).max(initial=least[0]))
 
 
-def _keyed_in(
-    rig: bpy.types.Object, slot: Slot
-) -> tuple[Source | None, dict[Transform, Source], dict[Transform, Mapping[Channel, bpy.types.FCurve]]]:
-    """What a slot has of a rig itself, and of its bones as sources; and F-curves of bones that make no source."""
-    sources: dict[Transform, Source] = {}
-    curves: dict[Transform, Mapping[Channel, bpy.types.FCurve]] = {}
+def _keyed_in(rig: bpy.types.Object, slot: Slot) -> tuple[dict[str, Source], dict[str, dict[Channel, bpy.types.FCurve]]]:
+    """What a slot has of a rig and its bones, by the prefixes of their data paths: sources, and all F-curves."""
+    sources: dict[str, Source] = {}
     places = transforms_in(slot)
     for place, of_users in zip(places, sources_of_users(places), strict=True):
         for user, source in zip(place.users, of_users, strict=True):
-            if user.animated != rig:
-                continue
-            try:
-                if isinstance(source, Refused):
-                    raise source
-                refuse_numbers(user.name, source)
-            except Refused:
-                curves[user] = place.curves
-                continue
-            if source.channels:
-                sources[user] = source
-    return sources.pop(transform_of(rig), None), sources, curves
+            if user.animated == rig and isinstance(source, Source) and source.channels:
+                with suppress(Refused):
+                    refuse_numbers(user.name, source)
+                    sources[place.prefix] = source
+    curves: dict[str, dict[Channel, bpy.types.FCurve]] = {}
+    for fcurve in () if slot.channelbag is None else slot.channelbag.fcurves:
+        path = fcurve.data_path
+        curves.setdefault(split_path(path)[0], {})[path, fcurve.array_index] = fcurve
+    return sources, curves
