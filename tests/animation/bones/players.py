@@ -45,6 +45,7 @@ class Player:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._process.stdin.close()
+        self._process.stdout.close()
         self._process.wait(timeout=30)
 
     def play(self, path: Path, rig: str, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

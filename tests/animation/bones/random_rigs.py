@@ -167,7 +167,10 @@ def _move(rig: bpy.types.Object, case: RigCase, random: np.random.Generator) -> 
 
 def random_case(random: np.random.Generator, *, follows: bool = True) -> RigCase:
     """A case by NumPy's random numbers, for runs at large; hypothesis makes those of the tests."""
-    some = lambda chance: bool(random.random() < chance)
+
+    def some(chance: float) -> bool:
+        return bool(random.random() < chance)
+
     bones = []
     for number in range(random.integers(1, 8)):
         bones.append(

@@ -109,7 +109,11 @@ def complaints(case: RigCase, folder: Path, player: Player) -> list[str]:
         found.append(f"{off} off, {case.tolerance} allowed, {report.largest_error} reported")
     if off > report.largest_error + rounding:
         found.append(f"{off} off, {report.largest_error} reported")
-    if promised.all() and all(bone.step in (0.0, 1.0, 2.0, 5.0) for bone in case.bones) and report.largest_error > 1.02 * off + rounding:
+    if (
+        promised.all()
+        and all(bone.step in (0.0, 1.0, 2.0, 5.0) for bone in case.bones)
+        and report.largest_error > 1.02 * off + rounding
+    ):
         found.append(f"{report.largest_error} reported, {off} off")
     if report.rig.not_promised != excepted:
         found.append(f"named are {report.rig.not_promised}, not {excepted}")

@@ -51,7 +51,7 @@ def shown(transform: Transform, source: Source, frames: np.ndarray) -> tuple[Pos
 def evaluated(
     transform: Transform, curves: Mapping[Channel, bpy.types.FCurve], frames: np.ndarray
 ) -> tuple[Poses, AffineMaps]:
-    """The same of a bone that cannot be read as a source: by its F-curves as Blender evaluates them, or as it stands."""
+    """The same of a bone that makes no source: by its F-curves as Blender evaluates them, or as it stands."""
     bone, frame_list = transform.carrier, frames.tolist()
 
     def values(name: str) -> np.ndarray:

@@ -23,11 +23,14 @@ from ..inbetweens.channel_values import channel_values
 from ..inbetweens.differences import in_betweens
 from ..transforms import ROWS, SCALE, Channel, Refused, Transform
 from .channel_maps import shown
-from .followers import NotPromised
+from .followers import ALL_PROMISED, NotPromised
 from .sizes import into_scene, scale_in_scene
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
+
+
+NO_FRAMES = np.empty(0)
 
 
 class NeedsItsKeys(Refused):
@@ -50,7 +53,7 @@ class WholeRig:
     largest_error: float = 0.0
     """Of all bones that the tolerance is promised for, those without keys among them, in the scene's units."""
 
-    not_promised: NotPromised = NotPromised()
+    not_promised: NotPromised = ALL_PROMISED
     """The bones that it is not promised for."""
 
 
@@ -120,10 +123,14 @@ def fewer_keys(
     radius: float,
     *,
     best_of: bool,
+    more_frames: np.ndarray = NO_FRAMES,
 ) -> FewerKeys:
-    """The keys that one slot needs, which may be as many as it has. Lengths are the scene's units."""
+    """The keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
+
+    The tolerance holds on all whole frames, on those with keys, and on `more_frames`.
+    """
     frames = samples_of(source)
-    seen = seen_frames(frames, [source])
+    seen = np.union1d(seen_frames(frames, [source]), more_frames)
     poses, truth = shown(transform, source, seen)
     samples = np.searchsorted(seen, frames)
     placing, radius = into_scene(transform), radius / scale_in_scene(transform)
@@ -144,9 +151,9 @@ def fewer_keys(
         searched = radius
         if not np.all(poses.scales > 0.0):
             raise Refused(
-                rpt_("{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)").format(
-                    name=transform.name
-                )
+                rpt_(
+                    "{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"
+                ).format(name=transform.name)
             )
     chosen = samples[reduce_keys(frames, poses[samples], mode, tolerance / unit, searched)]
     values = values_on(transform, source, seen)

@@ -183,7 +183,7 @@ class _Rig:
         """Fewer keys for the rig itself, within a share of the tolerance at the farthest point of any bone."""
         share = SHARE * self.tolerance / self.weights.max()
         reach = self.motion.extent * scale_in_scene(transform)
-        plan = fewer_keys(transform, place, source, mode, share, reach, best_of=best_of)
+        plan = fewer_keys(transform, place, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
         if len(plan.key_frames) < plan.before:
             self.motion.carry(plan.fewer)
             self.largest_own = plan.largest_error
@@ -199,7 +199,7 @@ class _Rig:
                 self.poses[:, samples],
                 self.skeleton.parents,
                 mode,
-                tolerance=(self.tolerance - self.largest_own * self.weights.max()) / (self.motion.unit * self.parts),
+                tolerance=(self.tolerance - self.largest_own) / (self.motion.unit * self.parts),
                 radius=self.motion.radii,
                 shared=shared,
                 weights=self.weights[:, samples],
@@ -285,7 +285,7 @@ class _Rig:
                 off.add(number)
                 movable = list(chosen) if shared else [one for one in chain if one in chosen]
                 added = self._with_keys_at(moment, movable, chosen)
-                if not added:
+                if not added and changed.isdisjoint(chain):
                     names = [self.targets[one].name for one in chain if one in self.targets]
                     raise goes_elsewhere(names[0] if names else f"{self.rig.name}/{self.motion.bones[number].name}")
                 chosen.update(added)
@@ -301,7 +301,8 @@ class _Rig:
             added = {}
             for number in movable:
                 first, last = self._ends(number)
-                more = [one for one in moments if first <= one <= last and one not in chosen[number]]
+                # Before and behind its keys it stays where they leave it.
+                more = [one for one in np.clip(moments, first, last).tolist() if one not in chosen[number]]
                 if more:
                     added[number] = np.union1d(chosen[number], (first, *more, last))
             if added:

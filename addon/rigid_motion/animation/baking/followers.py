@@ -34,6 +34,9 @@ class NotPromised:
         return name in self.followers or name in self.below
 
 
+ALL_PROMISED = NotPromised()
+
+
 def not_promised(rig: bpy.types.Object) -> NotPromised:
     """The bones of a rig whose motion is not that of their channels, and of those above them, alone."""
     followers = {*_constrained(rig), *_driven(rig)}

@@ -29,8 +29,8 @@ from ..transforms import Refused, Transform, is_ours, transform_of
 from .bake import go_back
 from .copies import REDUCED, entries_in_use, entries_of
 from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys, has_uneven_scale
-from .followers import NotPromised
 from .fewer_rig_keys import Plans, fewer_keys_of_rigs
+from .followers import NotPromised
 from .originals import (
     discard_originals,
     has_original,

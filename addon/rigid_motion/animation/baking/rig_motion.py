@@ -150,7 +150,9 @@ class RigMotion:
         return float(ball_displacement(now[may], truth[may], np.full(len(may), radius)).max(initial=least[0]))
 
 
-def _keyed_in(rig: bpy.types.Object, slot: Slot) -> tuple[dict[str, Source], dict[str, dict[Channel, bpy.types.FCurve]]]:
+def _keyed_in(
+    rig: bpy.types.Object, slot: Slot
+) -> tuple[dict[str, Source], dict[str, dict[Channel, bpy.types.FCurve]]]:
     """What a slot has of a rig and its bones, by the prefixes of their data paths: sources, and all F-curves."""
     sources: dict[str, Source] = {}
     places = transforms_in(slot)

@@ -22,12 +22,18 @@ OF_A_RIG = 0.003
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     """How far an object or a pose bone reaches from its origin, in the scene's units.
 
-    That is the farthest corner of an object's bounding box as it is now, and how far a bone reaches at rest, see
-    `reach_of`. Empties and cameras are as large as they are drawn; what has no size at all counts as ten centimetres.
+    That is the farthest corner of an object's bounding box as it is now; how far a bone reaches at rest, see `reach_of`;
+    and of a rig how far its bones reach as it is posed now. Empties and cameras are as large as they are drawn; what
+    has no size at all counts as ten centimetres.
     """
     if isinstance(obj, bpy.types.PoseBone):
         return reach_of(obj) * (size_of(_evaluated(obj.id_data).matrix_world) or 1.0)
     evaluated = _evaluated(obj)
+    if obj.pose is not None and len(obj.pose.bones):
+        axes = np.array(evaluated.matrix_world.to_3x3())
+        heads = np.array([bone.head for bone in evaluated.pose.bones]) @ axes.T
+        reaches = np.array([reach_of(bone) for bone in obj.pose.bones]) * size_of(axes)
+        return float((np.linalg.norm(heads, axis=1) + reaches).max()) or SOME_SIZE / metres_per_unit(bpy.context.scene)
     corners = np.array(evaluated.bound_box)
     size = 0.0
     if np.ptp(corners) > 0.0:

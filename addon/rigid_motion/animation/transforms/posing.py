@@ -38,7 +38,7 @@ class Hierarchy:
         self.rest = AffineMaps(rest[:, :3, :3], rest[:, :3, 3])
         """Where bones are at rest, shape (bones,)."""
         inverse = np.linalg.inv(rest)
-        offsets = np.array([inverse[above] @ own if above >= 0 else own for above, own in zip(self.parents, rest)])
+        offsets = np.where((self.parents >= 0)[:, None, None], inverse[self.parents] @ rest, rest)
         self.offsets = AffineMaps(offsets[:, :3, :3], offsets[:, :3, 3])
         """The same in the spaces of their parents at rest."""
 
@@ -122,9 +122,7 @@ def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
     across, _ = _unit(unit_x - cosine[:, None] * unit_z)
     moved_x = np.sin(target)[:, None] * across + np.cos(target)[:, None] * unit_z
     moved_z, _ = _unit(np.cross(np.cross(moved_x, unit_z), moved_x))
-    unit_x, unit_z = (
-        np.where(sheared[:, None], moved, unit) for moved, unit in ((moved_x, unit_x), (moved_z, unit_z))
-    )
+    unit_x, unit_z = (np.where(sheared[:, None], moved, unit) for moved, unit in ((moved_x, unit_x), (moved_z, unit_z)))
     if normalise:
         return np.stack((unit_x, _unit(y)[0], unit_z), axis=-1)
     shrink = np.sqrt(np.sin(angle))
