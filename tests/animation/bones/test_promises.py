@@ -94,6 +94,7 @@ def complaints(case: RigCase, folder: Path, player: Player) -> list[str]:
         reduce_keys_of(targets, case.mode, case.tolerance, refused=refused, **wishes)
         done = [transform for transform in targets if len(transform.motion.bakes)]
         found = [f"{one.name} has not fewer keys" for one in done if key_count(one) >= counts[one]]
+        found += [str(refusal) for refusal in refused if "goes on outside" in str(refusal)]
         if not any(transform.prefix for transform in done) or not promised.any():
             return found
         report = total_reduction(done)

@@ -60,8 +60,10 @@ def _constrained(rig: bpy.types.Object) -> Iterator[str]:
             if is_switched or (not constraint.mute and constraint.influence > 0.0):
                 yield bone.name
                 if constraint.type in CHAINS:
-                    count = constraint.chain_count or len(bone.parent_recursive) + 1
-                    yield from (parent.name for parent in bone.parent_recursive[:count])
+                    # The bone itself is the last of a chain, unless that is to reach for its head.
+                    count = constraint.chain_count - getattr(constraint, "use_tail", True)
+                    above = bone.parent_recursive[:count] if constraint.chain_count else bone.parent_recursive
+                    yield from (parent.name for parent in above)
 
 
 def _driven(rig: bpy.types.Object) -> Iterator[str]:

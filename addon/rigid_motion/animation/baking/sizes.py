@@ -22,7 +22,7 @@ OF_A_RIG = 0.003
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     """How far an object or a pose bone reaches from its origin, in the scene's units.
 
-    That is the farthest corner of an object's bounding box as it is now; how far a bone reaches at rest, see `reach_of`;
+    That is the farthest corner of an object's bounding box as it is now, how far a bone reaches at rest (`reach_of`),
     and of a rig how far its bones reach as it is posed now. Empties and cameras are as large as they are drawn; what
     has no size at all counts as ten centimetres.
     """
