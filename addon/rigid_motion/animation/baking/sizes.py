@@ -59,15 +59,15 @@ def reach_of(bone: bpy.types.PoseBone) -> float:
 
 
 def rig_size(rig: bpy.types.Object) -> float:
-    """The size of a rig in the scene's units: the largest extent of its joints along any axis, as it is posed now.
+    """The size of a rig in the scene's units: the largest extent of its joints along any axis, at rest.
 
     Joints are the heads of bones, for importers make up where the last bones end. A rig whose heads are in one place is
     as large as the bone that reaches farthest.
     """
-    evaluated = _evaluated(rig)
-    heads = np.array([evaluated.matrix_world @ bone.head for bone in evaluated.pose.bones]).reshape(-1, 3)
+    world = _evaluated(rig).matrix_world
+    heads = np.array([world @ bone.bone.head_local for bone in rig.pose.bones]).reshape(-1, 3)
     extent = float(np.ptp(heads, axis=0).max()) if len(heads) else 0.0
-    reach = max((reach_of(bone) for bone in rig.pose.bones), default=0.0) * size_of(evaluated.matrix_world)
+    reach = max((reach_of(bone) for bone in rig.pose.bones), default=0.0) * size_of(world)
     return extent if extent > SAME_PLACE * reach else reach
 
 
