@@ -2,6 +2,7 @@
 
 components  the rows of arrays                          transform   the interface: channels, and where differences go
 objects     objects, by their delta transforms          bones       pose bones, by a constraint
+posing      where the poses of bones put them
 
 A transform knows whose Action animates it, on which property its channels are, and where the difference between
 Blender's in-betweens and the wanted ones goes.
