@@ -55,10 +55,11 @@ examples:
 .blend files:
   The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation. It
   keeps the keys that the mode needs, and sets the mode on them. The dense keys stay in the file, so that Restore Keys
-  brings them back; with --discard they do not. For bones, the tolerance holds in the rig's space, through all parents;
-  if the rig itself has keys, its own error comes on top. Feet that stand on the ground keep to a quarter of the
-  tolerance. An object that needs all of its keys stays as it is. Without --radius, the radius is the size of the object
-  or the length of the bone.
+  brings them back; with --discard they do not. For bones, the tolerance holds through all parents, and with the rig's
+  own keys. Bones that follow constraints or drivers are not promised, nor is what hangs on them: they are named. Feet
+  that stand on the ground keep to a quarter of the tolerance. An object that needs all of its keys stays as it is, and
+  so does one whose scale has keys everywhere that differ from axis to axis. Without --radius, the radius is the size of
+  the object or the length of the bone.
 
 recordings:
   The program reads what compare.py reads: CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and animated objects and

@@ -169,7 +169,7 @@ def test_what_grows_gets_its_best_modes_too(live_file):
 
 def test_one_mode_stays_where_several_would_go_elsewhere_outside_of_the_keys(live_file, monkeypatch):
     # Seen with no motion yet; only cycles of different lengths could come to it.
-    monkeypatch.setattr(fewer_keys, "with_best_modes", lambda source, *_: replace(source, mode=1))
+    monkeypatch.setattr(fewer_keys, "with_best_modes", lambda _, source, *__: replace(source, mode=1))
     obj = recorded()
     frames = key_frames(obj)
     truth = read_poses(obj, frames)

@@ -103,6 +103,42 @@ def test_a_recorded_walk_that_was_imported_plays_within_the_tolerance_in_any_ble
     assert sum(map(count_keys, bones)) < len(bones) * len(shown) / 4
 
 
+def test_bones_that_follow_constraints_are_named_and_what_hangs_on_them(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    bpy.data.objects["Rig"].pose.bones["Arm"].constraints.new("COPY_ROTATION").target = new_object("Target")
+    save(path)
+    assert run(path, "--tolerance", "5mm") == 0
+    said = capsys.readouterr().err
+    assert "; not promised: Arm follows constraints or drivers, and what hangs on it (Hand)\n" in said
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+def test_a_rig_with_keys_of_its_own_plays_within_the_tolerance_in_the_world(tmp_path, capsys, uneven):
+    path, probes = rig_file(tmp_path / "shot.blend"), ("at Root", "at Arm", "at Hand")
+    rig = bpy.data.objects["Rig"]
+    key_densely(rig, swing(len(FRAMES), 4))
+    rig.scale = (1.0, 2.0, 0.8) if uneven else (1.0, 1.0, 1.0)
+    save(path)
+    assert run(path, "--tolerance", "5mm") == 0
+    assert "Rig: 3 bones and its own keys reduced, 360 -> " in capsys.readouterr().err
+    at_ends = np.zeros((1, 3))
+    assert 0.0 < displacement(played(reduced_name(path), *probes), played(path, *probes), at_ends) <= 5e-3 + ROUNDING
+
+
+def test_made_up_lengths_of_the_last_bones_make_a_rig_no_larger(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    rig = bpy.data.objects["Rig"]
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones["Hand"].tail = (0.0, 0.0, 57.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    save(path)
+    assert run(path, "--tolerance", "5mm") == 0
+    assert "large in this file" not in capsys.readouterr().err
+    assert run(path, "--overwrite") == 0
+    assert "(1.8 mm allowed)" in capsys.readouterr().err
+
+
 def test_key_poses_are_on_the_same_frames_for_all_bones(tmp_path):
     path = rig_file(tmp_path / "shot.blend")
     assert run(path, "--tolerance", "1cm", "--shared") == 0

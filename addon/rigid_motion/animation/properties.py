@@ -95,6 +95,10 @@ class ChangedAction(bpy.types.PropertyGroup):
     frames_after: IntProperty(description="On how many frames any bone of the rig has keys", options={"HIDDEN"})
     slide_before: FloatProperty(description="How far what stands on the ground slid there", options={"HIDDEN"})
     slide_after: FloatProperty(description="How far it slides there with fewer keys", options={"HIDDEN"})
+    # Of all bones of the rig, in Blender's units.
+    largest_error_of_rig: FloatProperty(options={"HIDDEN"})
+    # JSON: the bones that follow constraints or drivers, and those that hang on them.
+    not_promised: StringProperty(options={"HIDDEN"})
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:

@@ -107,6 +107,9 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
         summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
         if (feet := _slides(scene, reduction.rig)) is not None:
             summary += rpt_(", feet that stand slide {distance}").format(distance=feet)
+        if followers := reduction.rig.not_promised.followers:
+            text = rpt_("; not promised for what follows constraints or drivers, and hangs on it: {bones}")
+            summary += text.format(bones=listed(followers))
     if len(reduction.segments) > 1:
         summary += rpt_("; segments: {modes}").format(modes=", ".join(counted_modes(reduction.segments)))
     return summary
@@ -125,6 +128,9 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[s
         rows.insert(1, (iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
         if (feet := _slides(scene, reduction.rig)) is not None:
             rows.append((iface_("Feet", OWN_WORDS), iface_("slide {distance}").format(distance=feet)))
+        if followers := reduction.rig.not_promised.followers:
+            # What follows constraints or drivers is somewhere else than its keys say.
+            rows.append((iface_("Not Promised", OWN_WORDS), listed(followers)))
     return rows
 
 

@@ -158,7 +158,7 @@ class BlendRun:
                     self._begin(job, outcome, fitting)
                     self._refuse(job, outcome, obj.name, missing.reasons[obj])
                 continue
-            for targets in groups_of(obj):
+            for targets in groups_of(obj, whole_rigs=self.action.whole_rigs):
                 fitting = {
                     target: {"*"} if self._asked is None else matching(target, self._asked) for target in targets
                 }
@@ -199,10 +199,9 @@ class BlendRun:
 
     def _tell_done(self, job: Job, outcome: Outcome, result: Result) -> None:
         targets = result.done
-        if isinstance(targets[0], BoneTransform):
-            outcome.bones += len(targets)
-        else:
-            outcome.objects += len(targets)
+        bones = sum(isinstance(target, BoneTransform) for target in targets)
+        outcome.bones += bones
+        outcome.objects += len(targets) - bones
         told = f"{self._would}{self.action.done}{result.told}"
         self._note(f"{job.source}: {title_of(targets)}{' ' if len(targets) > 1 else ': '}{told}")
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import bpy
 
 from rigid_motion import animation
-from rigid_motion.animation import NeedsItsKeys, Reduction, Refused
-from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit
+from rigid_motion.animation import NeedsItsKeys, Reduction, Refused, WholeRig
+from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit, rig_size
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
 from rigid_motion_batch.comparison.study.choices import Tolerance
@@ -53,7 +53,7 @@ def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
     def reduce(targets: Sequence[Transform]) -> Result:
         return reduced(targets, wishes)
 
-    return Action("Reducing", "reduced", "-reduced", concerned, reduce)
+    return Action("Reducing", "reduced", "-reduced", concerned, reduce, whole_rigs=True)
 
 
 def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
@@ -97,12 +97,22 @@ def _described(reduction: Reduction, tolerance: Tolerance, unit: float) -> str:
     if rig and rig.slide_before > 0.0:
         before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
         told += f"; feet slide {after}, and {before} before"
-    return told
+    return told + not_promised(rig) if rig else told
+
+
+def not_promised(rig: WholeRig) -> str:
+    """Which bones the tolerance is not promised for, and why; nothing where it is for all."""
+    followers, below = rig.not_promised.followers, rig.not_promised.below
+    if not followers:
+        return ""
+    names = f"{', '.join(followers)} follow{'s' if len(followers) == 1 else ''} constraints or drivers"
+    hanging = f", and what hangs on {'it' if len(followers) == 1 else 'them'} ({', '.join(below)})" if below else ""
+    return f"; not promised: {names}{hanging}"
 
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
     """What to think of where a tolerance is in metres, and a rig hardly is: importers leave it in units of its own."""
-    size = max(targets[0].animated.dimensions) * unit if targets[0].prefix else 0.0
+    size = rig_size(targets[0].animated) * unit if targets[0].prefix else 0.0
     name, length = unit_of(size)
     if tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
@@ -134,5 +144,6 @@ def _has_bones(target: Transform) -> bool:
 
 def _reason(target: Transform, refusal: Refused) -> str:
     """A refusal without the name that it begins with: the target's, or that of its rig."""
-    begin = next((name for name in (target.name, target.animated.name) if str(refusal).startswith(name)), "")
-    return str(refusal).removeprefix(begin).removeprefix(":").strip()
+    names = (f"{name}{end}" for name in (target.name, target.animated.name) for end in (": ", " "))
+    begin = next((name for name in names if str(refusal).startswith(name)), "")
+    return str(refusal).removeprefix(begin)

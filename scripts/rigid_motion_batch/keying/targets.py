@@ -29,7 +29,7 @@ class Result:
     def refusals(self) -> Iterator[tuple[str, str, int]]:
         """Which targets were refused, why, and how many they are: all bones of a rig at once where it is the rig's."""
         reasons = set(self.refused.values())
-        if len(reasons) == 1 < len(self.refused) and not (self.done or self.left):
+        if len(reasons) == 1 < len(self.refused) and not (any(one.is_part for one in self.done) or self.left):
             yield title_of(list(self.refused)), *reasons, len(self.refused)
         else:
             yield from ((target.name, reason, 1) for target, reason in self.refused.items())
@@ -61,15 +61,20 @@ class Action:
     act: Callable[[Sequence[Transform]], Result]
     """Do it to several of one object, in one go."""
 
+    whole_rigs: bool = False
+    """Whether the bones of a rig and its own motion are done in one go."""
 
-def groups_of(obj: bpy.types.Object) -> Iterator[list[Transform]]:
-    """What is done in one go of an object: all bones of a rig, and then its own motion.
+
+def groups_of(obj: bpy.types.Object, *, whole_rigs: bool) -> Iterator[list[Transform]]:
+    """What is done in one go of an object: all bones of a rig, and with them or after them its own motion.
 
     The other way round each bone would be compared with what it was in the Action of which a copy is there already.
     """
-    if obj.pose is not None and len(obj.pose.bones):
-        yield [transform_of(bone) for bone in obj.pose.bones]
-    yield [transform_of(obj)]
+    bones = [transform_of(bone) for bone in obj.pose.bones] if obj.pose is not None else []
+    if bones and not whole_rigs:
+        yield bones
+        bones = []
+    yield [*bones, transform_of(obj)]
 
 
 def matching(target: Transform, asked: Iterable[str]) -> set[str]:
@@ -91,6 +96,8 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def title_of(targets: Sequence[Transform]) -> str:
-    """One target by its name, and several bones by how many they are of which rig."""
-    rig = targets[0].animated.name
-    return targets[0].name if len(targets) == 1 else f"{rig}: {len(targets)} bones"
+    """One target by its name, several bones by how many they are of which rig, and the rig itself along with them."""
+    rig, bones = targets[0].animated.name, sum(bool(target.prefix) for target in targets)
+    if len(targets) == 1:
+        return targets[0].name
+    return f"{rig}: {bones} bone{'s' if bones > 1 else ''}{' and its own keys' if bones < len(targets) else ''}"

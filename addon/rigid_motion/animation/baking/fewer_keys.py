@@ -6,13 +6,15 @@ are those of the Action, lengths those of its channels.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import KEYFRAME_MODES, Poses, reduce_keys, shell_error
+from ...motion.affine import AffineMaps, ball_displacement
 from ...motion.best_of import least_errors
 from ..actions.slots import SlotTransform
 from ..compute.components import ROWS, SCALE
@@ -21,10 +23,15 @@ from ..compute.sources import MODE_NUMBERS, SAME_FRAME, Source, distinct
 from ..curves import CODE, CONSTANT, LINEAR, Keys
 from ..transforms import Channel, Refused, Transform
 from ..writers.channel_values import channel_values
-from .sizes import in_channels
+from .channel_maps import shown
+from .followers import ALL_PROMISED, NotPromised
+from .sizes import into_scene, scale_in_scene
 
 SMALLEST = 1e-6
 """Errors of single precision, relative to how far something gets."""
+
+
+NO_FRAMES = np.empty(0)
 
 
 class NeedsItsKeys(Refused):
@@ -43,6 +50,12 @@ class WholeRig:
 
     slide_after: float
     """How far it does now."""
+
+    largest_error: float = 0.0
+    """Of all bones that the tolerance is promised for, those without keys among them, in the scene's units."""
+
+    not_promised: NotPromised = ALL_PROMISED
+    """The bones that it is not promised for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +81,9 @@ class FewerKeys:
     largest_error: float
     """In the scene's units."""
 
+    fewer: Source
+    """What it is to be, as a source."""
+
     rig: WholeRig | None = None
     """What became of the rig that it is a bone of."""
 
@@ -92,8 +108,9 @@ class FewerKeys:
             {transform.channels[row]: column for row, column in values.items()},
             key_frames,
             fewer.modes_at(key_frames + SAME_FRAME),
-            SCALE in source.keyed and ROWS[SCALE].start not in values,
+            keeps_scale(source, values),
             largest_error,
+            fewer,
             rig,
         )
 
@@ -107,77 +124,97 @@ def fewer_keys(
     radius: float,
     *,
     best_of: bool,
+    more_frames: np.ndarray = NO_FRAMES,
 ) -> FewerKeys:
-    """The keys that one slot needs, which may be as many as it has."""
+    """The keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
+
+    The tolerance holds on all whole frames, on those with keys, and on `more_frames`.
+    """
     frames = samples_of(source)
-    seen = seen_frames(frames, [source])
-    truth, own = shown_poses(source, seen), np.isin(seen, frames)
-    unit, radius = in_channels(transform, radius, truth.scales is not None)
-    tolerance /= unit
-    rounding = SMALLEST * (float(np.abs(truth.positions).max()) + radius)
+    seen = np.union1d(seen_frames(frames, [source]), more_frames)
+    poses, truth = shown(transform, source, seen)
+    samples = np.searchsorted(seen, frames)
+    placing, radius = into_scene(transform), radius / scale_in_scene(transform)
+    unit = float(np.linalg.norm(placing, 2))
+    size = float(np.sqrt(np.einsum("nij,nij->nj", truth.axes, truth.axes).max()))
+    rounding = SMALLEST * unit * (float(np.abs(truth.origins).max()) + radius * size)
     allowed = tolerance + rounding
-    values = values_on(transform, source, frames)
-    chosen = _chosen(transform, source, frames, truth[own], mode, tolerance, radius)
+    truth = AffineMaps(placing, np.zeros(3)) @ truth
+
+    def error_of(fewer: Source) -> np.ndarray:
+        maps = AffineMaps(placing, np.zeros(3)) @ shown(transform, fewer, seen)[1]
+        return ball_displacement(maps, truth, np.full(len(seen), radius))
+
+    if not source.uniform_scale:
+        # The scale stays what it is, and makes the object this large.
+        poses, searched = Poses(poses.positions, poses.quaternions), radius * size
+    else:
+        searched = radius
+        if not np.all(poses.scales > 0.0):
+            raise Refused(
+                rpt_(
+                    "{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"
+                ).format(name=transform.name)
+            )
+    chosen = samples[reduce_keys(frames, poses[samples], mode, tolerance / unit, searched)]
+    values = values_on(transform, source, seen)
     while True:
-        fewer = with_keys(source, frames[chosen], {row: column[chosen] for row, column in values.items()}, mode)
-        error = shell_error(shown_poses(fewer, seen), truth, radius)
+        fewer = with_keys(source, seen[chosen], {row: column[chosen] for row, column in values.items()}, mode)
+        error = error_of(fewer)
         if error.max() <= allowed:
             break
-        more = _worst(chosen, error[own], allowed)
+        more = _worst(chosen, error, samples, allowed)
         if not len(more):
             raise goes_elsewhere(transform.name)
-        chosen = np.union1d(chosen, more)
+        samples, chosen = np.union1d(samples, more), np.union1d(chosen, more)
     if best_of:
-        mixed = with_best_modes(fewer, frames, truth[own], radius, rounding, allowed)
-        error_of_mixed = shell_error(shown_poses(mixed, seen), truth, radius)
+        inside = poses[samples]
+        mixed = with_best_modes(transform, fewer, seen[samples], inside, searched, rounding / unit, allowed / unit)
+        error_of_mixed = error_of(mixed)
         # Outside of the keys cycles of different lengths may meet in other segments than inside.
         if error_of_mixed.max() <= allowed:
             fewer, error = mixed, error_of_mixed
     columns = {row: column[chosen] for row, column in values.items()}
-    return FewerKeys.planned(transform, place, source, fewer, frames[chosen], columns, float(error.max()) * unit)
-
-
-def _chosen(
-    transform: Transform,
-    source: Source,
-    frames: np.ndarray,
-    poses: Poses,
-    mode: str,
-    tolerance: float,
-    radius: float,
-) -> np.ndarray:
-    """The samples that are to be keys, if nothing but poses counted."""
-    if poses.scales is not None and not source.uniform_scale:
-        # It stays what it is, and makes the object this large.
-        radius, poses = radius * float(np.abs(poses.scales).max()), Poses(poses.positions, poses.quaternions)
-    elif poses.scales is not None and not np.all(poses.scales > 0.0):
-        raise Refused(
-            rpt_("{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)").format(
-                name=transform.name
-            )
-        )
-    return reduce_keys(frames, poses, mode, tolerance, radius)
+    return FewerKeys.planned(transform, place, source, fewer, seen[chosen], columns, float(error.max()))
 
 
 def with_best_modes(
-    source: Source, frames: np.ndarray, truth: Poses, radius: float, rounding: float, allowed: float
+    transform: Transform,
+    source: Source,
+    frames: np.ndarray,
+    truth: Poses,
+    radius: float,
+    rounding: float,
+    allowed: float,
 ) -> Source:
     """The source with the best mode in each segment, of those that keep within what is allowed on these frames."""
     keys = distinct(source.keyed_frames)
     numbers = np.array([source.mode, *(mode.number for mode in KEYFRAME_MODES.values() if mode.number != source.mode)])
-    errors = np.stack([shell_error(shown_poses(replace(source, mode=int(n)), frames), truth, radius) for n in numbers])
+    alike = [shown(transform, replace(source, mode=int(number)), frames)[0] for number in numbers]
+    if truth.scales is None:
+        alike = [Poses(poses.positions, poses.quaternions) for poses in alike]
+    errors = np.stack([shell_error(poses, truth, radius) for poses in alike])
     best = least_errors(errors, np.searchsorted(frames, keys - SAME_FRAME), rounding, allowed)
     points = np.stack((keys, numbers[[*best, best[-1]]]), axis=-1)[None].astype(np.float32)
     return replace(source, mode=Keys(points, np.full(points.shape[:2], CONSTANT, CODE)))
 
 
-def _worst(chosen: np.ndarray, error: np.ndarray, allowed: float) -> np.ndarray:
-    """In each segment between chosen samples the one that is furthest off, where it is too far."""
-    error[chosen] = 0.0
-    segment = np.searchsorted(chosen, np.arange(len(error)), side="right")
-    order = np.lexsort((error, segment))
-    furthest = order[np.flatnonzero(np.diff(segment[order], append=-1))]
-    return furthest[error[furthest] > allowed]
+def _worst(chosen: np.ndarray, error: np.ndarray, samples: np.ndarray, allowed: float) -> np.ndarray:
+    """Where keys are put back: in each segment between those chosen at the moment that is furthest off, if too far.
+
+    Moments that are no samples count for the samples around them, as long as one of these is no key.
+    """
+    if len(chosen) == 1:
+        inside = error[samples[0] : samples[-1] + 1]
+        return samples[[0, -1]] if len(samples) > 1 and inside.max() > allowed else chosen[:0]
+    more = []
+    for first, last in itertools.pairwise(chosen.tolist()):
+        if last - first > 1:
+            worst = first + 1 + int(np.argmax(error[first + 1 : last]))
+            if error[worst] > allowed:
+                between = samples[(samples > first) & (samples < last)]
+                more.append(int(between[np.argmin(np.abs(between - worst))]) if len(between) else worst)
+    return np.array(more, dtype=np.int64)
 
 
 def samples_of(source: Source) -> np.ndarray:
@@ -191,10 +228,9 @@ def samples_of(source: Source) -> np.ndarray:
 
 
 def seen_frames(frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
-    """These frames and, since what goes on outside of the keys has to stay as well, all that are seen around them."""
+    """These frames and all whole ones that are seen: between them, and outside of the keys where something goes on."""
     first, last = min(source.seen_range[0] for source in sources), max(source.seen_range[1] for source in sources)
-    around = np.arange(first, last + 1.0)
-    return np.union1d(frames, around[(around < frames[0]) | (around > frames[-1])])
+    return np.union1d(frames, np.arange(np.floor(first), np.ceil(last) + 1.0))
 
 
 def goes_elsewhere(name: str) -> Refused:
@@ -204,18 +240,6 @@ def goes_elsewhere(name: str) -> Refused:
             "{name} goes on outside of its keys, and with fewer of them would go elsewhere there: "
             "give its channels constant extrapolation and no cycles, or cycles that all have the same range"
         ).format(name=name)
-    )
-
-
-def shown_poses(source: Source, frames: np.ndarray) -> Poses:
-    """What is to be seen of a source, with a scale wherever it has keys of it."""
-    wanted = in_betweens(source, frames).wanted
-    if wanted.scales is not None or SCALE not in source.keyed:
-        return wanted
-    return Poses(
-        wanted.positions,
-        wanted.quaternions,
-        (source.values_at(frames)[ROWS[SCALE]] * source.original[ROWS[SCALE], None]).mean(axis=0),
     )
 
 
@@ -229,6 +253,18 @@ def values_on(transform: Transform, source: Source, frames: np.ndarray) -> dict[
     keyed = {row for own, _ in source.channels for row in own}
     columns = {row: by_path[path][:, index] for row, (path, index) in transform.channels.items() if path in by_path}
     return {row: column for row, column in columns.items() if row in keyed or not _is_constant(column)}
+
+
+def keeps_scale(source: Source, values: Mapping[int, np.ndarray]) -> bool:
+    """Whether a scale keeps the keys it has, where these are the values of what gets others."""
+    return SCALE in source.keyed and ROWS[SCALE].start not in values
+
+
+def has_uneven_scale(source: Source) -> bool:
+    """Whether a scale is keyed that differs from axis to axis as it changes."""
+    if SCALE not in source.keyed or source.uniform_scale:
+        return False
+    return not np.all(_is_constant(source.values_at(source.keyed_frames)[ROWS[SCALE]].T))
 
 
 def _is_constant(columns: np.ndarray) -> np.ndarray:

@@ -1,13 +1,14 @@
 """Which keys the bones of a rig can do without: one plan for all of them, since what moves one moves all below it.
 
-The tolerance is kept in the space of the rig, at every bone, whether it gets fewer keys itself or only hangs on one
-that does. Poses are those that the channels give, without other constraints. A bone that does not inherit rotation, or
-not all of the scale where there is any, begins a chain of its own.
+Keys are searched for in the rig as if it were rigid, and proven in what Blender makes of them: the tolerance is kept
+at every bone, whether it gets fewer keys itself or only hangs on one that does, with the keys of the rig itself where
+these are reduced along with them. Poses are those that the channels give, without constraints and drivers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -18,25 +19,26 @@ from ...motion import Poses, Skeleton, reduce_skeleton_keys, shell_error
 from ...motion.contacts import slide, standing
 from ...motion.poses import placed
 from ...motion.quaternions import align_signs
-from ..actions.reading import sources_of_users
-from ..actions.slots import Slot, SlotTransform, transforms_in
+from ..actions.slots import Slot, SlotTransform
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..edits.apply import Readings, readable
 from ..transforms import Refused, Transform, transform_of
+from .channel_maps import shown
 from .fewer_keys import (
-    SMALLEST,
     FewerKeys,
     NeedsItsKeys,
     WholeRig,
+    fewer_keys,
     goes_elsewhere,
     samples_of,
     seen_frames,
-    shown_poses,
     values_on,
     with_best_modes,
     with_keys,
 )
-from .sizes import radius_of, size_of
+from .followers import not_promised
+from .rig_motion import SMALLEST, RigMotion
+from .sizes import scale_in_scene
 
 NO_FEWER = n_(
     "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: allow a larger one"
@@ -49,8 +51,16 @@ NO_FEWER_POSES = n_(
 HOLD = 4.0
 """How many times the error counts of what stands on the ground."""
 
+SHARE = 0.5
+"""How much of the tolerance the keys of the rig itself may take, of what there is for the bones."""
+
+LEAST_SCALE = 1e-6
+"""What the search takes a scale of zero for."""
+
 Plans = dict[Transform, "list[FewerKeys] | Refused"]
-"""What each bone is to have in each slot that moves it, or why it cannot have it."""
+"""What each bone is to have in each slot that moves it, or why it cannot have it; and rigs with keys of their own."""
+
+_Members = dict[Transform, tuple[SlotTransform, Source]]
 
 
 def fewer_keys_of_rigs(
@@ -63,10 +73,13 @@ def fewer_keys_of_rigs(
     hold: bool,
     best_of: bool,
 ) -> Plans:
-    """Plans for all bones among the targets, those together that one slot of a rig moves."""
-    together: dict[tuple[bpy.types.Object, bpy.types.Action, int], dict[Transform, tuple[SlotTransform, Source]]] = {}
+    """Plans for all bones among the targets, those together that one slot of a rig moves, and the rig along with them.
+
+    Lengths are the scene's units.
+    """
+    together: dict[tuple[bpy.types.Object, bpy.types.Action, int], _Members] = {}
     for transform, reading in readings.items():
-        if transform.is_part:
+        if transform.animated.pose is not None:
             try:
                 keyed = readable(transform, reading)
             except Refused:
@@ -76,14 +89,25 @@ def fewer_keys_of_rigs(
                     key = transform.animated, place.slot.action, place.slot.handle
                     together.setdefault(key, {})[transform] = place, source
     plans: Plans = {}
-    for (rig, *_), members in together.items():
+    for (obj, *_), members in together.items():
+        own = members.pop(transform_of(obj), None)
+        if not members:
+            continue
         try:
-            fewer = _Rig(rig, members, tolerance, radius, hold=hold).fewer_keys(mode, shared=shared, best_of=best_of)
+            rig = _Rig(obj, members, tolerance, radius, hold=hold)
+            if own is not None:
+                of_object = plans.setdefault(transform_of(obj), [])
+                of_object.append(rig.reduce_own_keys(transform_of(obj), *own, mode, best_of=best_of))
+            fewer = rig.fewer_keys(mode, shared=shared, best_of=best_of)
+            if own is not None and fewer:
+                # How far it is off counts at the bones, which is known by now.
+                whole = next(iter(fewer.values())).rig
+                of_object[-1] = replace(of_object[-1], largest_error=whole.largest_error)
         except Refused as refusal:
             plans.update(dict.fromkeys(members, refusal))
             continue
         except ValueError as problem:
-            why = rpt_("{name} cannot be reduced: {problem}").format(name=rig.name, problem=problem)
+            why = rpt_("{name} cannot be reduced: {problem}").format(name=obj.name, problem=problem)
             plans.update(dict.fromkeys(members, Refused(why)))
             continue
         for transform, plan in fewer.items():
@@ -97,112 +121,105 @@ class _Rig:
     """The bones of a rig as one slot moves them: those that are to have fewer keys, and all others as they are."""
 
     def __init__(
-        self,
-        rig: bpy.types.Object,
-        members: dict[Transform, tuple[SlotTransform, Source]],
-        tolerance: float,
-        radius: float | None,
-        *,
-        hold: bool,
+        self, rig: bpy.types.Object, members: _Members, tolerance: float, radius: float | None, *, hold: bool
     ) -> None:
-        self.rig, self.bones = rig, list(rig.pose.bones)
-        numbers = {bone.name: number for number, bone in enumerate(self.bones)}
+        self.rig, self.tolerance = rig, tolerance
+        numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
         self.targets = {numbers[transform.carrier.name]: transform for transform in members}
         self.places = {numbers[transform.carrier.name]: place for transform, (place, _) in members.items()}
         self.sources = {numbers[transform.carrier.name]: source for transform, (_, source) in members.items()}
-        slot = next(iter(self.places.values())).slot
-        others = {transform: source for transform, source in _keyed_in(rig, slot) if transform not in members}
-        self._look_at_frames()
-        self._pose_bones({numbers[one.carrier.name]: source for one, source in others.items() if one.is_part})
-        self.unit = size_of(rig.matrix_world) or 1.0
-        self.tolerance = tolerance / self.unit
-        self.radii = np.array([(radius or radius_of(bone)) / self.unit for bone in self.bones])
-        self.rounding = SMALLEST * (float(np.abs(self.truth.positions).max()) + self.radii.max())
-        self._stand(others.get(transform_of(rig)), hold=hold)
+        self.before = {number: distinct(source.keyed_frames) for number, source in self.sources.items()}
+        samples = _united(map(samples_of, self.sources.values()))
+        self.frames = seen_frames(samples, list(self.sources.values()))
+        self.sampled = np.isin(self.frames, samples)
+        """Which moments keys may be on."""
+        slot: Slot = next(iter(self.places.values())).slot
+        self.motion = RigMotion(rig, slot, self.sources, self.frames, radius)
+        self.values = {
+            number: values_on(self.targets[number], source, self.frames) for number, source in self.sources.items()
+        }
+        self.largest_own = 0.0
+        self._stand(hold=hold)
+        self._search_in()
 
-    def _look_at_frames(self) -> None:
-        """The frames that keys are for, and those that are seen: where channels go on outside of their keys, more."""
-        sources = [self.sources[number] for number in self.targets]
-        self.frames = _united(map(samples_of, sources))
-        self.seen = seen_frames(self.frames, sources)
-        self.own = np.isin(self.seen, self.frames)
+    def _stand(self, *, hold: bool) -> None:
+        """Which bones stand on the ground, and how much their errors count."""
+        render, truth = bpy.context.scene.render, self.motion.truth.origins
+        self.stands = standing(self.frames * render.fps_base / render.fps, truth)
+        self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
 
-    def _pose_bones(self, others: dict[int, Source]) -> None:
-        """The poses of all bones on the frames that are seen, in their parents' space and in the rig's."""
-        basis = [self._basis(number, (others | self.sources).get(number)) for number in range(len(self.bones))]
-        for bone, poses in zip(self.bones, basis, strict=True):
-            if poses.scales is not None and poses.scales.min() <= 0.0:
+    def _search_in(self) -> None:
+        """The rig as the search has it: rigid, with even scale, in chains of bones that inherit all."""
+        motion = self.motion
+        for number, bone in enumerate(motion.bones):
+            if motion.passes_zero(number):
                 raise Refused(
                     rpt_(
                         "{name}: its scale passes zero, and with it the size of all that hangs on "
                         "it: reduce the bones above and below it apart from one another"
                     ).format(name=f"{self.rig.name}/{bone.name}")
                 )
-        grows = any(poses.scales is not None and np.abs(poses.scales - 1.0).max() > SMALLEST for poses in basis)
-        follows = [_follows(bone, grows) for bone in self.bones]
-        numbers = {bone: number for number, bone in enumerate(self.bones)}
-        parents = [numbers[bone.parent] if whole else -1 for bone, whole in zip(self.bones, follows, strict=True)]
-        self.skeleton = Skeleton(parents)
-        self.rest = [_rest(bone, whole) for bone, whole in zip(self.bones, follows, strict=True)]
-        local = [placed(rest, poses) for rest, poses in zip(self.rest, basis, strict=True)]
-        one = np.ones(len(self.seen))
+        grows = any(np.abs(poses.scales - 1.0).max() > SMALLEST for poses in motion.poses)
+        follows = [_follows(bone, grows) for bone in motion.bones]
+        above = motion.hierarchy.parents
+        self.skeleton = Skeleton(np.where(follows, above, -1))
+        # The head of a bone that begins a chain still moves with its parent: each chain gets a part of the tolerance.
+        chains = np.array([sum(not follows[one] for one in motion.above(number)) for number in range(len(above))])
+        self.parts = np.sqrt(chains.max(initial=1))
+        local = []
+        for number, (bone, poses) in enumerate(zip(motion.bones, motion.poses, strict=True)):
+            if bone.bone.use_connect and bone.parent:
+                poses = replace(poses, positions=np.zeros_like(poses.positions))
+            local.append(placed(_rest(motion, number, follows[number]), poses))
         self.poses = Poses(
             np.stack([poses.positions for poses in local]),
             align_signs(np.stack([poses.quaternions for poses in local])),
-            np.stack([one if poses.scales is None else poses.scales for poses in local]) if grows else None,
+            np.maximum([poses.scales for poses in local], LEAST_SCALE) if grows else None,
         )
-        self.truth = self.skeleton.in_root_space(self.poses)
 
-    def _stand(self, own: Source | None, *, hold: bool) -> None:
-        """Which bones stand on the ground, with what is keyed of the rig itself, and how much their errors count."""
-        self.world = _world(self.rig, own, self.seen)
-        self.in_world = placed(self.world, self.truth).positions
-        render = bpy.context.scene.render
-        self.stands = standing(self.seen * render.fps_base / render.fps, self.in_world)
-        self.weights = np.where(self.stands, HOLD, 1.0) if hold else np.ones(self.stands.shape)
+    def reduce_own_keys(
+        self, transform: Transform, place: SlotTransform, source: Source, mode: str, *, best_of: bool
+    ) -> FewerKeys:
+        """Fewer keys for the rig itself, within a share of the tolerance at the farthest point of any bone."""
+        share = SHARE * self.tolerance / self.weights.max()
+        reach = self.motion.extent * scale_in_scene(transform)
+        plan = fewer_keys(transform, place, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
+        if len(plan.key_frames) < plan.before:
+            self.motion.carry(plan.fewer)
+            self.largest_own = plan.largest_error
+        return plan
 
     def fewer_keys(self, mode: str, *, shared: bool, best_of: bool) -> dict[Transform, FewerKeys]:
-        keys = reduce_skeleton_keys(
-            self.frames,
-            self.poses[:, self.own],
-            self.skeleton.parents,
-            mode,
-            tolerance=self.tolerance,
-            radius=self.radii,
-            shared=shared,
-            weights=self.weights[:, self.own],
-            fixed=[number not in self.targets for number in range(len(self.bones))],
-        )
-        before = {number: distinct(self.sources[number].keyed_frames) for number in self.targets}
-        values = {number: values_on(self.targets[number], self.sources[number], self.frames) for number in self.targets}
-        chosen = {number: self._within_its_keys(keys[number], before[number]) for number in self.targets}
-        # What has as few keys already stays as it is.
-        chosen = {number: own for number, own in chosen.items() if len(own) < len(before[number])}
-        if not chosen:
+        samples = np.flatnonzero(self.sampled)
+        able = {number for number in self.targets if not self._keeps_all(number)}
+        chosen: dict[int, np.ndarray] = {}
+        if able:
+            keys = reduce_skeleton_keys(
+                self.frames[samples],
+                self.poses[:, samples],
+                self.skeleton.parents,
+                mode,
+                tolerance=(self.tolerance - self.largest_own) / (self.motion.unit * self.parts),
+                radius=self.motion.radii,
+                shared=shared,
+                weights=self.weights[:, samples],
+                fixed=[number not in able for number in range(len(self.motion.bones))],
+            )
+            chosen = {number: self._within_its_keys(samples[keys[number]], number) for number in able}
+        fewer = self._proven(chosen, mode, shared=shared)
+        if not fewer:
             text = NO_FEWER_POSES if shared else NO_FEWER
-            raise NeedsItsKeys(rpt_(text).format(name=self.rig.name, frames=len(self.frames)))
-        shown = self.poses.copy()
-        fewer: dict[int, Source] = {}
-
-        def show(number: int, source: Source) -> None:
-            fewer[number] = source
-            shown[number] = placed(self.rest[number], self._basis(number, source))
-
-        def show_keys(number: int) -> None:
-            own = chosen[number]
-            columns = {row: column[own] for row, column in values[number].items()}
-            show(number, with_keys(self.sources[number], self.frames[own], columns, mode))
-
-        for number in chosen:
-            show_keys(number)
-        self._densify(chosen, shown, show_keys)
+            raise NeedsItsKeys(rpt_(text).format(name=self.rig.name, frames=len(samples)))
         if best_of:
-            self._mix(fewer, shown, show)
-        errors = self._errors(shown).max(axis=1) * self.unit
-        standing_at = (self.in_world, placed(self.world, self.skeleton.in_root_space(shown)).positions)
+            self._mix(fewer)
+        errors = [self.motion.largest_error(number) for number in range(len(self.motion.bones))]
+        excepted = not_promised(self.rig)
+        promised = [error for bone, error in zip(self.motion.bones, errors, strict=True) if bone.name not in excepted]
         as_whole = WholeRig(
-            len(_united(distinct(source.keyed_frames) for source in fewer.values())) if fewer else 0,
-            *(slide(places, self.stands) for places in standing_at),
+            len(_united(distinct(source.keyed_frames) for source in fewer.values())),
+            *(slide(maps.origins, self.stands) for maps in (self.motion.truth, self.motion.now())),
+            max(promised or errors),
+            excepted,
         )
         return {
             self.targets[number]: FewerKeys.planned(
@@ -211,93 +228,107 @@ class _Rig:
                 self.sources[number],
                 source,
                 self.frames[chosen[number]],
-                {row: column[chosen[number]] for row, column in values[number].items()},
-                float(errors[number]),
+                {row: column[chosen[number]] for row, column in self.values[number].items()},
+                errors[number],
                 as_whole,
             )
             for number, source in fewer.items()
         }
 
-    def _basis(self, number: int, source: Source | None) -> Poses:
-        """How a bone is posed on all frames: by what is keyed, or as it stands."""
-        bone, count = self.bones[number], len(self.seen)
-        if source is not None and source.channels:
-            poses = shown_poses(source, self.seen)
-        else:
-            place, turn, scale = bone.matrix_basis.decompose()
-            poses = Poses(np.tile(place, (count, 1)), np.tile(turn, (count, 1)), np.full(count, np.mean(scale)))
-        # Blender leaves a connected bone where its parent ends.
-        return _unmoved(poses) if bone.bone.use_connect and bone.parent else poses
+    def _keeps_all(self, number: int) -> bool:
+        """Whether the scale of a bone, which keeps its keys, has some wherever anything of it has."""
+        source, values = self.sources[number], self.values[number]
+        kept = [keys.times for rows, keys in source.channels if any(row not in values for row in rows)]
+        return bool(kept) and len(_united(kept)) >= len(self.before[number])
 
-    def _errors(self, shown: Poses) -> np.ndarray:
-        """Of all bones on all frames (bones, m), in the rig's unit."""
-        return shell_error(self.skeleton.in_root_space(shown), self.truth, self.radii[:, None])
-
-    def _within_its_keys(self, keys: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """The samples of a bone's keys, none of them outside of those that it has: there it holds."""
-        first, last = np.searchsorted(self.frames, before[[0, -1]] - SAME_FRAME)
+    def _within_its_keys(self, keys: np.ndarray, number: int) -> np.ndarray:
+        """The moments of a bone's keys, none of them outside of those that it has: there it holds."""
+        first, last = self._ends(number)
         inside = keys[(keys > first) & (keys < last)]
         return keys if len(keys) == 1 else np.union1d(inside, (first, last))
 
-    def _densify(self, chosen: dict[int, np.ndarray], shown: Poses, show_keys: Callable[[int], None]) -> None:
-        """Put keys back where the motion of the channels is off after all."""
-        samples = np.flatnonzero(self.own)
-        allowed = self.tolerance + self.rounding
+    def _ends(self, number: int) -> np.ndarray:
+        """The moments of the first and the last key that a bone has."""
+        return np.searchsorted(self.frames, self.before[number][[0, -1]] - SAME_FRAME)
+
+    def _with_keys(self, number: int, keys: np.ndarray, mode: str) -> Source:
+        columns = {row: column[keys] for row, column in self.values[number].items()}
+        return with_keys(self.sources[number], self.frames[keys], columns, mode)
+
+    def _proven(self, chosen: dict[int, np.ndarray], mode: str, *, shared: bool) -> dict[int, Source]:
+        """The bones that get fewer keys, and these, so that all of the rig keeps to the tolerance.
+
+        Keys are put back in `chosen` where the motion of the channels is off after all. What would not have fewer keys
+        than before stays as it is.
+        """
+        fewer: dict[int, Source] = {}
+        changed = set(chosen)
         while True:
-            errors = self._errors(shown) * self.weights
-            if errors.max() <= allowed:
-                return
-            number, moment = np.unravel_index(np.argmax(errors), errors.shape)
-            chain = [one for one in self._chain(int(number)) if one in chosen]
-            sample = int(np.searchsorted(samples, moment))
-            off = [one for one in chain if self.own[moment] and sample not in chosen[one]]
-            if not off:
-                raise goes_elsewhere(self.targets[chain[0]].name if chain else self.bones[number].name)
-            # What rests goes on resting, as long as others can make up for it.
-            for one in [one for one in off if len(chosen[one]) > 1] or off:
-                chosen[one] = np.union1d(chosen[one], (0, sample, len(samples) - 1))
-                show_keys(one)
+            fewer |= {number: self._with_keys(number, chosen[number], mode) for number in changed}
+            dense = [n for n in changed if len(distinct(fewer[n].keyed_frames)) >= len(self.before[n])]
+            for number in dense:
+                del fewer[number], chosen[number]
+            self.motion.show({number: fewer.get(number) for number in changed})
+            over = self.motion.over(self.tolerance + self.motion.rounding, self.weights)
+            if not over:
+                return fewer
+            changed = self._put_back(over, chosen, shared=shared)
 
-    def _chain(self, number: int) -> Iterator[int]:
-        """A bone and all that it hangs on."""
-        while number >= 0:
-            yield number
-            number = int(self.skeleton.parents[number])
+    def _put_back(self, over: list[tuple[float, int, int]], chosen: dict[int, np.ndarray], *, shared: bool) -> set[int]:
+        """Put keys back where each bone is off the most, and return the bones that got any."""
+        changed: set[int] = set()
+        off: set[int] = set()
+        for _, number, moment in over:
+            chain = list(self.motion.above(number))
+            # Once what it hangs on is put right, it may be, too.
+            if off.isdisjoint(chain):
+                off.add(number)
+                movable = list(chosen) if shared else [one for one in chain if one in chosen]
+                added = self._with_keys_at(moment, movable, chosen)
+                if not added and changed.isdisjoint(chain):
+                    names = [self.targets[one].name for one in chain if one in self.targets]
+                    raise goes_elsewhere(names[0] if names else f"{self.rig.name}/{self.motion.bones[number].name}")
+                chosen.update(added)
+                changed.update(added)
+        return changed
 
-    def _mix(self, fewer: dict[int, Source], shown: Poses, show: Callable[[int, Source], None]) -> None:
+    def _with_keys_at(self, moment: int, movable: list[int], chosen: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+        """The keys of those of these bones that get any more at a moment: there, or on the samples around it."""
+        samples = np.flatnonzero(self.sampled)
+        at = np.searchsorted(samples, moment)
+        around = [moment] if self.sampled[moment] else samples[max(at - 1, 0) : at + 1].tolist()
+        for moments in (around, [moment]):
+            added = {}
+            for number in movable:
+                first, last = self._ends(number)
+                # Before and behind its keys it stays where they leave it.
+                more = [one for one in np.clip(moments, first, last).tolist() if one not in chosen[number]]
+                if more:
+                    added[number] = np.union1d(chosen[number], (first, *more, last))
+            if added:
+                # What rests goes on resting, as long as others can make up for it.
+                moving = {number: keys for number, keys in added.items() if len(chosen[number]) > 1}
+                return moving or added
+        return {}
+
+    def _mix(self, fewer: dict[int, Source]) -> None:
         """Give segments their best modes, bone by bone from the roots on, where the whole keeps to the tolerance."""
-        allowed = self.tolerance + self.rounding
-        for number in sorted(fewer, key=self.skeleton.depths.__getitem__):
-            single, radius = fewer[number], float(self.radii[number])
-            truth, frames = self._basis(number, self.sources[number])[self.own], self.frames
-            largest = float(shell_error(self._basis(number, single)[self.own], truth, radius).max())
-            keys = distinct(single.keyed_frames)
+        motion, allowed = self.motion, self.tolerance + self.motion.rounding
+        for number in sorted(fewer, key=motion.hierarchy.order.index):
+            single, transform, radius = fewer[number], self.targets[number], float(motion.radii[number])
+            keys, frames = distinct(single.keyed_frames), self.frames
             inside = (frames >= keys[0] - SAME_FRAME) & (frames <= keys[-1] + SAME_FRAME)
             if len(keys) < 2:
                 continue
-            show(number, with_best_modes(single, frames[inside], truth[inside], radius, self.rounding, largest))
-            if (self._errors(shown) * self.weights).max() > allowed:
-                show(number, single)
-
-
-def _keyed_in(rig: bpy.types.Object, slot: Slot) -> Iterator[tuple[Transform, Source]]:
-    """What is keyed of a rig in a slot, itself and its bones. What cannot be read stands as it is."""
-    places = transforms_in(slot)
-    for place, sources in zip(places, sources_of_users(places), strict=True):
-        for user, source in zip(place.users, sources, strict=True):
-            if user.animated == rig and isinstance(source, Source) and source.channels:
-                yield user, source
-
-
-def _world(rig: bpy.types.Object, source: Source | None, frames: np.ndarray) -> Poses:
-    """Where a rig is on these frames, shape (m,): by its own keys where nothing else moves it, or as it stands."""
-    if source is not None and rig.parent is None and not rig.constraints:
-        poses = shown_poses(source, frames)
-        size = rig.scale[0] * rig.delta_scale[0] if poses.scales is None else poses.scales
-    else:
-        place, turn, scale = rig.matrix_world.decompose()
-        poses, size = Poses(np.tile(place, (len(frames), 1)), np.tile(turn, (len(frames), 1))), np.mean(scale)
-    return Poses(poses.positions, poses.quaternions, np.broadcast_to(size, frames.shape))
+            truth = motion.poses[number]
+            largest = float(shell_error(shown(transform, single, frames)[0], truth, radius)[self.sampled].max())
+            rounding = motion.rounding / motion.unit
+            mixed = with_best_modes(transform, single, frames[inside], truth[inside], radius, rounding, largest)
+            motion.show({number: mixed})
+            if motion.over(allowed, self.weights, motion.below(number)):
+                motion.show({number: single})
+            else:
+                fewer[number] = mixed
 
 
 def _united(frames: Iterable[np.ndarray]) -> np.ndarray:
@@ -311,14 +342,11 @@ def _follows(bone: bpy.types.PoseBone, grows: bool) -> bool:
     return bool(bone.parent and own.use_inherit_rotation and (own.inherit_scale == "FULL" or not grows))
 
 
-def _rest(bone: bpy.types.PoseBone, follows: bool) -> Poses:
+def _rest(motion: RigMotion, number: int, follows: bool) -> Poses:
     """Where a bone is at rest: in its parent's space, or that of the rig."""
+    bone = motion.bones[number]
     matrix = bone.bone.matrix_local
     if follows:
         matrix = bone.parent.bone.matrix_local.inverted() @ matrix
     place, turn, _ = matrix.decompose()
     return Poses(np.array(place), np.array(turn))
-
-
-def _unmoved(poses: Poses) -> Poses:
-    return Poses(np.zeros_like(poses.positions), poses.quaternions, poses.scales)

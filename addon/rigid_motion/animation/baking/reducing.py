@@ -7,10 +7,11 @@ the original stays in the file, for `restore_keys`. Frames are those of the Acti
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -28,8 +29,9 @@ from ..queries.keyed import segment_modes
 from ..transforms import Refused, Transform, shows_differences, transform_of
 from .bake import go_back
 from .copies import REDUCED, entries_in_use, entries_of
-from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys
+from .fewer_keys import FewerKeys, NeedsItsKeys, WholeRig, fewer_keys, has_uneven_scale
 from .fewer_rig_keys import Plans, fewer_keys_of_rigs
+from .followers import NotPromised
 from .originals import (
     discard_originals,
     has_original,
@@ -68,6 +70,8 @@ class Reduction:
     before: int
     after: int
     largest_error: float
+    """In the scene's units; of a rig the largest of all its bones, with and without keys, but for `not_promised`."""
+
     segments: dict[str, int]
     """How many segments each mode has by now."""
 
@@ -141,16 +145,18 @@ def reduce_keys_of(
         keyed = [(place, source) for place, source in readable(transform, readings) if source.channels]
         if not keyed:
             raise Refused(_why_nothing_is_keyed(transform, 0))
+        found = of_rigs.get(transform, [])
+        if isinstance(found, Refused):
+            raise found
         if transform.is_part:
-            found = of_rigs.get(transform, [])
-            if isinstance(found, Refused):
-                raise found
             if not found:
                 before = sum(len(distinct(source.keyed_frames)) for _, source in keyed)
-                raise _no_fewer(transform, before, keeps_scale=False)
+                raise _no_fewer(transform, before, keeps_scale=any(has_uneven_scale(source) for _, source in keyed))
             return found
         size = radius or radius_of(transform.carrier)
-        found = [fewer_keys(transform, *one, mode, tolerance, size, best_of=best_of) for one in keyed]
+        planned = {fewer.place for fewer in found}
+        rest = [one for one in keyed if one[0] not in planned]
+        found = [*found, *(fewer_keys(transform, *one, mode, tolerance, size, best_of=best_of) for one in rest)]
         fewer = [reduced for reduced in found if len(reduced.key_frames) < reduced.before]
         if not fewer:
             before, keeps_scale = sum(kept.before for kept in found), any(kept.keeps_scale for kept in found)
@@ -188,13 +194,24 @@ def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> 
     """All of these notes together; None where there are none. What they say of a rig is that with the most frames."""
     if not entries:
         return None
-    rig = max(of_bones, key=lambda entry: entry.frames_after, default=None)
+    rig = max((_whole_rig(entry) for entry in of_bones), key=lambda found: found.frames, default=None)
     return Reduction(
         sum(entry.keys_before for entry in entries),
         sum(entry.keys_after for entry in entries),
         max(entry.largest_error for entry in entries),
         segments,
-        None if rig is None else WholeRig(rig.frames_after, rig.slide_before, rig.slide_after),
+        rig,
+    )
+
+
+def _whole_rig(entry: bpy.types.PropertyGroup) -> WholeRig:
+    names = json.loads(entry.not_promised) if entry.not_promised else ((), ())
+    return WholeRig(
+        entry.frames_after,
+        entry.slide_before,
+        entry.slide_after,
+        entry.largest_error_of_rig,
+        NotPromised(*map(tuple, names)),
     )
 
 
@@ -202,7 +219,12 @@ def total_reduction(targets: Targets) -> Reduction | None:
     """What became of the keys of several targets together, without their modes. None where none were reduced."""
     of_each = [(transform, _reduced(entries)) for transform, entries in entries_of(transforms_of(targets))]
     of_bones = [entry for transform, entries in of_each if transform.is_part for entry in entries]
-    return _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
+    found = _summed([entry for _, entries in of_each for entry in entries], of_bones, {})
+    if found is None or found.rig is None:
+        return found
+    whole = [_whole_rig(entry) for entry in of_bones]
+    objects = [entry.largest_error for transform, own in of_each if not transform.is_part for entry in own]
+    return replace(found, largest_error=max([*objects, *(rig.largest_error for rig in whole)]))
 
 
 def is_reduced(target: Target) -> bool:
@@ -257,6 +279,9 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
     if fewer.rig is not None:
         entry.frames_after = fewer.rig.frames
         entry.slide_before, entry.slide_after = fewer.rig.slide_before, fewer.rig.slide_after
+        entry.largest_error_of_rig = fewer.rig.largest_error
+        names = fewer.rig.not_promised
+        entry.not_promised = json.dumps([names.followers, names.below]) if names else ""
     fcurves = copy.channelbag.fcurves
     for channel, values in fewer.values.items():
         fcurve = copy.ensure_curve(channel)

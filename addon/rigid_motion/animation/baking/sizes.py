@@ -12,21 +12,28 @@ from ..transforms import Transform
 SOME_SIZE = 0.1
 """The radius, in metres, of what has no size."""
 
+SAME_PLACE = 0.1
+"""Heads of bones that are closer than this, of a bone's length, make no size."""
+
 OF_A_RIG = 0.003
 """The tolerance that the keys of a rig are reduced to at first, of its size: 5 mm for a grown-up."""
 
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
-    """How far an object or a pose bone reaches from its origin as it is now, in the scene's units.
+    """How far an object or a pose bone reaches from its origin, in the scene's units.
 
-    That is the farthest corner of its bounding box, and the length of a bone. Empties and cameras are as large as they
-    are drawn; what has no size at all counts as ten centimetres.
+    That is the farthest corner of an object's bounding box as it is now, how far a bone reaches at rest (`reach_of`),
+    and of a rig how far its bones reach as it is posed now. Empties and cameras are as large as they are drawn; what
+    has no size at all counts as ten centimetres.
     """
     if isinstance(obj, bpy.types.PoseBone):
-        return obj.length * size_of(_evaluated(obj.id_data).matrix_world) or SOME_SIZE / metres_per_unit(
-            bpy.context.scene
-        )
+        return reach_of(obj) * (size_of(_evaluated(obj.id_data).matrix_world) or 1.0)
     evaluated = _evaluated(obj)
+    if obj.pose is not None and len(obj.pose.bones):
+        axes = np.array(evaluated.matrix_world.to_3x3())
+        heads = np.array([bone.head for bone in evaluated.pose.bones]) @ axes.T
+        reaches = np.array([reach_of(bone) for bone in obj.pose.bones]) * size_of(axes)
+        return float((np.linalg.norm(heads, axis=1) + reaches).max()) or SOME_SIZE / metres_per_unit(bpy.context.scene)
     corners = np.array(evaluated.bound_box)
     size = 0.0
     if np.ptp(corners) > 0.0:
@@ -38,9 +45,35 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     return size or SOME_SIZE / metres_per_unit(bpy.context.scene)
 
 
+def reach_of(bone: bpy.types.PoseBone) -> float:
+    """How far a bone reaches from its head at rest, in the rig's unit: its length.
+
+    Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
+    as far as that is long, or its head is from the head of that.
+    """
+    length, parent = bone.bone.length, bone.bone.parent
+    if parent is not None and not bone.bone.children:
+        before = (bone.bone.head_local - parent.head_local).length
+        length = min(length, max(before, parent.length))
+    return length or SOME_SIZE / metres_per_unit(bpy.context.scene)
+
+
+def rig_size(rig: bpy.types.Object) -> float:
+    """The size of a rig in the scene's units: the largest extent of its joints along any axis, at rest.
+
+    Joints are the heads of bones, for importers make up where the last bones end. A rig whose heads are in one place is
+    as large as the bone that reaches farthest.
+    """
+    world = _evaluated(rig).matrix_world
+    heads = np.array([world @ bone.bone.head_local for bone in rig.pose.bones]).reshape(-1, 3)
+    extent = float(np.ptp(heads, axis=0).max()) if len(heads) else 0.0
+    reach = max((reach_of(bone) for bone in rig.pose.bones), default=0.0) * size_of(world)
+    return extent if extent > SAME_PLACE * reach else reach
+
+
 def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform]) -> float:
     """What to begin with: a millimetre, and of a rig a share of its size; in the scene's units."""
-    sizes = [max(target.animated.dimensions) for target in targets if target.is_part]
+    sizes = [rig_size(rig) for rig in {target.animated for target in targets if target.is_part}]
     if not sizes or max(sizes) <= 0.0:
         return 0.001 / metres_per_unit(scene)
     return float(f"{OF_A_RIG * max(sizes):.2g}")
@@ -59,11 +92,18 @@ def size_of(matrix: object) -> float:
     return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
 
 
-def in_channels(transform: Transform, radius: float, scaled: bool) -> tuple[float, float]:
-    """The length of a unit of the channels in the scene, and a radius in it, before the pose itself scales it."""
-    own, world = size_of(transform.carrier.matrix_basis), size_of(_evaluated(transform.animated).matrix_world)
-    if transform.is_part:
-        world *= size_of(transform.carrier.matrix)
-    if not (own > 0.0 and world > 0.0):
-        return 1.0, radius
-    return world / own, radius / (world if scaled else world / own)
+def scale_in_scene(transform: Transform) -> float:
+    """The size of something in the scene as it is now, 1 where it has none."""
+    return size_of(_evaluated(transform.animated).matrix_world) or 1.0
+
+
+def into_scene(transform: Transform) -> np.ndarray:
+    """What takes the axes of an object's channels to those of the scene, shape (3, 3): its parents, as they are now."""
+    obj = transform.carrier
+    if obj.parent is None and not obj.constraints:
+        return np.eye(3)
+    own, world = np.array(obj.matrix_basis.to_3x3()), np.array(_evaluated(obj).matrix_world.to_3x3())
+    if not (size_of(own) > 0.0 and size_of(world) > 0.0):
+        return np.eye(3)
+    # Constraints may turn it anyhow: then only its size counts.
+    return np.eye(3) * size_of(world) / size_of(own) if obj.constraints else world @ np.linalg.inv(own)

@@ -7,6 +7,7 @@ transform  the interface: channels, and where differences go
 objects    objects, by their delta transforms
 bones      pose bones, by a constraint
 kinds      the table of both
+posing     where the poses of bones put them
 
 Each module imports only those above it.
 """

@@ -110,6 +110,7 @@ OF_OWN_CONTEXT = {
     "Distance": "Abstand",
     "Keys": "Keys",
     "Off By": "Fehler",
+    "Not Promised": "Nicht zugesagt",
     "Feet": "Füße",
     "Mode": "Modus",
     "Step": "Schritt",

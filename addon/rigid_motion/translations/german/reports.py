@@ -27,5 +27,8 @@ REPORTS = {
     ),
     ", keys on {frames} frames": ", Schlüsselbilder auf {frames} Einzelbildern",
     ", feet that stand slide {distance}": ", stehende Füße rutschen {distance}",
+    "; not promised for what follows constraints or drivers, and hangs on it: {bones}": (
+        "; nicht zugesagt für das, was Beschränkungen oder Treibern folgt, und was daran hängt: {bones}"
+    ),
     "; segments: {modes}": "; Segmente: {modes}",
 }

@@ -1,0 +1,158 @@
+"""Forward kinematics of rigs by Blender's rule, for many frames at once: where poses put bones.
+
+A bone is placed by its parent as *Inherit Rotation*, *Inherit Scale*, *Local Location* and *Connected* say, with uneven
+and negative scale, and shear where that comes of it. Constraints and drivers have no part in it.
+
+Source: `BKE_bone_parent_transform_calc_from_matrices` in Blender's `armature.cc`, for the rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import bpy
+import numpy as np
+
+from ...motion.affine import AffineMaps, turned
+
+SOME_SHEAR = 1e-4
+"""Cosines between axes that are smaller are none to Blender."""
+
+
+class Hierarchy:
+    """The bones of a rig at rest, and what each inherits from its parent.
+
+    Parameters
+    ----------
+    bones : sequence of bpy.types.PoseBone
+        All bones of the rig. They are numbered in this order.
+    """
+
+    def __init__(self, bones: Sequence[bpy.types.PoseBone]) -> None:
+        self.bones = [bone.bone for bone in bones]
+        numbers = {bone.name: number for number, bone in enumerate(bones)}
+        self.parents = np.array([numbers[bone.parent.name] if bone.parent else -1 for bone in bones], dtype=np.int64)
+        self.order = sorted(range(len(bones)), key=lambda number: len(bones[number].parent_recursive))
+        """The numbers of the bones, parents before their children."""
+        rest = np.array([bone.matrix_local for bone in self.bones], dtype=np.float64).reshape(-1, 4, 4)
+        self.rest = AffineMaps(rest[:, :3, :3], rest[:, :3, 3])
+        """Where bones are at rest, shape (bones,)."""
+        inverse = np.linalg.inv(rest)
+        offsets = np.where((self.parents >= 0)[:, None, None], inverse[self.parents] @ rest, rest)
+        self.offsets = AffineMaps(offsets[:, :3, :3], offsets[:, :3, 3])
+        """The same in the spaces of their parents at rest."""
+
+    def posed(self, channels: AffineMaps) -> AffineMaps:
+        """Where bones are in the space of the rig, shape (bones, n), posed by matrices (bones, n) of their channels."""
+        placed = AffineMaps(np.empty_like(channels.axes), np.empty_like(channels.origins))
+        self.pose(range(len(self.bones)), channels, placed)
+        return placed
+
+    def pose(self, numbers: Iterable[int], channels: AffineMaps, placed: AffineMaps) -> None:
+        """Place these bones anew, and all that hang on them, in `placed`, shape (bones, n)."""
+        changed = set(numbers)
+        for number in self.order:
+            if number in changed or self.parents[number] in changed:
+                changed.add(number)
+                placed[number] = self._placed(number, channels[number], placed)
+
+    def _placed(self, number: int, channels: AffineMaps, placed: AffineMaps) -> AffineMaps:
+        bone, offset, parent = self.bones[number], self.offsets[number], int(self.parents[number])
+        if parent < 0:
+            along = offset.axes if bone.use_local_location else np.eye(3)
+            return AffineMaps(offset.axes @ channels.axes, offset.origins + turned(along, channels.origins))
+        above = placed[parent]
+        along = above.axes @ offset.axes if bone.use_local_location else above.axes
+        origins = above.at(offset.origins)
+        # Blender leaves a connected bone where its parent ends.
+        if not bone.use_connect:
+            origins = origins + turned(along, channels.origins)
+        axes, growth = _inherited(bone, above.axes, self.rest.axes[parent], offset.axes)
+        return AffineMaps(axes @ channels.axes * growth, origins)
+
+
+def _inherited(
+    bone: bpy.types.Bone, above: np.ndarray, above_at_rest: np.ndarray, offset: np.ndarray
+) -> tuple[np.ndarray, np.ndarray | float]:
+    """What a bone's rotation and scale are applied in, (n, 3, 3), and what its axes are scaled by in the end.
+
+    `above` are the axes (n, 3, 3) of its parent, `above_at_rest` and `offset` (3, 3) the parent's at rest and its own
+    at rest in that.
+    """
+    mode, growth = bone.inherit_scale, 1.0
+    if bone.use_inherit_rotation:
+        axes = above
+        if mode in ("NONE", "AVERAGE"):
+            axes = without_shear(above, normalise=True)
+        elif mode == "ALIGNED":
+            axes, growth = _normalised(without_shear(above))
+        elif mode == "NONE_LEGACY":
+            axes, _ = _normalised(above)
+    else:
+        axes = np.broadcast_to(above_at_rest, above.shape)
+        if mode == "FULL":
+            axes = axes * _lengths(above)
+        elif mode == "FIX_SHEAR":
+            axes = axes * _lengths_by_volume(above)
+        elif mode == "ALIGNED":
+            growth = _lengths_by_volume(above)
+    if mode == "AVERAGE":
+        axes = axes * np.cbrt(np.abs(np.linalg.det(above)))[:, None, None]
+    axes = axes @ offset
+    if mode == "FIX_SHEAR":
+        axes = without_shear(axes)
+    return axes, growth
+
+
+def without_shear(axes: np.ndarray, *, normalise: bool = False) -> np.ndarray:
+    """Axes (n, 3, 3) made orthogonal around y as Blender does it: x and z are both turned by half of what they lack.
+
+    The volume stays, unless they are to have the length 1.
+    """
+    x, y, z = np.moveaxis(axes, -1, 0)
+    squared = _dot(y, y)
+    safe = np.where(squared > 0.0, squared, 1.0)[:, None]
+    x, z = (axis - y * _dot(axis, y)[:, None] / safe for axis in (x, z))
+    unit_x, length_x = _unit(x)
+    unit_z, length_z = _unit(z)
+    cosine = _dot(unit_x, unit_z)
+    sheared = (np.abs(cosine) > SOME_SHEAR) & (np.abs(cosine) < 1.0 - np.finfo(np.float32).eps)
+    angle = np.arccos(np.where(sheared, cosine, 0.0))
+    target = 0.5 * (angle + 0.5 * np.pi)
+    across, _ = _unit(unit_x - cosine[:, None] * unit_z)
+    moved_x = np.sin(target)[:, None] * across + np.cos(target)[:, None] * unit_z
+    moved_z, _ = _unit(np.cross(np.cross(moved_x, unit_z), moved_x))
+    unit_x, unit_z = (np.where(sheared[:, None], moved, unit) for moved, unit in ((moved_x, unit_x), (moved_z, unit_z)))
+    if normalise:
+        return np.stack((unit_x, _unit(y)[0], unit_z), axis=-1)
+    shrink = np.sqrt(np.sin(angle))
+    return np.stack((unit_x * (length_x * shrink)[:, None], y, unit_z * (length_z * shrink)[:, None]), axis=-1)
+
+
+def _normalised(axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Axes (n, 3, 3) of length 1, and their lengths as a row each (n, 1, 3)."""
+    lengths = _lengths(axes)
+    return axes / np.where(lengths > 0.0, lengths, 1.0), lengths
+
+
+def _lengths(axes: np.ndarray) -> np.ndarray:
+    """The lengths of axes (n, 3, 3) as a row each (n, 1, 3)."""
+    return np.sqrt(np.einsum("nij,nij->nj", axes, axes))[:, None]
+
+
+def _lengths_by_volume(axes: np.ndarray) -> np.ndarray:
+    """The lengths of axes (n, 3, 3) as rows (n, 1, 3) whose product is the volume, also where there is shear."""
+    lengths = _lengths(axes)
+    product = lengths.prod(axis=-1, keepdims=True)
+    return lengths * np.cbrt(np.abs(np.linalg.det(axes))[:, None, None] / np.where(product > 0.0, product, 1.0))
+
+
+def _unit(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors (n, 3) of length 1, and the lengths (n,) that they had. Those without a length stay zero."""
+    lengths = np.sqrt(_dot(vectors, vectors))
+    return vectors / np.where(lengths > 0.0, lengths, 1.0)[:, None], lengths
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of vectors (n, 3)."""
+    return np.einsum("ni,ni->n", a, b)

@@ -1,0 +1,99 @@
+"""Affine maps: where bodies are that may be scaled unevenly, mirrored or sheared, and how far they are from there.
+
+The axes of a body are the columns of matrices (..., 3, 3), its origin is of shape (..., 3). Radii are those of balls in
+the body's own space, before its scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .measures import NEWTON_STEPS, TINY
+
+
+@dataclass(frozen=True, eq=False)
+class AffineMaps:
+    """Affine maps from the spaces of bodies to the space that they are in."""
+
+    axes: np.ndarray
+    """Shape (..., 3, 3), the axes as columns."""
+
+    origins: np.ndarray
+    """Shape (..., 3)."""
+
+    def __getitem__(self, index: Any) -> AffineMaps:
+        """The maps at `index` of the leading axes, by NumPy's rules."""
+        whole = index if isinstance(index, tuple) else (index,)
+        return AffineMaps(self.axes[(*whole, slice(None), slice(None))], self.origins[(*whole, slice(None))])
+
+    def __setitem__(self, index: Any, maps: AffineMaps) -> None:
+        self.axes[index], self.origins[index] = maps.axes, maps.origins
+
+    def __matmul__(self, maps: AffineMaps) -> AffineMaps:
+        """The maps that apply `maps` first. Leading axes are broadcast."""
+        return AffineMaps(self.axes @ maps.axes, self.at(maps.origins))
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Where points (..., 3) of the bodies' own spaces are."""
+        return turned(self.axes, points) + self.origins
+
+    def copy(self) -> AffineMaps:
+        return AffineMaps(self.axes.copy(), self.origins.copy())
+
+
+def turned(axes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) multiplied by matrices (..., 3, 3)."""
+    return np.einsum("...ij,...j->...i", axes, vectors)
+
+
+def displacement_bound(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -> np.ndarray:
+    """An upper bound of `ball_displacement`, at most 1.8 times as large, that takes a tenth of the time."""
+    offsets, turns = maps.origins - truth.origins, maps.axes - truth.axes
+    return np.sqrt(np.einsum("...i,...i->...", offsets, offsets)) + radii * np.sqrt(
+        np.einsum("...ij,...ij->...", turns, turns)
+    )
+
+
+def ball_displacement(maps: AffineMaps, truth: AffineMaps, radii: np.ndarray) -> np.ndarray:
+    """The largest displacement of any point of the ball around a body's origin: the shell error of affine maps.
+
+    Parameters
+    ----------
+    maps, truth : AffineMaps, shape (...)
+    radii : array, shape (...)
+
+    Returns
+    -------
+    array, shape (...)
+        In the unit of the origins.
+
+    Notes
+    -----
+    A point p of the ball moves by d + M p, with M the difference of the axes: the longest sum of d and a vector to an
+    ellipsoid. In the singular axes of M the components of that vector are s_i^2 d_i / (m - s_i^2), with the multiplier
+    m that makes p as long as the radius. What m is above the largest s_i^2 is found by Newton's method, from below.
+
+    Source: Conn, Gould and Toint, "Trust-Region Methods", 2000, section 7.3.
+    """
+    left, sizes, _ = np.linalg.svd((maps.axes - truth.axes) * np.asarray(radii)[..., None, None])
+    offsets = np.abs(np.einsum("...ij,...i->...j", left, maps.origins - truth.origins))
+    # Components are the leading axis from here on: s, the gaps s_1^2 - s_i^2, and s_i d_i.
+    sizes, offsets = np.moveaxis(sizes, -1, 0), np.moveaxis(offsets, -1, 0)
+    gaps, pulls = sizes[0] ** 2 - sizes**2, sizes * offsets
+    least = np.maximum((pulls - gaps).max(axis=0), TINY)
+    above = least
+    for _ in range(NEWTON_STEPS):
+        shares = pulls / (above + gaps)
+        squared = np.einsum("i...,i...->...", shares, shares)
+        slope = np.einsum("i...,i...->...", shares, shares / (above + gaps))
+        above = np.maximum(above + squared / np.maximum(slope, TINY) * (np.sqrt(squared) - 1.0), least)
+    shares = np.minimum(pulls / (above + gaps), 1.0)
+    # What is left of the length goes along the longest axis.
+    rest = np.einsum("i...,i...->...", shares[1:], shares[1:])
+    shares[1:] /= np.maximum(np.sqrt(rest), 1.0)
+    shares[0] = np.sqrt(np.maximum(1.0 - rest, 0.0))
+    longest = offsets + sizes * shares
+    return np.sqrt(np.einsum("i...,i...->...", longest, longest))

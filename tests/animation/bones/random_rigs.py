@@ -1,0 +1,205 @@
+"""Rigs at random: every way to inherit, to turn and to be keyed, with constraints, drivers, strips and scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from rigid_motion.animation import write_channel
+from rigid_motion.motion.quaternions import normalise
+from tests.animation.bones.rigs import INHERIT_SCALES, ORDERS
+from tests.animation.scenes import new_object
+
+LAST = 30
+"""Keys are on frames from 1 to this."""
+
+ROTATION_MODES = (*ORDERS, "AXIS_ANGLE")
+
+
+@dataclass(frozen=True)
+class BoneCase:
+    """How one bone of a rig is at random."""
+
+    parent: int
+    """How many bones before it its parent is; 0 for none."""
+
+    seed: int
+    rotation_mode: str = "QUATERNION"
+    inherit_rotation: bool = True
+    inherit_scale: str = "FULL"
+    local_location: bool = True
+    connected: bool = False
+    step: float = 1.0
+    """Frames from key to key; 0 where it has none."""
+
+    location: bool = False
+    scale: str = ""
+    """"even", "uneven", "negative" for keys of it; "still" where it just is another."""
+
+    follows: str = ""
+    """The type of a constraint, or "DRIVER"."""
+
+
+@dataclass(frozen=True)
+class RigCase:
+    """A rig, what is asked of it, and how it moves."""
+
+    bones: tuple[BoneCase, ...]
+    seed: int = 0
+    object_keys: bool = False
+    parented: bool = False
+    size: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    strip: float = 0.0
+    """The scale of the strip that it moves by; 0 for none."""
+
+    mode: str = "motor_spline"
+    shared: bool = False
+    hold: bool = True
+    best_of: bool = False
+    tolerance: float = 0.01
+
+
+def name_of(number: int) -> str:
+    return f"Bone {number}"
+
+
+def build(case: RigCase, name: str = "Rig") -> bpy.types.Object:
+    """The rig of a case, in the open file."""
+    random = np.random.default_rng(case.seed)
+    rig = new_object(name, data=bpy.data.armatures.new(name))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited: list[bpy.types.EditBone] = []
+    for number, settings in enumerate(case.bones):
+        bone = rig.data.edit_bones.new(name_of(number))
+        parent = edited[number - settings.parent] if 0 < settings.parent <= number else None
+        bone.parent = parent
+        shift = random.normal(size=3) * (0.0 if settings.connected else 0.1)
+        bone.head = np.array(parent.tail) + shift if parent else random.normal(size=3)
+        bone.tail = np.array(bone.head) + 0.3 * normalise(random.normal(size=3)) * random.uniform(0.4, 1.0)
+        bone.roll = random.uniform(-3.0, 3.0)
+        bone.use_connect = settings.connected and parent is not None
+        bone.use_inherit_rotation, bone.inherit_scale = settings.inherit_rotation, settings.inherit_scale
+        bone.use_local_location = settings.local_location
+        edited.append(bone)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for number, settings in enumerate(case.bones):
+        _key(rig.pose.bones[name_of(number)], settings)
+    for number, settings in enumerate(case.bones):
+        if settings.follows:
+            _constrain(rig, number, settings)
+    _move(rig, case, random)
+    return rig
+
+
+def frames_of(step: float) -> np.ndarray:
+    return np.append(np.arange(1.0, LAST, step), float(LAST))
+
+
+def _waves(random: np.random.Generator, frames: np.ndarray, count: int) -> np.ndarray:
+    """Smooth noise of about 1, shape (n, count)."""
+    return np.sin(random.uniform(0.05, 0.35, count) * frames[:, None] + random.uniform(0.0, 6.0, count))
+
+
+def _key(bone: bpy.types.PoseBone, settings: BoneCase) -> None:
+    random = np.random.default_rng(settings.seed)
+    bone.rotation_mode = settings.rotation_mode
+    path = f"{bone.path_from_id()}."
+    frames = frames_of(settings.step) if settings.step else np.array((1.0,))
+    turned = 0.7 * _waves(random, frames, 3)
+    rows = {"rotation_euler": turned}
+    if settings.rotation_mode == "QUATERNION":
+        rows = {"rotation_quaternion": normalise(np.column_stack((np.ones(len(frames)), turned)))}
+    elif settings.rotation_mode == "AXIS_ANGLE":
+        rows = {"rotation_axis_angle": np.column_stack((turned[:, 0], normalise(turned + 2.0)))}
+    if settings.location:
+        rows["location"] = 0.2 * _waves(random, frames, 3)
+    if settings.scale:
+        waves = 1.0 + 0.4 * _waves(random, frames, 3)
+        scale = {"even": waves[:, :1].repeat(3, axis=1), "negative": waves * (-1.0, 1.0, 1.0)}
+        rows["scale"] = scale.get(settings.scale, waves)
+    for name, values in rows.items():
+        if not settings.step or (name == "scale" and settings.scale == "still"):
+            setattr(bone, name, values[0])
+        else:
+            write_channel(bone.id_data, path + name, frames, values)
+
+
+def _constrain(rig: bpy.types.Object, number: int, settings: BoneCase) -> None:
+    bone, other = rig.pose.bones[name_of(number)], name_of((number + 1) % len(rig.pose.bones))
+    if settings.follows == "DRIVER":
+        driver = bone.driver_add("location", 1).driver
+        driver.type, driver.expression = "SCRIPTED", "0.01 * frame"
+        return
+    constraint = bone.constraints.new(settings.follows)
+    if settings.follows == "LIMIT_ROTATION":
+        constraint.use_limit_x, constraint.max_x, constraint.owner_space = True, 0.1, "LOCAL"
+        return
+    target = new_object(f"Target {number}")
+    target.location = (0.3, 0.4, 0.5)
+    constraint.target = target
+    if number + 1 < len(rig.pose.bones) and all(one.name != other for one in bone.children_recursive):
+        constraint.target, constraint.subtarget = rig, other
+    if settings.follows == "IK":
+        constraint.chain_count = 2
+
+
+def _move(rig: bpy.types.Object, case: RigCase, random: np.random.Generator) -> None:
+    rig.scale = case.size
+    if case.parented:
+        parent = new_object(f"{rig.name} parent")
+        parent.location, parent.rotation_euler = random.normal(size=3), random.normal(size=3)
+        rig.parent = parent
+    if case.object_keys:
+        rig.rotation_mode, frames = "XYZ", frames_of(1.0)
+        write_channel(rig, "location", frames, 0.3 * _waves(random, frames, 3))
+        write_channel(rig, "rotation_euler", frames, 0.3 * _waves(random, frames, 3))
+    data = rig.animation_data
+    if case.strip and data is not None and data.action is not None:
+        action, slot = data.action, data.action_slot
+        data.action = None
+        strip = data.nla_tracks.new().strips.new("Strip", 1, action)
+        strip.action_slot, strip.scale = slot, case.strip
+    bpy.context.view_layer.update()
+
+
+def random_case(random: np.random.Generator, *, follows: bool = True) -> RigCase:
+    """A case by NumPy's random numbers, for runs at large; hypothesis makes those of the tests."""
+
+    def some(chance: float) -> bool:
+        return bool(random.random() < chance)
+
+    bones = []
+    for number in range(random.integers(1, 8)):
+        bones.append(
+            BoneCase(
+                parent=int(random.integers(0, min(number, 3) + 1)) if number and some(0.95) else 0,
+                seed=int(random.integers(1 << 30)),
+                rotation_mode=str(random.choice(ROTATION_MODES)) if some(0.5) else "QUATERNION",
+                inherit_rotation=some(0.75),
+                inherit_scale=str(random.choice(INHERIT_SCALES)) if some(0.5) else "FULL",
+                local_location=some(0.75),
+                connected=some(0.3),
+                step=float(random.choice((0.0, 0.8, 1.0, 1.0, 1.0, 2.0, 5.0))),
+                location=some(0.4),
+                scale=str(random.choice(("even", "uneven", "negative", "still"))) if some(0.3) else "",
+                follows=str(random.choice(("DAMPED_TRACK", "IK", "COPY_ROTATION", "LIMIT_ROTATION", "DRIVER")))
+                if follows and some(0.1)
+                else "",
+            )
+        )
+    return RigCase(
+        tuple(bones),
+        seed=int(random.integers(1 << 30)),
+        object_keys=some(0.3),
+        parented=some(0.3),
+        size=tuple(random.uniform(0.5, 2.0, 3).tolist()) if some(0.2) else (1.0, 1.0, 1.0),
+        strip=float(random.choice((1.0, 1.5, 2.0))) if some(0.25) else 0.0,
+        mode=str(random.choice(("motor_spline", "lerp_slerp", "dq_sclerp", "cga_lerp"))),
+        shared=some(0.3),
+        hold=some(0.5),
+        best_of=some(0.2),
+        tolerance=float(random.choice((0.003, 0.01, 0.05))),
+    )

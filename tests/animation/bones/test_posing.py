@@ -1,0 +1,48 @@
+"""Blender's rule of what bones inherit, in NumPy: beside Blender's own pose matrices."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation.baking.channel_maps import evaluated
+from rigid_motion.animation.transforms import transform_of
+from rigid_motion.animation.transforms.posing import Hierarchy
+from rigid_motion.motion.affine import AffineMaps
+from tests.animation.bones.random_rigs import LAST, build, random_case
+from tests.animation.oracle import curves_of
+from tests.thoroughness import tried
+
+FRAMES = np.arange(1.0, LAST + 1.0, 3.0)
+
+
+def channel_maps(rig: bpy.types.Object) -> AffineMaps:
+    """The matrices of all bones' channels, by Blender's own F-curves, shape (bones, n)."""
+    curves = curves_of(rig) if rig.animation_data and rig.animation_data.action else {}
+    maps = [evaluated(transform_of(bone), curves, FRAMES)[1] for bone in rig.pose.bones]
+    return AffineMaps(np.stack([one.axes for one in maps]), np.stack([one.origins for one in maps]))
+
+
+def posed_by_blender(rig: bpy.types.Object) -> np.ndarray:
+    """Matrices of all bones in the space of the rig (bones, n, 4, 4)."""
+    played = []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(int(frame))
+        shown = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        played.append([np.array(bone.matrix) for bone in shown.pose.bones])
+    return np.array(played).swapaxes(0, 1)
+
+
+@pytest.mark.parametrize("seed", range(tried(120)))
+def test_bones_are_where_blender_poses_them(empty_file, seed):
+    rig = build(random_case(np.random.default_rng(seed), follows=False))
+    if rig.animation_data is not None:
+        while rig.animation_data.nla_tracks:
+            action = rig.animation_data.nla_tracks[0].strips[0].action
+            rig.animation_data.nla_tracks.remove(rig.animation_data.nla_tracks[0])
+            rig.animation_data.action = action
+    posed, truth = Hierarchy(rig.pose.bones).posed(channel_maps(rig)), posed_by_blender(rig)
+    size = max(1.0, np.abs(truth).max())
+    np.testing.assert_allclose(posed.origins, truth[..., :3, 3], rtol=0.0, atol=1e-5 * size)
+    np.testing.assert_allclose(posed.axes, truth[..., :3, :3], rtol=0.0, atol=1e-5 * size)

@@ -1,0 +1,227 @@
+"""What is promised of reduced rigs and what is not: constraints, drivers, scale, bones without keys, and sizes."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+from rigid_motion import animation
+from rigid_motion.animation import Refused, is_reduced, key_frames, reduce_keys_of, total_reduction, write_channel
+from rigid_motion.animation.baking.followers import not_promised
+from rigid_motion.animation.baking.sizes import first_tolerance, reach_of, rig_size
+from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.test_rig_reducing import RADIUS, TOLERANCE, bones, errors, matrices
+from tests.animation.scenes import new_object
+from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
+
+ONE_MORE = 1.0 + 1e-3
+
+
+def uneven(seed: int = 0) -> np.ndarray:
+    """Scales (n, 3) that differ from axis to axis as they change."""
+    return 1.0 + 0.3 * np.sin(0.1 * FRAMES[:, None] * (1.0, 1.3, 1.7) + seed)
+
+
+# Constraints and drivers
+
+
+@pytest.mark.parametrize("kind", ["DAMPED_TRACK", "COPY_ROTATION", "LIMIT_ROTATION"])
+def test_what_follows_a_constraint_is_named_and_what_hangs_on_it(live_file, kind):
+    rig = recorded_rig()
+    rig.pose.bones["Arm.L"].constraints.new(kind)
+    found = not_promised(rig)
+    assert (found.followers, found.below) == (("Arm.L",), ("Hand.L",))
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert total_reduction(bones(rig)).rig.not_promised == found
+
+
+@pytest.mark.parametrize("switched_off", ["mute", "influence"])
+def test_a_constraint_that_is_switched_off_counts_for_nothing_until_that_is_animated(live_file, switched_off):
+    rig = recorded_rig()
+    constraint = rig.pose.bones["Arm.L"].constraints.new("COPY_ROTATION")
+    setattr(constraint, switched_off, {"mute": True, "influence": 0.0}[switched_off])
+    assert not not_promised(rig)
+    constraint.keyframe_insert("influence")
+    assert not_promised(rig).followers == ("Arm.L",)
+
+
+def test_constraints_that_show_in_betweens_count_for_nothing(live_file):
+    rig = recorded_rig()
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert all(len(bone.constraints) for bone in bones(rig))
+    assert not not_promised(rig)
+
+
+@pytest.mark.parametrize(("count", "moved"), [(2, ("Arm.L", "Hand.L")), (0, ("Root", "Spine", "Arm.L", "Hand.L"))])
+def test_inverse_kinematics_move_all_bones_of_their_chain(live_file, count, moved):
+    rig = recorded_rig()
+    rig.pose.bones["Hand.L"].constraints.new("IK").chain_count = count
+    assert not_promised(rig).followers == moved
+
+
+def test_a_driven_bone_is_named_unless_its_driver_is_muted(live_file):
+    rig = recorded_rig(still=("Head",))
+    driver = rig.pose.bones["Head"].driver_add("rotation_quaternion", 1)
+    assert not_promised(rig).followers == ("Head",)
+    driver.mute = True
+    assert not not_promised(rig)
+
+
+def test_the_tolerance_holds_for_all_that_follow_nothing(live_file):
+    rig = recorded_rig()
+    target = new_object("Target")
+    target.location = (0.4, 0.3, 0.2)
+    constraint = rig.pose.bones["Arm.L"].constraints.new("DAMPED_TRACK")
+    constraint.target, constraint.track_axis = target, "TRACK_X"
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    off = errors(rig, truth)
+    report = total_reduction(bones(rig))
+    promised = [error for name, error in off.items() if name not in report.rig.not_promised]
+    assert max(promised) <= TOLERANCE * ONE_MORE
+    assert report.largest_error == pytest.approx(max(promised), abs=2e-6)
+
+
+# What is reported
+
+
+def test_the_largest_error_is_that_of_a_bone_without_keys_where_that_is_off_the_most(live_file):
+    rig = recorded_rig(still=("Hand.L", "Hand.R", "Head"))
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig, *NAMES[:2], "Arm.L", "Arm.R"), "motor_spline", TOLERANCE, RADIUS)
+    off, report = errors(rig, truth), total_reduction(bones(rig))
+    assert max(off, key=off.get) in ("Hand.L", "Hand.R", "Head")
+    assert report.largest_error == pytest.approx(max(off.values()), abs=2e-6)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_the_tolerance_holds_in_the_world_where_the_rig_itself_is_reduced_in_the_same_go(live_file, hold):
+    rig = recorded_rig()
+    rig.rotation_mode = "XYZ"
+    write_channel(rig, "location", FRAMES, 0.3 * np.sin(0.1 * FRAMES[:, None] * (1.0, 1.4, 0.3)))
+    write_channel(rig, "rotation_euler", FRAMES, 0.2 * np.sin(0.1 * FRAMES[:, None] * (0.7, 1.1, 1.6)))
+    truth, both = matrices(rig), [*bones(rig), rig]
+    reduce_keys_of(both, "motor_spline", TOLERANCE, RADIUS, hold=hold)
+    assert is_reduced(rig)
+    assert is_reduced(rig.pose.bones["Spine"])
+    off = max(errors(rig, truth).values())
+    assert off <= TOLERANCE * ONE_MORE
+    assert total_reduction(both).largest_error == pytest.approx(off, abs=2e-6)
+
+
+# Scale
+
+
+def test_a_bone_whose_scale_has_keys_on_every_frame_and_is_uneven_is_left_alone_and_says_why(live_file):
+    rig = recorded_rig()
+    write_channel(rig, 'pose.bones["Spine"].scale', FRAMES, uneven())
+    truth, refused = matrices(rig), []
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, refused=refused)
+    assert [str(one) for one in refused if "its scale changes differently along its axes" in str(one)] == list(
+        map(str, refused)
+    )
+    assert not is_reduced(rig.pose.bones["Spine"])
+    assert total_reduction(bones(rig)).after < (len(NAMES) - 1) * len(FRAMES)
+    assert max(sheared(rig, truth).values()) <= TOLERANCE * ONE_MORE
+
+
+def test_a_bone_whose_uneven_scale_has_few_keys_is_reduced(live_file):
+    rig = recorded_rig()
+    few = FRAMES[::30]
+    write_channel(rig, 'pose.bones["Spine"].scale', few, uneven()[::30])
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS)
+    assert len(key_frames(rig.pose.bones["Spine"])) < len(FRAMES)
+    off = sheared(rig, truth)
+    assert max(off.values()) <= TOLERANCE * ONE_MORE
+    assert total_reduction(bones(rig)).largest_error >= max(off.values()) - 2e-6
+
+
+def test_the_uneven_scale_of_an_object_counts_in_what_is_promised(live_file):
+    obj = new_object("Plank")
+    obj.rotation_mode = "XYZ"
+    angles = 0.5 * np.sin(0.1 * FRAMES[:, None] * (1.0, 1.3, 0.6))
+    write_channel(obj, "rotation_euler", FRAMES, angles)
+    write_channel(obj, "scale", FRAMES[::89], ((8.0, 0.5, 0.5), (9.0, 0.5, 0.5)))
+
+    def ends() -> np.ndarray:
+        shown = []
+        for frame in FRAMES:
+            bpy.context.scene.frame_set(int(frame))
+            shown.append([obj.matrix_world @ Vector(corner) for corner in (RADIUS * np.eye(3)).tolist()])
+        return np.array(shown)
+
+    truth = ends()
+    obj.scale = (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
+    off = np.linalg.norm(ends() - truth, axis=-1).max()
+    assert is_reduced(obj)
+    assert 0.2 * TOLERANCE < off <= TOLERANCE * ONE_MORE
+
+
+def sheared(rig: bpy.types.Object, truth: dict[str, np.ndarray]) -> dict[str, float]:
+    """How far points of balls get off that may be scaled unevenly, by a few hundred of them."""
+    points = np.random.default_rng(1).normal(size=(500, 3))
+    points *= RADIUS / np.linalg.norm(points, axis=1)[:, None]
+    found = {}
+    for name, rows in matrices(rig).items():
+        offset = rows - truth[name]
+        moved = points @ offset[:, :3, :3].swapaxes(1, 2) + offset[:, None, :3, 3]
+        found[name] = float(np.linalg.norm(moved, axis=-1).max())
+    return found
+
+
+# How large things are
+
+
+def imported(length: float) -> bpy.types.Object:
+    """A chain of three bones, of which the last has a length that an importer made up."""
+    rig = new_object("Rig", data=bpy.data.armatures.new("Rig"))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for number, name in enumerate(("Hips", "Spine", "HeadTop")):
+        bone = rig.data.edit_bones.new(name)
+        bone.head, bone.parent = (0.0, 0.0, 0.8 * number), parent
+        bone.tail = (0.0, 0.0, 0.8 * number + (length if name == "HeadTop" else 0.8))
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return rig
+
+
+def test_made_up_lengths_of_the_last_bones_are_no_part_of_the_size_of_a_rig(live_file):
+    rig = imported(57.0)
+    rig.scale = (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    assert rig_size(rig) == pytest.approx(3.2)
+    assert first_tolerance(bpy.context.scene, [transform_of(bone) for bone in rig.pose.bones]) == pytest.approx(9.6e-3)
+    assert reach_of(rig.pose.bones["HeadTop"]) == pytest.approx(0.8)
+    assert animation.radius_of(rig.pose.bones["HeadTop"]) == pytest.approx(1.6)
+    assert animation.radius_of(rig) == pytest.approx(2.0 * (1.6 + 0.8))
+
+
+def test_a_rig_of_one_bone_is_as_large_as_that(live_file):
+    rig = new_object("Rig", data=bpy.data.armatures.new("Rig"))
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = rig.data.edit_bones.new("Lid")
+    bone.head, bone.tail = (0.0, 0.0, 0.0), (0.0, 0.4, 0.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert rig_size(rig) == pytest.approx(0.4)
+
+
+def test_a_rig_with_bones_keyed_on_different_frames_is_not_refused(live_file):
+    rig = recorded_rig(still=("Head", "Arm.L", "Arm.R"))
+    for seed, (name, frames) in enumerate(
+        (("Head", FRAMES[::2]), ("Arm.L", FRAMES[10:40] + 0.3), ("Arm.R", FRAMES[::7]))
+    ):
+        angle = 0.5 * np.sin(0.2 * frames + seed)
+        turns = np.stack((np.cos(angle), np.sin(angle), 0.0 * angle, 0.0 * angle), axis=1)
+        write_channel(rig, f'pose.bones["{name}"].rotation_quaternion', frames, turns)
+    truth, refused = matrices(rig), []
+    reduce_keys_of(bones(rig), "motor_spline", TOLERANCE, RADIUS, refused=refused)
+    assert not [str(one) for one in refused if isinstance(one, Refused) and "goes on outside" in str(one)]
+    assert max(errors(rig, truth).values()) <= TOLERANCE * ONE_MORE
