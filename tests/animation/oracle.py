@@ -16,8 +16,8 @@ import numpy as np
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Euler, Quaternion
 
-from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate
-from rigid_motion.motion.quaternions import multiply, normalise
+from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
+from rigid_motion.motion.quaternions import multiply, normalise, rotate
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
 """What has location, rotation and scale. Pose bones have no delta transforms of their own."""
@@ -157,10 +157,10 @@ def _components(
             continue
         share = progress(obj, first, last, frames[inside])
         if mode in SMOOTH:
-            within = (frames[inside] > first) & (frames[inside] < last)
-            if _codes(obj, first) <= {"LINEAR", "BEZIER"}:
-                share = np.where(within, (frames[inside] - first) / (last - first), share)
-            poses = _smooth(obj, keys, first, share, mode, own, scaled)
+            elapsed = np.clip((frames[inside] - first) / (last - first), 0.0, 1.0)
+            leaving, arriving = _passings(obj, keys, first)
+            share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
+            poses = _smooth(obj, keys, first, share, mode, own, scaled, (leaving[0], arriving[0]))
         else:
             ends = _key_poses(obj, np.array((first, last)), own, scaled)
             poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
@@ -188,7 +188,14 @@ def _key_poses(obj: Carrier, frames: np.ndarray, own: Own, scaled: bool) -> Pose
 
 
 def _smooth(
-    obj: Carrier, keys: np.ndarray, first: float, share: np.ndarray, mode: str, own: Own, scaled: bool
+    obj: Carrier,
+    keys: np.ndarray,
+    first: float,
+    share: np.ndarray,
+    mode: str,
+    own: Own,
+    scaled: bool,
+    tangents: tuple[float, float],
 ) -> Poses:
     """A segment of a smooth mode with the keys next to it; beside a segment that holds, the object rests."""
     place = int(np.flatnonzero(keys == first)[0])
@@ -201,7 +208,89 @@ def _smooth(
         shown[before + 2] = shown[before + 1]
     counts = np.zeros(len(around) - 1, dtype=int)
     counts[before] = len(share)
-    return in_betweens(around, _key_poses(obj, shown, own, scaled), counts, share, mode)
+    poses = _key_poses(obj, shown, own, scaled)
+    if tangents == (1.0, 1.0):
+        return in_betweens(around, poses, counts, share, mode)
+    return _with_tangents(around, poses, before, share, tangents)
+
+
+def _with_tangents(times: np.ndarray, keys: Poses, segment: int, u: np.ndarray, tangents: tuple[float, float]) -> Poses:
+    """The segment between keys whose tangents are so many times as long as those of the mode."""
+    screws = twists.between(keys.positions[:-1], keys.quaternions[:-1], keys.positions[1:], keys.quaternions[1:])
+    growths = np.zeros(len(times) - 1) if keys.scales is None else np.diff(np.log(keys.scales))
+    ways, durations = np.vstack((screws, growths)).T, np.diff(times)
+    bends = []
+    for key, tangent in zip((segment, segment + 1), tangents, strict=True):
+        if 0 < key < len(durations):
+            part = _share(*durations[key - 1 : key + 1])
+            rests = not (ways[key - 1].any() and ways[key].any())
+            rate = part * ways[key - 1] / durations[key - 1] + (1.0 - part) * ways[key] / durations[key]
+            rate = 0.0 * rate if rests else rate
+        else:
+            rate = ways[segment] / durations[segment]
+        bends.append(tangent * durations[segment] * rate - ways[segment])
+    first = np.where(u < 0.0, u, np.where(u > 1.0, 0.0, u * (1.0 - u) ** 2))
+    second = np.where(u < 0.0, 0.0, np.where(u > 1.0, u - 1.0, -(u**2) * (1.0 - u)))
+    added = np.outer(bends[0], first) + np.outer(bends[1], second)
+    screw = interpolate((0.0, 1.0), keys[segment : segment + 2], u, "cga_slerp", extrapolate=True)
+    if keys.scales is not None:
+        rigid = Poses(keys.positions, keys.quaternions)[segment : segment + 2]
+        screw = Poses(*_parts(interpolate((0.0, 1.0), rigid, u, "dq_sclerp", extrapolate=True)), screw.scales)
+    turns, advances = twists.exponential(added[:6])
+    return Poses(
+        screw.positions + rotate(screw.quaternions, advances.T),
+        multiply(screw.quaternions, turns.T),
+        None if keys.scales is None else screw.scales * np.exp(added[6]),
+    )
+
+
+def _parts(poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+    return poses.positions, poses.quaternions
+
+
+def _passings(obj: Carrier, keys: np.ndarray, first: float) -> list[tuple[float, float]]:
+    """At both ends of a segment how long the tangent is, and what the slope of progress lacks."""
+    place, codes = int(np.flatnonzero(keys == first)[0]), _codes(obj, first)
+    passings = [(1.0, 0.0), (1.0, 0.0)]
+    if "BEZIER" in codes and codes <= {"LINEAR", "BEZIER"}:
+        if place > 0:
+            passings[0] = _passing(obj, *keys[place - 1 : place + 2], after=True)
+        if place + 2 < len(keys):
+            passings[1] = _passing(obj, *keys[place : place + 3], after=False)
+    return passings
+
+
+def _passing(obj: Carrier, before: float, key: float, behind: float, *, after: bool) -> tuple[float, float]:
+    """The same before or after the key in the middle of three."""
+    begin, end = (key, behind) if after else (before, key)
+    steps = key + (end - begin) / 16.0 * (np.arange(4) if after else -np.arange(4))
+    values = []
+    for path in transform_paths(obj):
+        weight = 2.0 if path == "rotation_quaternion" else 1.0
+        for index in range(WIDTHS[path]):
+            fcurve = curve_of(obj, path, index)
+            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
+                values.append(weight * np.array(_timing(fcurve, [before, key, behind, *steps])))
+    rows = np.array(values)
+    slope = np.polyfit(steps - key, rows[:, 3:].T, 3)[2]
+    times, chords = (key - before, behind - key), (rows[:, 1] - rows[:, 0], rows[:, 2] - rows[:, 1])
+    share = _share(*times)
+    speeds = [part * chord / time for part, chord, time in zip((share, 1.0 - share), chords, times, strict=True)]
+    mean, chord = sum(speeds), chords[after]
+    squared = max(mean @ mean, 0.01 * sum(speed @ speed for speed in speeds))
+    if not (squared > 0.0 and chord.any()):
+        return 0.0, 0.0
+    length = (chord / times[after]) @ mean / squared
+    wanted = slope @ mean / squared / np.copysign(max(abs(length), 0.1), length)
+    progress = (slope @ chord) * times[after] / (chord @ chord)
+    return length, np.clip(wanted, -3.0, 3.0) - np.clip(progress, -3.0, 3.0)
+
+
+def _share(before: float, after: float) -> float:
+    """Of the twist before a key in that of the key."""
+    if max(before, after) >= 6.0 * min(before, after):
+        return float(before > after)
+    return min(max(after / (before + after), 1.0 - after / before), before / after)
 
 
 def _codes(obj: Carrier, frame: float) -> set[str]:

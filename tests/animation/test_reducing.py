@@ -508,13 +508,25 @@ def reopen(path: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(path))
 
 
-def test_an_action_that_something_else_needs_stays_when_it_is_let_go(live_file):
+@pytest.mark.parametrize("kept_by", ["another object", "the asset browser"])
+def test_an_action_that_something_else_needs_stays_when_it_is_discarded(live_file, kept_by):
     obj = recorded()
     action = obj.animation_data.action
-    action.use_fake_user = True
+    if kept_by == "another object":
+        new_object("Other").animation_data_create().action = action
+    else:
+        action.asset_mark()
     reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
     discard_dense_keys(obj)
     assert action in list(bpy.data.actions)
+
+
+def test_an_action_that_an_importer_keeps_by_a_fake_user_goes_when_it_is_discarded(live_file):
+    obj = recorded()
+    obj.animation_data.action.use_fake_user = True
+    reduce_keys_of(obj, tolerance=TOLERANCE, radius=RADIUS)
+    discard_dense_keys(obj)
+    assert list(bpy.data.actions) == [obj.animation_data.action]
 
 
 def test_what_was_done_last_is_taken_back_first(live_file):

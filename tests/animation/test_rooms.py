@@ -13,7 +13,7 @@ from rigid_motion import animation
 from rigid_motion.animation.transforms import KINDS
 
 HOUSE = Path(animation.__file__).parent
-OUTSIDE = {"handlers"}
+OUTSIDE = {"handlers", "gltf_export"}
 """What belongs to no room."""
 
 OF_NUMBERS = ("curves", "compute")

@@ -12,7 +12,7 @@ baking      other keys for the same motion
 properties  what is kept in files
 
 Data flows from Blender through actions, compute and writers back to Blender. Each room imports only those above it;
-`handlers` belongs to none, and imports none.
+`handlers` belongs to none, and imports none; `gltf_export` is for Blender's glTF exporter, and imports none.
 """
 
 from . import properties

@@ -74,11 +74,12 @@ def motor_lerp(segments: Segments) -> Curves:
     )
 
 
-def motor_spline(segments: Segments) -> Curves:
+def motor_spline(segments: Segments, tangents: np.ndarray | None = None) -> Curves:
     """A screw from key to key, bent so that its twist goes on through every key.
 
     A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their
-    segment, and none has any where the body rests before or after.
+    segment, and none has any where the body rests before or after. `tangents` is how many times as long the twist at
+    either end of each segment is, shape (2, ..., S), for keys that are passed at speeds of their own.
     """
 
     def at_keys(twists, before, after, rests):
@@ -88,7 +89,7 @@ def motor_spline(segments: Segments) -> Curves:
             inner[:, rests[..., :-1] | rests[..., 1:]] = 0.0
         return np.concatenate((twists[..., :1], inner, twists[..., -1:]), axis=-1)
 
-    return _bent(segments, at_keys)
+    return _bent(segments, at_keys, 1.0 if tangents is None else tangents)
 
 
 def motor_spline_causal(segments: Segments) -> Curves:
@@ -114,8 +115,12 @@ def motor_spline_causal(segments: Segments) -> Curves:
     return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
 
 
+SHORT = 1.0 / 6.0
+"""The part of its neighbour's time up to which a segment passes no twist on."""
+
+
 def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """What the twist before a key counts for that of the key; the twist after it counts for the rest.
+    """Return what the twist before a key counts for that of the key; the twist after it counts for the rest.
 
     The parabola through the key and its neighbours would have
 
@@ -123,13 +128,16 @@ def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
     for segments of durations h0 and h1: nearly all for the shorter one, whose twist, kept up for as long as the longer
     one takes, leads any distance away. So the shorter one's share is at most short / long: neither segment, in its own
-    time, is then given more than |r0| + |r1| of the two screws, wherever on the body that is measured. Durations alone
-    decide, for a screw has no length that is the same for all choices of the body's origin.
+    time, is then given more than |r0| + |r1| of the two screws, wherever on the body that is measured. And it is none
+    up to `SHORT`: so short a segment is often a jump, as where something changes its parent from one frame to the next,
+    which would swing what is beside it by 4/27 of its way. Durations alone decide, for a screw has no length that is
+    the same for all choices of the body's origin.
     """
-    return np.clip(after / (before + after), 1.0 - after / before, before / after)
+    shares = np.clip(after / (before + after), 1.0 - after / before, before / after)
+    return np.where(after <= SHORT * before, 1.0, np.where(before <= SHORT * after, 0.0, shares))
 
 
-def _bent(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
+def _bent(segments: Segments, at_keys: Callable[..., np.ndarray], tangents: np.ndarray | float = 1.0) -> Curves:
     """A screw from key to key, bent so that the body has certain twists at the keys.
 
     Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
@@ -145,7 +153,7 @@ def _bent(segments: Segments, at_keys: Callable[..., np.ndarray]) -> Curves:
     screws, duration, rests, wanted = segments.screws, segments.durations, segments.are_still, segments.wanted
     twists = at_keys(screws / duration, duration[..., :-1], duration[..., 1:], rests)
     ends = np.stack([twists[..., keys][..., wanted] for keys in (slice(None, -1), slice(1, None))], axis=1)
-    ends = ends * duration[..., wanted] - screws[:, None, ..., wanted]
+    ends = ends * (duration[..., wanted] * tangents) - screws[:, None, ..., wanted]
     if rests.any():
         ends[..., rests[..., wanted]] = 0.0
     return replace(screw(segments), bends=ends.reshape(7, 2, -1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,7 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import refresh, set_mode
+import rigid_motion
+from rigid_motion.animation import bake, reduce_keys_of, refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_wanted, new_rig, wanted_bases
@@ -128,3 +131,55 @@ def test_a_mode_changes_nothing_else_that_an_export_says(exporter, tmp_path, kin
     set_mode(list(rig.pose.bones), "dq_sclerp")
     found = imported(kind, export(kind, tmp_path / f"mode.{kind}"))
     assert ({action.name for action in bpy.data.actions}, {bone.name for bone in found.pose.bones}) == names
+
+
+# -- clips ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def extension(exporter) -> Iterator[None]:
+    """The extension as the exporter finds it: an enabled add-on."""
+    added = bpy.context.preferences.addons.new()
+    added.module = rigid_motion.__name__
+    yield
+    bpy.context.preferences.addons.remove(added)
+
+
+def clips(path: Path) -> list[str]:
+    """The names of the animations in a GLB file."""
+    content = path.read_bytes()
+    (length,) = struct.unpack_from("<I", content, 12)
+    return sorted(clip["name"] for clip in json.loads(content[20 : 20 + length]).get("animations", []))
+
+
+def test_a_rig_with_two_actions_that_have_modes_is_exported_as_two_clips(extension, tmp_path):
+    rig = key_all(new_rig())
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    walk = rig.animation_data.action
+    walk.name, walk.use_fake_user = "Walk", True
+    rig.animation_data.action = None
+    key_all(rig, seed=3)
+    set_mode(list(rig.pose.bones), "motor_spline")
+    rig.animation_data.action.name = "Run"
+    assert clips(export("glb", tmp_path / "rig.glb")) == ["Run", "Walk"]
+
+
+def test_the_keys_from_before_baking_or_reducing_are_no_clip(extension, tmp_path):
+    rig = key_all(new_rig())
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    rig.animation_data.action.name = "Walk"
+    bake(list(rig.pose.bones))
+    assert clips(export("glb", tmp_path / "baked.glb")) == ["Walk Baked"]
+    reduce_keys_of(list(rig.pose.bones), "dq_sclerp", 0.01)
+    assert clips(export("glb", tmp_path / "reduced.glb")) == ["Walk Baked Reduced"]
+
+
+def test_an_original_that_is_in_a_strip_is_a_clip_of_its_own(extension, tmp_path):
+    rig = key_all(new_rig())
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    walk, slot = rig.animation_data.action, rig.animation_data.action_slot
+    walk.name = "Walk"
+    bake(list(rig.pose.bones))
+    strip = rig.animation_data.nla_tracks.new().strips.new("Walk", 101, walk)
+    strip.action_slot = slot
+    assert clips(export("glb", tmp_path / "rig.glb")) == ["Walk", "Walk Baked"]

@@ -133,7 +133,7 @@ def put_back(transform: Transform, kind: str, lookup: Lookup) -> None:
 
 
 def discard_originals(transform: Transform, kind: str) -> None:
-    """Give up the way back: originals of this kind leave the file, unless something else holds them."""
+    """Give up the way back: originals of this kind leave the file, unless they are used elsewhere or are assets."""
     bakes = transform.motion.bakes
     for entry in list(entries_in_use(transform)):
         original = entry.original
@@ -143,5 +143,6 @@ def discard_originals(transform: Transform, kind: str) -> None:
                 if earlier.changed == original:
                     earlier.changed = entry.changed
             entry.original = None
-            if not original.users:
+            # Importers keep their Actions by fake users; an asset is kept on purpose.
+            if original.users == int(original.use_fake_user) and original.asset_data is None:
                 bpy.data.actions.remove(original)

@@ -13,17 +13,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from ...motion import KEYFRAME_MODES, Poses, prepare
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
-from ...motion.poses import beyond
 from ...motion.quaternions import multiply
+from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
 from .bodies import differ, key_poses, location_axes, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
+from .key_speeds import MEASURED, corrected, end_slopes, tangents_and_lacks
+from .neighbours import meeting, with_neighbours
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
 
 AT_ONCE = 131072
@@ -41,7 +44,7 @@ SMOOTH = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
 
 if any(mode.behind > 1 or mode.ahead > 1 for mode in KEYFRAME_MODES.values()):
     raise NotImplementedError(
-        "a mode for keyframes can look one key behind and ahead of a segment: see _with_neighbours"
+        "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours"
     )
 
 
@@ -227,7 +230,9 @@ def _move(
     counts, on_keys, owners = _counts(sources, frames)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
     original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
-    ends = _Ends.of(start, end, segments, smooth=np.isin(modes, SMOOTH))
+    smooth = np.isin(modes, SMOOTH)
+    tangents, lacks = _at_keys(start, end, segments, smooth)
+    ends = _Ends.of(start, end, segments, smooth, tangents)
 
     every_frame = np.concatenate(frames)
     for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
@@ -236,7 +241,10 @@ def _move(
         progress = progress[0] - offsets[some].repeat(counts[some])
         turn_into_quaternions(native[:, place], order)
         default = original[:, ends.owners[some]]
-        ends.keep_even(some, counts[some], every_frame[place], progress)
+        if lacks is not None:
+            first, last = (rows.repeat(counts[some]) for rows in ends.times[some].T)
+            elapsed = (every_frame[place] - first) / np.where(last > first, last - first, np.inf)
+            progress = corrected(progress, elapsed, lacks[:, some].repeat(counts[some], axis=1))
         _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = original[:, owners]
@@ -288,11 +296,11 @@ class _Ends:
     keys: Poses
     """The poses at both, shape (S, 2)."""
 
-    even: np.ndarray
-    """Whether a smooth mode has its own timing, even from key to key, shape (S,)."""
-
     around: tuple[np.ndarray, Poses] | None
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
+
+    tangents: np.ndarray | None
+    """How long the tangents of smooth modes are at both, shape (2, S); None where all are 1."""
 
     axes: np.ndarray | None
     """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
@@ -301,33 +309,25 @@ class _Ends:
     """What each mode makes of all segments, once it has been asked for."""
 
     @classmethod
-    def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> _Ends:
+    def of(
+        cls,
+        start: np.ndarray,
+        end: np.ndarray,
+        segments: list[tuple[Source, slice]],
+        smooth: np.ndarray,
+        tangents: np.ndarray | None,
+    ) -> _Ends:
         """From the channels (10, S) at both ends, and which of the segments have a smooth mode."""
         sources = [source for source, _ in segments]
-        owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
-        times = np.stack(
-            [
-                np.concatenate([source.key_frames[:-1] for source in sources]),
-                np.concatenate([source.key_frames[1:] for source in sources]),
-            ],
-            axis=1,
-        )
+        owners, times = _owners_and_times(segments)
         keys = key_poses(start, end, np.stack([source.original for source in sources], axis=1)[:, owners], sources[0])
         axes = location_axes(sources, owners)
         if axes is not None:
             keys = replace(keys, positions=np.einsum("sij,skj->ski", axes, keys.positions))
         if not smooth.any():
-            return cls(owners, times, keys, smooth, None, axes)
+            return cls(owners, times, keys, None, None, axes)
         holds = np.concatenate([source.holds for source in sources])
-        plain = np.concatenate([source.is_plain for source in sources])
-        return cls(owners, times, keys, smooth & plain, _with_neighbours(owners, times, keys, holds), axes)
-
-    def keep_even(self, some: slice, counts: np.ndarray, frames: np.ndarray, progress: np.ndarray) -> None:
-        """Let progress (m,) be even in time where a smooth mode has it so."""
-        if self.even[some].any():
-            first, last = (rows.repeat(counts) for rows in self.times[some].T)
-            inside = self.even[some].repeat(counts) & (frames > first) & (frames < last)
-            np.divide(frames - first, last - first, out=progress, where=inside)
+        return cls(owners, times, keys, with_neighbours(owners, times, keys, holds), tangents, axes)
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
@@ -335,47 +335,46 @@ class _Ends:
         Positions run along the axes that location does.
         """
         axes = None if self.axes is None else self.axes[some].repeat(counts, axis=0)
-        smooth = KEYFRAME_MODES[mode].is_smooth
         if mode not in self.prepared:
-            even = np.broadcast_to((0.0, 1.0), self.times.shape)
-            self.prepared[mode] = prepare(*(self.around if smooth else (even, self.keys)), mode)
-        if smooth:
+            self.prepared[mode] = self._prepare(mode)
+        if KEYFRAME_MODES[mode].is_smooth:
             # Of the three segments between four keys the one in the middle.
             some = slice(3 * some.start, 3 * some.stop)
             counts = np.multiply.outer(counts, (0, 1, 0)).ravel()
         poses = self.prepared[mode](counts, progress, some)
         return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
 
-
-def _with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: np.ndarray) -> tuple[np.ndarray, Poses]:
-    """Frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
-
-    Where there is none, or a cycle jumps, the motion goes on as in the segment; where a segment holds, it rests.
-    """
-    rows = _packed(keys)
-    previous, following = _packed(beyond(keys[:, 0], keys[:, 1])), _packed(beyond(keys[:, 1], keys[:, 0]))
-    # Between two keys on one frame there is nothing, and what is on either side meets there.
-    lasts = times[:, 1] > times[:, 0]
-    duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
-    left, right = np.flatnonzero(lasts)[:-1], np.flatnonzero(lasts)[1:]
-    meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
-    left, right = left[meet], right[meet]
-    previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
-    following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
-    before, behind = duration.copy(), duration.copy()
-    before[right], behind[left] = duration[left], duration[right]
-    start, end = times[:, 0], np.where(lasts, times[:, 1], times[:, 0] + duration)
-    four = np.stack((previous, rows[:, 0], rows[:, 1], following), axis=1)
-    return (
-        np.stack((start - before, start, end, end + behind), axis=1),
-        Poses(four[..., :3], four[..., 3:7], None if keys.scales is None else four[..., 7]),
-    )
+    def _prepare(self, mode: str) -> Callable[..., Poses]:
+        if not KEYFRAME_MODES[mode].is_smooth:
+            return prepare(np.broadcast_to((0.0, 1.0), self.times.shape), self.keys, mode)
+        if self.tangents is None:
+            return prepare(*self.around, mode)
+        return prepare_within(partial(KEYFRAME_MODES[mode].curves, tangents=self.tangents[..., None]), *self.around)
 
 
-def _packed(poses: Poses) -> np.ndarray:
-    """Positions, quaternions and scales in one array (..., 7 or 8)."""
-    scales = () if poses.scales is None else (poses.scales[..., None],)
-    return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)
+def _owners_and_times(segments: list[tuple[Source, slice]]) -> tuple[np.ndarray, np.ndarray]:
+    """The number of the source of each segment, shape (S,), and the frames of both its keys, shape (S, 2)."""
+    owners = np.repeat(np.arange(len(segments)), [place.stop - place.start for _, place in segments])
+    firsts, lasts = ([source.key_frames[part] for source, _ in segments] for part in (slice(-1), slice(1, None)))
+    return owners, np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
+
+
+def _at_keys(
+    start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Return `tangents_and_lacks` of smooth segments that have handles; None where there are none."""
+    sources = [source for source, _ in segments]
+    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
+    if not has_handles.any():
+        return None, None
+    owners, times = _owners_and_times(segments)
+    moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
+    frames = [moments[place].ravel() for _, place in segments]
+    measured = _sampled(_each(sources, map(len, frames)), frames).reshape(len(start), -1, len(MEASURED))
+    pairs = meeting(owners, times, start, end)
+    slopes = end_slopes(start, end, measured)
+    tangents, lacks = tangents_and_lacks(slopes, end - start, times, pairs, sources[0].order is None)
+    return np.where(has_handles, tangents, 1.0), np.where(has_handles, lacks, 0.0)
 
 
 def _sampled(

@@ -253,9 +253,10 @@ class Source:
         return np.all(self._interpolations == CONSTANT, axis=0)
 
     @cached_property
-    def is_plain(self) -> np.ndarray:
-        """Whether no channel is eased in a segment, nor holds, shape (n - 1,)."""
-        return np.all((self._interpolations == LINEAR) | (self._interpolations == BEZIER), axis=0)
+    def has_handles(self) -> np.ndarray:
+        """Whether handles shape a segment, and no easing does nor a hold, shape (n - 1,)."""
+        codes = self._interpolations
+        return np.all((codes == LINEAR) | (codes == BEZIER), axis=0) & np.any(codes == BEZIER, axis=0)
 
     @cached_property
     def _interpolations(self) -> np.ndarray:

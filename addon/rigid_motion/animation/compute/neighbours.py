@@ -1,0 +1,45 @@
+"""The keys beside a segment, which a smooth mode looks at: arrays of S segments, one behind the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...motion import Poses
+from ...motion.poses import beyond
+
+
+def with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: np.ndarray) -> tuple[np.ndarray, Poses]:
+    """Frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
+
+    Where there is none, or a cycle jumps, the motion goes on as in the segment; where a segment holds, it rests.
+    """
+    rows = _packed(keys)
+    previous, following = _packed(beyond(keys[:, 0], keys[:, 1])), _packed(beyond(keys[:, 1], keys[:, 0]))
+    # Between two keys on one frame there is nothing, and what is on either side meets there.
+    lasts = times[:, 1] > times[:, 0]
+    duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
+    left, right = meeting(owners, times, rows[:, 0].T, rows[:, 1].T)
+    previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
+    following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
+    before, behind = duration.copy(), duration.copy()
+    before[right], behind[left] = duration[left], duration[right]
+    start, end = times[:, 0], np.where(lasts, times[:, 1], times[:, 0] + duration)
+    four = np.stack((previous, rows[:, 0], rows[:, 1], following), axis=1)
+    return (
+        np.stack((start - before, start, end, end + behind), axis=1),
+        Poses(four[..., :3], four[..., 3:7], None if keys.scales is None else four[..., 7]),
+    )
+
+
+def meeting(owners: np.ndarray, times: np.ndarray, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The segments (p,) before and after each key at which two of them meet: with the values (., S) that both have."""
+    lasts = np.flatnonzero(times[:, 1] > times[:, 0])
+    left, right = lasts[:-1], lasts[1:]
+    meet = (owners[right] == owners[left]) & np.all(start[:, right] == end[:, left], axis=0)
+    return left[meet], right[meet]
+
+
+def _packed(poses: Poses) -> np.ndarray:
+    """Positions, quaternions and scales in one array (..., 7 or 8)."""
+    scales = () if poses.scales is None else (poses.scales[..., None],)
+    return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)

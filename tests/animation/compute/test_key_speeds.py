@@ -1,0 +1,159 @@
+"""How fast Smooth Screw runs along its path: as the easing and the handles of its keys say."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import set_mode
+from rigid_motion.animation.actions.reading import keyed_in
+from rigid_motion.animation.actions.slots import slot_transforms_of
+from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.rigs import new_rig
+from tests.animation.oracle import curves_of, matrices, shown_worlds
+from tests.animation.scenes import new_object
+
+INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]
+
+POSES = [
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+    ((1.0, 0.4, -0.3), (0.9, 0.1, -0.2, 0.37)),
+    ((1.9, 1.5, 0.1), (0.6, 0.3, -0.3, 0.67)),
+    ((3.5, 1.9, 0.2), (0.2, 0.5, -0.3, 0.78)),
+]
+
+
+def keyed(frames, poses=POSES, *, interpolation: str | None = None, carrier=None):
+    """Something with keys as I sets them, with Blender's default handles."""
+    carrier = new_object() if carrier is None else carrier
+    for frame, (location, quaternion) in zip(frames, poses, strict=False):
+        carrier.location, carrier.rotation_quaternion = location, quaternion / np.linalg.norm(quaternion)
+        for path in ("location", "rotation_quaternion"):
+            carrier.keyframe_insert(path, frame=frame)
+    for point in points(carrier):
+        if interpolation:
+            point.interpolation = interpolation
+    return carrier
+
+
+def points(carrier) -> list[bpy.types.Keyframe]:
+    return [point for fcurve in curves_of(carrier).values() for point in fcurve.keyframe_points]
+
+
+def set_slopes(carrier, frame: float, factor: float, sides: str = "left right") -> None:
+    """Make the handles of a key so many times as steep."""
+    for point in points(carrier):
+        if point.co.x == frame:
+            for side in sides.split():
+                setattr(point, f"handle_{side}_type", "FREE")
+                handle = getattr(point, f"handle_{side}")
+                handle.y = point.co.y + factor * (handle.y - point.co.y)
+
+
+def worlds(obj, mode: str, frames) -> np.ndarray:
+    set_mode(obj, mode)
+    return shown_worlds([obj], frames)[0]
+
+
+def speeds(obj, frame: float, step: float = 0.02) -> tuple[np.ndarray, np.ndarray]:
+    """The twist by differences, as matrices (4, 4) for a frame, before and after a key."""
+    (source,) = keyed_in(slot_transforms_of([transform_of(obj)]))
+    at = frame + step * np.array((-2.0, -1.0, 0.0, 1.0, 2.0))
+    poses = in_betweens(source, at).wanted
+    world = matrices(poses.positions, poses.quaternions, np.ones((5, 3)))
+    before = (1.5 * world[2] - 2.0 * world[1] + 0.5 * world[0]) / step
+    after = (-1.5 * world[2] + 2.0 * world[3] - 0.5 * world[4]) / step
+    return before, after
+
+
+@pytest.mark.parametrize("easing", ["AUTO", "EASE_IN", "EASE_IN_OUT"])
+@pytest.mark.parametrize("interpolation", INTERPOLATIONS)
+def test_between_two_keys_it_is_the_screw_with_its_easing(live_file, interpolation, easing):
+    obj = keyed((1.0, 25.0), interpolation=interpolation)
+    for point in points(obj):
+        point.easing = easing
+    frames = np.arange(-3.0, 30.0)
+    difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
+    assert np.abs(difference).max() < 1e-5
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.4, 2.5, 40.0])
+def test_handles_that_are_pulled_ease_it_as_they_do_the_screw(live_file, factor):
+    obj = keyed((1.0, 25.0))
+    for point in points(obj):
+        point.handle_left_type = point.handle_right_type = "FREE"
+        point.handle_right.y += factor * 0.1
+        point.handle_left.x -= 3.0
+    frames = np.arange(1.0, 26.0)
+    screw = worlds(obj, "dq_sclerp", frames)
+    assert np.abs(worlds(obj, "motor_spline", frames) - screw).max() < 1e-5
+
+
+def test_it_starts_and_stops_gently_by_default(live_file):
+    obj = keyed((1.0, 13.0, 25.0, 41.0))
+    ways = np.linalg.norm(np.diff(worlds(obj, "motor_spline", np.arange(1.0, 42.0))[:, :3, 3], axis=0), axis=1)
+    assert ways[0] < 0.4 * ways.mean()
+    assert ways[-1] < 0.4 * ways.mean()
+    assert np.abs(np.diff(ways)).max() < 0.25 * ways.max(), "and nowhere suddenly"
+
+
+def test_it_passes_keys_with_automatic_handles_at_one_speed(live_file):
+    obj = keyed((1.0, 13.0, 25.0, 41.0))
+    set_mode(obj, "motor_spline")
+    for frame in (13.0, 25.0):
+        before, after = speeds(obj, frame)
+        assert np.abs(after).max() > 0.01
+        assert np.abs(before - after).max() < 0.02 * np.abs(after).max()
+
+
+def test_it_rests_where_all_handles_are_flat_and_hurries_where_they_are_steep(live_file):
+    lengths = {}
+    for factor in (0.0, 1.0, 1.5):
+        obj = keyed((1.0, 13.0, 25.0, 41.0), carrier=new_object(f"Tool {factor}"))
+        set_slopes(obj, 13.0, factor)
+        set_mode(obj, "motor_spline")
+        lengths[factor] = [np.linalg.norm(side) for side in speeds(obj, 13.0)]
+    assert max(lengths[0.0]) < 1e-3 * min(lengths[1.0])
+    np.testing.assert_allclose(lengths[1.5], 1.5 * np.array(lengths[1.0]), rtol=0.02)
+
+
+def test_handles_that_differ_make_a_corner_in_speed_and_none_in_direction(live_file):
+    obj = keyed((1.0, 13.0, 25.0, 41.0))
+    set_slopes(obj, 13.0, 0.5, "right")
+    set_mode(obj, "motor_spline")
+    before, after = speeds(obj, 13.0)
+    np.testing.assert_allclose(after, 0.5 * before, rtol=0, atol=0.02 * np.abs(before).max())
+
+
+@pytest.mark.parametrize("far", [120.0, 1000.0])
+def test_a_third_key_far_away_does_not_make_the_first_segment_jump(live_file, far):
+    """It is bent towards what follows by no more than 4/27 of its way."""
+    frames = np.arange(1.0, 26.0)
+    before = worlds(keyed((1.0, 25.0)), "motor_spline", frames)
+    after = worlds(keyed((1.0, 25.0, far), carrier=new_object("Other")), "motor_spline", frames)
+    assert np.abs(after - before).max() < 4.0 / 27.0 * np.linalg.norm(np.subtract(POSES[1][0], POSES[0][0]))
+
+
+@pytest.mark.parametrize("interpolation", ["BEZIER", "LINEAR"])
+def test_nothing_swings_beside_a_change_of_space(live_file, interpolation):
+    """Keys on two frames, 5 m apart, as *Child Of* needs them where it is switched."""
+    poses = [*POSES[:2], ((6.0, 0.4, -0.3), POSES[1][1]), ((7.0, 0.9, 0.0), POSES[2][1])]
+    obj = keyed((1.0, 20.0, 21.0, 40.0), poses, interpolation=interpolation)
+    frames = np.arange(1.0, 41.0)
+    difference = worlds(obj, "motor_spline", frames) - worlds(obj, "dq_sclerp", frames)
+    assert np.abs(difference).max() < 1e-5
+
+
+def test_bones_ease_likewise(live_file):
+    rig = new_rig()
+    hand = rig.pose.bones["Hand"]
+    hand.rotation_mode = "QUATERNION"
+    keyed((1.0, 25.0), [((0.0, 0.0, 0.0), POSES[0][1]), ((0.1, 0.2, 0.0), POSES[1][1])], carrier=hand)
+    shown = {}
+    for mode in ("dq_sclerp", "motor_spline"):
+        set_mode(hand, mode)
+        bpy.context.scene.frame_set(7)
+        shown[mode] = np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix)
+    assert np.abs(shown["dq_sclerp"] - shown["motor_spline"]).max() < 1e-5
