@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, Skeleton, interpolate, key_costs, key_search, reduce_keys, shell_error
+from rigid_motion.motion.bodies import Body
 from rigid_motion.motion.key_costs import Costs, Recording
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.segments import prepare_within
 from rigid_motion.motion.skeleton_levels import Level
-from rigid_motion.motion.skeleton_reduction import Body
 from tests.motion.bodies import wandering_body
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 

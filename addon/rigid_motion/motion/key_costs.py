@@ -109,6 +109,11 @@ class Costs:
             found[some] = self._remembered(rows[some])
         return found[:, 0].reshape(segments.shape[:-1]), found[:, 1].reshape(segments.shape[:-1])
 
+    def total(self, keys: np.ndarray) -> float:
+        """Return the cost of all segments between keys (k,) of a recording of one track."""
+        ended = np.pad(keys, self.reach, constant_values=-1)
+        return float(self.of(np.lib.stride_tricks.sliding_window_view(ended, self.keys))[0].sum())
+
     def effort(self, segments: np.ndarray) -> float:
         """How many poses are to be looked at, at most, for segments (..., keys)."""
         return self.recording.poses_each * _counts(segments.reshape(-1, self.keys), self.reach).sum()

@@ -116,7 +116,7 @@ class Search:
             best = self._better(best, keys)
             found.append(keys.indices)
         if self._is_linkable and tries:
-            linked = linked_keys(self, found)
+            linked = linked_keys(self.costs, found)
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
         return best.indices
@@ -133,7 +133,7 @@ class Search:
         found = [best.indices]
         for other in OTHERS[:tries]:
             found.append(self._first(other).indices)
-        traded = traded_keys(self, found)
+        traded = traded_keys(self.costs, found)
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     @property

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from .bodies import Body
 from .key_costs import Recording
 from .measures import largest_displacement
 from .piecewise import blocks
 from .poses import PackedPoses, Poses, inverse, placed, reshaped
 from .quaternions import components, conjugate, cross, matrices, multiply
-
-if TYPE_CHECKING:
-    from .skeleton_reduction import Body
 
 AT_ONCE = 2**13
 """Joints that are looked at in one go, for the processor's caches."""

@@ -11,23 +11,20 @@ share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe s
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .bodies import Body
 from .checks import check_poses, check_recording, check_wishes
 from .key_costs import Recording
 from .key_search import Keys, Search
 from .measures import shell_error
-from .modes import interpolate, mode_named
+from .modes import mode_named
 from .poses import LIMIT, PackedPoses, Poses, reshaped
-from .quaternions import align_signs, normalise
+from .quaternions import align_signs
 from .skeleton_levels import Level
 from .skeletons import Skeleton
-
-SOME_TURN = 1e-12
-"""What a mean of quaternions is turned by, so that it has a length."""
 
 TINY = 1e-30
 """Stands for a weight of zero."""
@@ -141,95 +138,32 @@ def reduce_skeleton_keys(
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
-        keys = body.key_poses(tolerance, budget, tries)
+        keys = _key_poses(body, tolerance, budget, tries)
         every = np.arange(len(times))
         return tuple(keys if moves else every for moves in free.tolist())
-    return body.own_keys(tolerance) if tolerance is not None else body.own_keys_within(budget)
+    return _OwnKeys(body, tolerance).found() if tolerance is not None else _own_keys_within(body, budget)
 
 
-class Body:
-    """The recording of a body, and what it is measured by. Errors are weighted."""
+def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
+    if len(body.times) <= 2:
+        return np.arange(len(body.times))
+    search = Search(_WholeBody(body, tolerance or 1.0))
+    return search.within(tries) if tolerance is not None else search.within_budget(budget)
 
-    def __init__(
-        self,
-        times: np.ndarray,
-        poses: Poses,
-        skeleton: Skeleton,
-        mode: str,
-        radii: np.ndarray,
-        weights: np.ndarray,
-        free: np.ndarray,
-    ) -> None:
-        self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
-        self.radii, self.weights, self.free = radii, weights, free
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.truth = skeleton.in_root_space(poses)
-        for joint in range(len(skeleton)):
-            check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
 
-    def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
-        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
-        there = self.skeleton.in_root_space(shown)
-        if samples is None:
-            return shell_error(there, self.truth, self.radii[:, None]) * self.weights
-        return shell_error(there, self.packed_truth[samples], self.radii[:, None]) * self.weights[:, samples]
-
-    @cached_property
-    def packed_truth(self) -> PackedPoses:
-        return PackedPoses(self.truth)
-
-    def shown(self, joint: int, keys: np.ndarray) -> Poses:
-        """What a joint does between keys (k,), shape (n,)."""
-        return interpolate(self.times[keys], self.poses[joint][keys], self.times, self.mode)
-
-    def key_poses(self, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
-        if len(self.times) <= 2:
-            return np.arange(len(self.times))
-        search = Search(_WholeBody(self, tolerance or 1.0))
-        return search.within(tries) if tolerance is not None else search.within_budget(budget)
-
-    def own_keys_within(self, budget: int) -> tuple[np.ndarray, ...]:
-        """The keys of the smallest tolerance that so many can keep to, by bisection."""
-        best = tuple(_OwnKeys(self, math.inf).keys)
-        high = math.log(max(float(self.errors(self.at_rest()).max()), TINY))
-        low = high - LEAST
-        for _ in range(BUDGET_STEPS):
-            middle = 0.5 * (low + high)
-            keys = self.own_keys(math.exp(middle))
-            if sum(len(keys[joint]) for joint in np.flatnonzero(self.free).tolist()) <= budget:
-                high, best = middle, keys
-            else:
-                low = middle
-        return best
-
-    def own_keys(self, tolerance: float) -> tuple[np.ndarray, ...]:
-        return _OwnKeys(self, tolerance).found()
-
-    @cached_property
-    def middles(self) -> np.ndarray:
-        """The sample of each joint that is nearest to its mean pose, shape (joints,)."""
-        scales = self.poses.scales
-        means = Poses(
-            self.poses.positions.mean(axis=1, keepdims=True),
-            normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + SOME_TURN),
-            None if scales is None else scales.mean(axis=1, keepdims=True),
-        )
-        return np.argmin(shell_error(self.poses, _spread(means, self.poses), self.sizes), axis=1)
-
-    def at_rest(self) -> Poses:
-        """Every joint in its middle pose all the time, shape (joints, n)."""
-        joints = np.arange(len(self.skeleton))
-        return _spread(self.poses[joints[:, None], self.middles[:, None]], self.poses)
-
-    @cached_property
-    def sizes(self) -> np.ndarray:
-        """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
-        found = np.empty(self.poses.shape)
-        for joint, below in enumerate(self.skeleton.below):
-            away = self.truth.positions[below] - self.truth.positions[joint]
-            balls = self.radii[below, None] * (1.0 if self.truth.scales is None else self.truth.scales[below])
-            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls).max(axis=0)
-        return found
+def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:
+    """The keys of the smallest tolerance that so many can keep to, by bisection."""
+    best = tuple(_OwnKeys(body, math.inf).keys)
+    high = math.log(max(float(body.errors(body.at_rest()).max()), TINY))
+    low = high - LEAST
+    for _ in range(BUDGET_STEPS):
+        middle = 0.5 * (low + high)
+        keys = _OwnKeys(body, math.exp(middle)).found()
+        if sum(len(keys[joint]) for joint in np.flatnonzero(body.free).tolist()) <= budget:
+            high, best = middle, keys
+        else:
+            low = middle
+    return best
 
 
 class _WholeBody(Recording):
@@ -364,15 +298,6 @@ class _OwnKeys:
         for joint in np.flatnonzero(wanted.any(axis=1) & self.body.free).tolist():
             ends = (0, len(self.body.times) - 1)
             self._show(joint, np.union1d(self.keys[joint], (*ends, *np.flatnonzero(wanted[joint]))))
-
-
-def _spread(one: Poses, over: Poses) -> Poses:
-    """Poses (joints, 1) for all moments of others (joints, n)."""
-    return Poses(
-        np.broadcast_to(one.positions, over.positions.shape),
-        np.broadcast_to(one.quaternions, over.quaternions.shape),
-        None if one.scales is None else np.broadcast_to(one.scales, over.scales.shape),
-    )
 
 
 def _moves(poses: Poses) -> np.ndarray:
