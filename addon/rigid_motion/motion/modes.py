@@ -163,7 +163,8 @@ def interpolate(
     mode : str
         A name in `MODES`. All are written out, with their sources, in `docs/conventions.md`.
     extrapolate : bool
-        Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold.
+        Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold. Scales
+        stay positive: they stop at `1e40` and `1e-40`, and `cga_lerp` with growth stops before it has no scale.
 
     Returns
     -------
@@ -241,7 +242,7 @@ def in_betweens(
         How many poses are wanted of each segment.
     progress : array-like, shape (m,), m the sum of the counts
         How far each has come in its segment, from 0 at the first key to 1 at the second. Where it passes them, the
-        motion of the segment goes on.
+        motion of the segment goes on, as in `interpolate` with `extrapolate`.
     mode : str
         A name in `MODES`.
 
