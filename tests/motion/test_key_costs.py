@@ -81,7 +81,7 @@ def test_a_joint_is_as_far_off_as_what_hangs_on_it(scaled, monkeypatch):
             joint, moment = joints[sample // 20], sample % 20
             tried = shown.copy()
             tried[joint] = poses[joint]
-            off = _errors_of(body, tried)[skeleton.below[joint], moment]
+            off = _errors_of(body, tried)[skeleton.below(joint), moment]
             assert error == pytest.approx(off.max() / 0.5, rel=1e-9, abs=1e-12)
 
 

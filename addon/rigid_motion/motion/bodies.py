@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .checks import check_recording
+from .checks import check_body
 from .measures import shell_error
 from .modes import interpolate
 from .poses import PackedPoses, Poses
@@ -34,8 +34,7 @@ class Body:
         self.radii, self.weights, self.free = radii, weights, free
         with np.errstate(over="ignore", invalid="ignore"):
             self.truth = skeleton.in_root_space(poses)
-        for joint in range(len(skeleton)):
-            check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
+        check_body(times, self.truth, ", in the root's space")
 
     def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
@@ -71,11 +70,13 @@ class Body:
     @cached_property
     def sizes(self) -> np.ndarray:
         """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
-        found = np.empty(self.poses.shape)
-        for joint, below in enumerate(self.skeleton.below):
+        balls = np.broadcast_to(self.radii[:, None], self.poses.shape)
+        balls = balls if self.truth.scales is None else balls * self.truth.scales
+        found = balls.copy()
+        for joint in np.flatnonzero(self.skeleton.sizes > 1).tolist():
+            below = self.skeleton.below(joint)
             away = self.truth.positions[below] - self.truth.positions[joint]
-            balls = self.radii[below, None] * (1.0 if self.truth.scales is None else self.truth.scales[below])
-            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls).max(axis=0)
+            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls[below]).max(axis=0)
         return found
 
 

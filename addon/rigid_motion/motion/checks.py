@@ -44,6 +44,17 @@ def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
     check_times(times, whose)
 
 
+def check_body(times: np.ndarray, poses: Poses, where: str = "") -> None:
+    """Raise a ValueError that names the first joint and sample of poses (joints, n) that is wrong."""
+    check_poses(poses, "poses")
+    numbers = [poses.positions, poses.quaternions] + ([] if poses.scales is None else [poses.scales])
+    sound = all(np.all(np.abs(rows) < LIMIT) for rows in numbers) and poses.quaternions.any(axis=-1).all()
+    sound &= poses.scales is None or bool(np.all(poses.scales > 1.0 / LIMIT))
+    # Which one is wrong is looked for only where something is: bodies may have many joints.
+    for joint in range(1 if sound else len(poses)):
+        check_recording(times, poses[joint], f"joint {joint}{where}, ")
+
+
 def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
     """Which of so many samples are keys, as rising numbers, shape (k,), k at least 2.
 

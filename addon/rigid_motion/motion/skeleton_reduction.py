@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Body
-from .checks import check_poses, check_recording, check_wishes
+from .checks import check_body, check_poses, check_wishes
 from .key_costs import Recording
 from .key_search import Keys, Search
 from .measures import shell_error
@@ -31,6 +31,9 @@ TINY = 1e-30
 
 BUDGET_STEPS = 9
 """Of a search for the tolerance that a budget of keys of their own can keep to."""
+
+DEEPEST = 1000
+"""How many joints a joint with keys of its own may hang on: the work grows with the square of it."""
 
 LEAST = 12.0
 """How much smaller than that of a body at rest the tolerance may be, by its logarithm."""
@@ -90,8 +93,8 @@ def reduce_skeleton_keys(
     TypeError
         Where the recording is no `Poses`.
     ValueError
-        As `reduce_keys` does, and where joints hang on one another in a circle, or radii or weights make no sense. The
-        message names the joint.
+        As `reduce_keys` does, and where joints hang on one another in a circle, or without `shared` in chains of more
+        than 1000, or radii or weights make no sense. The message names the joint.
 
     See Also
     --------
@@ -123,8 +126,7 @@ def reduce_skeleton_keys(
     skeleton, times = Skeleton(parents), np.asarray(times, dtype=np.float64)
     if poses.shape != (len(skeleton), *times.shape):
         raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
-    for joint in range(len(skeleton)):
-        check_recording(times, poses[joint], f"joint {joint}, ")
+    check_body(times, poses)
     radii = _one_for_each(radius, "radius", (len(skeleton),))
     weights = _one_for_each(1.0 if weights is None else weights, "weight", (len(skeleton),), poses.shape)
     if not np.any(weights > 0.0):
@@ -135,6 +137,12 @@ def reduce_skeleton_keys(
         raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     if len(times) <= 1:
         return (np.arange(len(times)),) * len(skeleton)
+    if not shared and skeleton.depths.max() > DEEPEST:
+        joint = int(skeleton.depths.argmax())
+        raise ValueError(
+            f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
+            f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
+        )
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
@@ -208,8 +216,7 @@ class _OwnKeys:
         body, count = self.body, len(self.body.times)
         sizes, shares = self._sizes_and_shares()
         rests = np.all(shell_error(body.at_rest(), body.poses, sizes) <= shares, axis=1)
-        for joint in np.flatnonzero(rests & body.free).tolist():
-            self._show(joint, self.keys[joint])
+        self.shown[rests & body.free] = body.at_rest()[rests & body.free]
         moving = np.flatnonzero(~rests & body.free)
         if len(moving):
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
@@ -230,7 +237,9 @@ class _OwnKeys:
         for joints in skeleton.levels[:0:-1]:
             parents = skeleton.parents[joints]
             np.maximum.at(beneath, parents, moves[parents] + beneath[joints])
-        weights = np.array([body.weights[below].max(axis=0) for below in skeleton.below])
+        weights = body.weights.copy()
+        for joints in skeleton.levels[:0:-1]:
+            np.maximum.at(weights, skeleton.parents[joints], weights[joints])
         longest_chain = np.maximum(above + beneath - moves, 1)
         shares = np.full(body.poses.shape, self.tolerance) / longest_chain[:, None]
         shares /= np.maximum(weights, TINY)
