@@ -47,7 +47,7 @@ PRICE_STEPS = 10
 """Of bisection for the price."""
 
 
-def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
+def linked_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
     """The fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
 
     Parameters
@@ -56,18 +56,20 @@ def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     found : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
+    tolerance : float
+        In tolerances of the recording.
     """
     for width in WIDTHS[costs.reach]:
         candidates = _beside(costs, found, width)
-        links = _links(costs, candidates, found, 1.0 if costs.reach == 0 else ALIVE, ALIVE**2)
+        links = _links(costs, candidates, found, (1.0 if costs.reach == 0 else ALIVE) * tolerance, ALIVE**2 * tolerance)
         if links is not None:
             _, peak = costs.of(links)
-            links = links[peak <= WITHIN]
+            links = links[peak <= WITHIN * tolerance]
             return _shortest(links, np.ones(len(links)), candidates)
     return min(found, key=len)
 
 
-def traded_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
+def traded_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
     """The fewest keys that prices allow, or the first that were found; at all costs that are too high.
 
     Parameters
@@ -76,9 +78,11 @@ def traded_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
         Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
     found : list of array of int
         Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
+    tolerance : float
+        In tolerances of the recording.
     """
     counts, totals = [len(keys) for keys in found], [costs.total(keys) for keys in found]
-    best, least, allowed = found[0], totals[0], float(len(costs.recording.times))
+    best, least, allowed = found[0], totals[0], tolerance**2 * len(costs.recording.times)
     if max(counts) == min(counts) or max(totals) == min(totals):
         return best
     price = (max(totals) - min(totals)) / (max(counts) - min(counts))

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
-from .checks import check_poses
-from .poses import LIMIT, SHORTEST, Poses
+from .checks import check_flag, check_poses
+from .poses import LIMIT, SHORTEST, Poses, numbers
 from .segments import Curves, Segments, interpolate_along, prepare_within
 
 
@@ -135,7 +135,9 @@ KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if
 
 
 def mode_named(name: str) -> Mode:
-    """The mode of a name in `MODES`. Raises ValueError for another, and says which there are."""
+    """The mode of a name in `MODES`. Raises ValueError for another, and says which there are, TypeError for no name."""
+    if not isinstance(name, str):
+        raise TypeError(f"mode is {name!r}: give the name of one, such as 'dq_sclerp'")
     if name not in MODES:
         raise ValueError(no_such_mode(name, MODES))
     return MODES[name]
@@ -200,7 +202,8 @@ def interpolate(
     [[0.5, 0.0, 0.0]]
     """
     curves_of_mode = mode_named(mode).curves
-    key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    key_times, times = numbers(key_times, "key times"), numbers(times, "times")
+    check_flag(extrapolate, "extrapolate")
     keys = _checked(key_times, keys)
     if keys.shape[-1] == 1:
         # A motion with a single key is a rest at all times: the segment from that key to itself.
@@ -313,7 +316,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     [[1.0, 0.5, 0.0]]
     """
     curves_of_mode = mode_named(mode).curves
-    key_times = np.asarray(key_times, dtype=np.float64)
+    key_times = numbers(key_times, "key times")
     keys = _checked(key_times, keys)
     if keys.shape[-1] < 2:
         raise ValueError("in-betweens need at least two keys")
@@ -322,7 +325,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
 
     def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
         """The poses (m,) of the selected segments, by how many are wanted of each and how far each of them is."""
-        counts, progress = np.asarray(counts), np.asarray(progress, dtype=np.float64)
+        counts, progress = np.asarray(counts), numbers(progress, "progress")
         if counts.size and (not np.issubdtype(counts.dtype, np.integer) or counts.min() < 0):
             raise ValueError("counts of in-betweens need to be whole numbers from 0 on, one for each segment")
         expected = shape if selected == slice(None) else (len(range(*selected.indices(math.prod(shape)))),)

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .bodies import Body
-from .checks import check_body, check_poses, check_wishes
+from .checks import check_body, check_flag, check_poses, check_wishes
 from .key_costs import Recording
 from .key_search import Keys, Search
 from .measures import shell_error
 from .modes import mode_named
-from .poses import LIMIT, PackedPoses, Poses, reshaped
+from .poses import LIMIT, PackedPoses, Poses, numbers, reshaped
 from .quaternions import align_signs
 from .skeleton_levels import Level
 from .skeletons import Skeleton
@@ -121,9 +121,10 @@ def reduce_skeleton_keys(
     [[0], [0, 29]]
     """
     mode_named(mode)
-    check_wishes(tolerance, budget)
+    check_wishes(tolerance, budget, tries)
+    check_flag(shared, "shared")
     check_poses(poses, "poses")
-    skeleton, times = Skeleton(parents), np.asarray(times, dtype=np.float64)
+    skeleton, times = Skeleton(parents), numbers(times, "times")
     if poses.shape != (len(skeleton), *times.shape):
         raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
     check_body(times, poses)
@@ -156,7 +157,7 @@ def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: i
     if len(body.times) <= 2:
         return np.arange(len(body.times))
     search = Search(_WholeBody(body, tolerance or 1.0))
-    return search.within(tries) if tolerance is not None else search.within_budget(budget)
+    return search.within(tries) if tolerance is not None else search.within_budget(budget, tries)
 
 
 def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:
@@ -222,7 +223,7 @@ class _OwnKeys:
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
             size, share = sizes[moving].ravel(), shares[moving].ravel()
             search = Search(Recording(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
-            self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
+            self._take(moving, search.thinned(search.started(1.0), 1.0))
 
     def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
         """How large what hangs on each joint is and how far it may be off by that joint, both (joints, n).
@@ -328,14 +329,17 @@ def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
     return np.broadcast_to(mask, (joints,))
 
 
-def _one_for_each(numbers: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
+def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
     """A number for each joint or sample, or one for all: no damage and not below zero."""
-    numbers = np.asarray(numbers, dtype=np.float64)
-    if numbers.shape not in ((), *shapes):
+    given = numbers(given, f"{name}s")
+    if given.shape not in ((), *shapes):
         wanted = " or ".join(map(str, shapes))
-        raise ValueError(f"{name} of shape {numbers.shape}: give one number, or an array of shape {wanted}")
-    numbers = np.broadcast_to(numbers, shapes[0]) if numbers.ndim == 0 else numbers
-    if not (valid := (numbers >= 0.0) & (numbers < LIMIT)).all():
+        raise ValueError(f"{name} of shape {given.shape}: give one number, or an array of shape {wanted}")
+    given = np.broadcast_to(given, shapes[0]) if given.ndim == 0 else given
+    if not (valid := (given == 0.0) | ((given > 1.0 / LIMIT) & (given < LIMIT))).all():
         joint = np.argwhere(~valid)[0]
-        raise ValueError(f"joint {joint[0]} has a {name} of {numbers[tuple(joint)]}")
-    return numbers
+        raise ValueError(
+            f"joint {joint[0]} has a {name} of {given[tuple(joint)]}: give 0, or a number from {1.0 / LIMIT:g} to "
+            f"{LIMIT:g}"
+        )
+    return given
