@@ -223,7 +223,7 @@ class _OwnKeys:
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
             size, share = sizes[moving].ravel(), shares[moving].ravel()
             search = Search(Recording(times, reshaped(body.poses[moving], -1), body.mode, size, share, starts))
-            self._take(moving, search.thinned(search.started(1.0), 1.0))
+            self._take(moving, search.thinned(search.measured(np.arange(len(times))), 1.0))
 
     def _sizes_and_shares(self) -> tuple[np.ndarray, np.ndarray]:
         """How large what hangs on each joint is and how far it may be off by that joint, both (joints, n).
