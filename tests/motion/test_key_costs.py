@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES, Poses, Skeleton, interpolate, key_costs, key_search, reduce_keys, shell_error
+from rigid_motion.motion.bodies import Body
 from rigid_motion.motion.key_costs import Costs, Recording
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.segments import prepare_within
 from rigid_motion.motion.skeleton_levels import Level
-from rigid_motion.motion.skeleton_reduction import Body
 from tests.motion.bodies import wandering_body
 from tests.motion.test_reduction import RADIUS, shell_errors, wandering
 
@@ -81,7 +81,7 @@ def test_a_joint_is_as_far_off_as_what_hangs_on_it(scaled, monkeypatch):
             joint, moment = joints[sample // 20], sample % 20
             tried = shown.copy()
             tried[joint] = poses[joint]
-            off = _errors_of(body, tried)[skeleton.below[joint], moment]
+            off = _errors_of(body, tried)[skeleton.below(joint), moment]
             assert error == pytest.approx(off.max() / 0.5, rel=1e-9, abs=1e-12)
 
 

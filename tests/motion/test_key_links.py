@@ -47,7 +47,7 @@ def test_the_shortest_way_is_that_of_an_exhaustive_programme(mode, seed):
     times, poses = wandering(18, seed, (0.0, 0.01)[seed % 2], 40.0)
     search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[seed]))
     samples = np.arange(len(times))
-    links = _links(search, samples, [samples], 1.0, np.inf)
+    links = _links(search.costs, samples, [samples], 1.0, np.inf)
     keys = _shortest(links, np.ones(len(links)), samples)
     assert len(keys) == fewest_of_a_programme(times, poses, mode, TOLERANCES[seed])
     assert 2 < len(keys) < len(times)
@@ -88,7 +88,7 @@ def test_keys_with_a_price_are_the_best_of_their_number(mode, seed):
     search = Search(Recording(times, poses, mode, RADIUS, TOLERANCES[1]), rms=True)
     samples = np.arange(len(times))
     best = search.within(0)
-    keys = traded_keys(search, [best, samples, np.array((0, len(times) - 1))])
+    keys = traded_keys(search.costs, [best, samples, np.array((0, len(times) - 1))])
     assert search.measured(keys).cost.sum() <= len(times)
     assert 2 < len(keys) <= len(best)
     if len(keys) < len(best):

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, interpolate
+from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, in_betweens, interpolate
 from rigid_motion.motion.quaternions import angle_between, multiply, normalise, rotate
 from tests.thoroughness import tried
 
@@ -156,6 +156,43 @@ def test_end_poses_hold_outside_the_keys(mode, motion):
     key_times, keys = motion
     poses = interpolate(key_times, keys, [key_times[0] - 5.0, key_times[-1] + 5.0], mode)
     assert_close(poses, keys[[0, -1]], 1e-12)
+
+
+@every_mode
+@settings(max_examples=tried(60))
+@given(
+    motions(scaled=True),
+    st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6),
+    st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=6),
+)
+def test_outside_of_the_keys_scales_stay_positive_and_all_is_finite(mode, motion, logarithms, progress):
+    key_times, keys = motion
+    count = len(key_times)
+    for scales in (keys.scales, np.exp(2.0 * np.resize(logarithms, count))):
+        growing = Poses(keys.positions, keys.quaternions, scales)
+        times = key_times[0] + np.array(progress) * (key_times[-1] - key_times[0])
+        beyond = interpolate(key_times, growing, times, mode, extrapolate=True)
+        eased = in_betweens(key_times, growing, [len(progress)] * (count - 1), np.tile(progress, count - 1), mode)
+        for poses in (beyond, eased):
+            assert np.all(poses.scales > 0.0)
+            assert all(np.isfinite(rows).all() for rows in (poses.positions, poses.quaternions, poses.scales))
+
+
+def test_a_versor_blend_with_growth_stops_half_way_to_where_it_has_no_scale():
+    keys = Poses([[0, 0, 0], [1, 0, 0]], [[1, 0, 0, 0]] * 2, [1.0, 10.0])
+    root = np.sqrt(10.0)
+    pole = 0.5 + 0.5 * (root + 1.0) / (root - 1.0)
+    u = np.array([0.0, 0.5, 0.99, 1.0, 1.01, 2.0, 1e6]) * (pole - 1.0) + 1.0
+    shown = interpolate([0, 1], keys, u, "cga_lerp", extrapolate=True)
+    assert np.all(np.diff(shown.scales[:2]) > 0.0)
+    assert shown.scales[1:] == pytest.approx(shown.scales[1])
+    blend = ((1.0 - u[1]) + u[1] * root) / ((1.0 - u[1]) + u[1] / root)
+    assert shown.scales[1] == pytest.approx(blend)
+    # Where nothing grows, it never stops.
+    still = interpolate(
+        [0, 1], Poses(keys.positions, keys.quaternions, [3.0, 3.0]), [50.0], "cga_lerp", extrapolate=True
+    )
+    assert still.positions[0, 0] == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)

@@ -358,3 +358,16 @@ def test_real_bodies_keep_to_the_tolerance_with_fewer_keys(name, mode, shared):
     errors = body_errors(times, poses, parents, keys, mode, np.full(len(parents), 0.03))
     assert errors.max() <= 0.01 * (1.0 + 1e-9)
     assert sum(map(len, keys)) < len(parents) * len(times)
+
+
+def test_a_chain_of_any_length_has_key_poses_and_one_that_is_too_long_no_keys_of_its_own():
+    joints = 1500
+    positions = np.zeros((joints, 5, 3))
+    positions[0, :, 0] = (0.0, 1.0, 0.0, 2.0, 0.0)
+    poses, parents = Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (joints, 5, 1))), np.arange(joints) - 1
+    assert reduce_skeleton_keys(np.arange(5.0), poses, parents, "lerp_slerp", tolerance=0.1, shared=True)[0].size == 5
+    with pytest.raises(ValueError, match=r"joint 1499 hangs on 1499 others, .* 1000 at most: shared=True"):
+        reduce_skeleton_keys(np.arange(5.0), poses, parents, tolerance=0.1)
+    branches = np.append(-1, np.zeros(joints - 1, dtype=int))
+    keys = reduce_skeleton_keys(np.arange(5.0), poses, branches, "lerp_slerp", tolerance=0.1)
+    assert list(map(len, keys)) == [5] + [1] * (joints - 1)

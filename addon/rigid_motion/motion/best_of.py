@@ -13,10 +13,10 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_poses, check_radius, check_recording, key_samples, number
+from .checks import check_poses, check_radius, check_recording, check_tolerance, key_samples
 from .measures import shell_error
-from .modes import KEYFRAME_MODES, interpolate
-from .poses import Poses
+from .modes import KEYFRAME_MODES, interpolate, mode_named
+from .poses import Poses, numbers
 
 ALIKE = 1e-6
 """Errors that differ by less than this share are the same: those of modes that are one motion do."""
@@ -84,13 +84,17 @@ def best_modes(
     """
     if isinstance(modes, str):
         raise ValueError(f"modes to choose from need to be several names: of a single one make a list, [{modes!r}]")
+    if not isinstance(modes, Iterable):
+        raise TypeError(f"modes to choose from are {modes!r}: give a list of names")
     modes = tuple(modes)
+    for mode in modes:
+        mode_named(mode)
     if not modes:
         raise ValueError("there is no mode to choose from")
     check_radius(radius)
-    if tolerance is not None and not number(tolerance, "tolerance") > 0.0:
-        raise ValueError(f"a tolerance of {tolerance} is not a positive number")
-    times = np.asarray(times, dtype=np.float64)
+    if tolerance is not None:
+        check_tolerance(tolerance)
+    times = numbers(times, "times")
     check_recording(times, poses)
     keys = key_samples(keys, len(times))
     samples = slice(keys[0], keys[-1] + 1)
@@ -184,11 +188,16 @@ def interpolate_by_segments(key_times: ArrayLike, keys: Poses, times: ArrayLike,
     [[0.5, 0.0, 0.0], [1.5, 0.207107, 0.0]]
     """
     check_poses(keys, "keys")
-    key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    key_times, times = numbers(key_times, "key times"), numbers(times, "times")
     if key_times.ndim != 1 or times.ndim != 1 or len(key_times) < 2:
         raise ValueError("modes for segments need a row of at least two key times, and a row of times")
     if isinstance(modes, str):
         raise ValueError(f"{modes!r} is a single mode: give one for each segment, or use interpolate")
+    if not isinstance(modes, Iterable):
+        raise TypeError(f"modes are {modes!r}: give a list of names, one for each segment")
+    modes = tuple(modes)
+    for mode in modes:
+        mode_named(mode)
     if len(modes) != len(key_times) - 1:
         raise ValueError(f"{len(modes)} modes do not fit {len(key_times)} keys")
     if keys.shape != key_times.shape:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from numbers import Integral
+import math
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .poses import LIMIT, SHORTEST, Poses
+from .poses import LIMIT, SHORTEST, Poses, numbers
 
 KEYS_WANTED = "give rising numbers of samples, as reduce_keys and decimate return them, or a mask of all samples"
 
@@ -42,6 +43,17 @@ def check_recording(times: np.ndarray, poses: Poses, whose: str = "") -> None:
     if poses.scales is not None and not (sound := (poses.scales > 1.0 / LIMIT) & (poses.scales < LIMIT)).all():
         raise ValueError(f"{whose}sample {int(np.argmin(sound))} has a scale that is not a positive number")
     check_times(times, whose)
+
+
+def check_body(times: np.ndarray, poses: Poses, where: str = "") -> None:
+    """Raise a ValueError that names the first joint and sample of poses (joints, n) that is wrong."""
+    check_poses(poses, "poses")
+    numbers = [poses.positions, poses.quaternions] + ([] if poses.scales is None else [poses.scales])
+    sound = all(np.all(np.abs(rows) < LIMIT) for rows in numbers) and poses.quaternions.any(axis=-1).all()
+    sound &= poses.scales is None or bool(np.all(poses.scales > 1.0 / LIMIT))
+    # Which one is wrong is looked for only where something is: bodies may have many joints.
+    for joint in range(1 if sound else len(poses)):
+        check_recording(times, poses[joint], f"joint {joint}{where}, ")
 
 
 def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
@@ -90,35 +102,61 @@ def key_samples(keys: ArrayLike, samples: int) -> np.ndarray:
     return numbers
 
 
-def check_wishes(tolerance: float | None, budget: int | None) -> None:
-    """A ValueError that says what is wrong with what is asked of key reduction."""
+def check_wishes(tolerance: float | None, budget: int | None, tries: int) -> None:
+    """A TypeError or ValueError that says what is wrong with what is asked of key reduction."""
     if tolerance is None and budget is None:
         raise ValueError("key reduction needs a tolerance or a budget of keys: give one of the two")
     if tolerance is not None and budget is not None:
         raise ValueError("key reduction goes by a tolerance or by a budget of keys: give one of the two, not both")
-    if tolerance is not None and not 1.0 / LIMIT < number(tolerance, "tolerance") < LIMIT:
-        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
-    if budget is not None and (isinstance(budget, bool) or not isinstance(budget, Integral)):
-        raise ValueError(f"a budget of {budget} is no whole number of keys")
-    if budget is not None and budget < 2:
+    if tolerance is not None:
+        check_tolerance(tolerance)
+    if budget is not None and whole_number(budget, "budget") < 2:
         raise ValueError(f"a budget of {budget} keys is too small: a motion begins and ends with one")
+    if whole_number(tries, "tries") < 0:
+        raise ValueError(f"tries is {tries}: give 0 for a single search, or up to 3 for more")
+
+
+def check_tolerance(tolerance: float) -> None:
+    """A TypeError where the tolerance is no number, a ValueError where it is no length."""
+    if not 1.0 / LIMIT < number(tolerance, "tolerance") < LIMIT:
+        raise ValueError(f"a tolerance of {tolerance} is not a positive number from {1.0 / LIMIT:g} to {LIMIT:g}")
 
 
 def check_radius(radius: float) -> None:
-    """A ValueError where the shell's radius is no length: without turns it is zero."""
-    if not 0.0 <= number(radius, "radius") < LIMIT:
-        raise ValueError(f"a radius of {radius} is not a number from 0 to {LIMIT:g}")
+    """A TypeError where the shell's radius is no number, a ValueError where it is no length: without turns it is 0."""
+    if not (1.0 / LIMIT < (given := number(radius, "radius")) < LIMIT or given == 0.0):
+        raise ValueError(f"a radius of {radius} is no length: give 0, or a number from {1.0 / LIMIT:g} to {LIMIT:g}")
 
 
-def check_radii(radii: ArrayLike) -> None:
-    """The same of one radius or many, in an array of any shape."""
-    for radius in np.unique(np.asarray(radii)):
+def check_radii(radii: ArrayLike) -> np.ndarray:
+    """The same of one radius or many, in an array of any shape, which is returned."""
+    if not isinstance(radii, np.ndarray | list | tuple):
+        check_radius(radii)
+    radii = numbers(radii, "radii")
+    for radius in np.unique(radii):
         check_radius(radius)
+    return radii
+
+
+def check_flag(flag: bool, name: str) -> None:
+    """A TypeError where an argument of this name is neither True nor False."""
+    if not isinstance(flag, bool | np.bool_):
+        raise TypeError(f"{name} is {flag!r}: give True or False")
 
 
 def number(value: float, name: str) -> float:
-    """One number, or a ValueError where an argument of this name is none, such as "5mm"."""
+    """One number, or a TypeError where an argument of this name is none, such as "5mm" or True."""
+    is_one = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_one and not (isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf"):
+        raise TypeError(f"a {name} of {value!r} is not a number: give a single one, without quotes or unit")
     try:
         return float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"a {name} of {value!r} is not a number, in the unit of the recording") from None
+    except OverflowError:
+        return math.inf
+
+
+def whole_number(value: int, name: str) -> int:
+    """One whole number, or a TypeError where an argument of this name is none: 1.5, "80" or True."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{name} is {value!r}: give a whole number, such as 3")
+    return int(value)

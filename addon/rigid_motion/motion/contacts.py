@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .poses import numbers
+
 LOW = 0.12
 """How far above the lowest place that any joint gets to what stands is at most, in heights of the body."""
 
@@ -54,7 +56,7 @@ def standing(times: ArrayLike, positions: ArrayLike) -> np.ndarray:
     >>> standing(times, [head, foot]).sum(axis=1).tolist()
     [0, 5]
     """
-    times, positions = np.asarray(times, dtype=np.float64), np.asarray(positions, dtype=np.float64)
+    times, positions = numbers(times, "times"), numbers(positions, "positions")
     if positions.ndim != 3 or (*times.shape, 3) != positions.shape[1:]:
         raise ValueError(f"positions of shape {positions.shape} need the shape (joints, {times.size}, 3)")
     if len(times) < 2:

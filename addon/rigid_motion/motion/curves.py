@@ -19,11 +19,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from .poses import LIMIT
 from .segments import SMALLEST_ANGLE, Curves, Segments
 from .trigonometry import fill_sine_and_cosine
 
 LATE = 2.0
 """How many times as long as the segment before one may take for a stream, before its key counts as late."""
+
+MOST = float(np.log(LIMIT))
+"""Outside of the keys the logarithm of a scale grows to this at most, and falls to its negative."""
 
 
 def lerp_slerp(segments: Segments) -> Curves:
@@ -165,11 +169,11 @@ def similarity_slerp(segments: Segments) -> Curves:
         return screw(segments)
 
     def basis(s, parameters, narrow):
-        quarter_angle, half_growth, mean = parameters
+        quarter_angle, half_growth, mean, least, most = parameters
         rows = np.empty((6, s.size))
         _slerp(s, quarter_angle, narrow, rows[:2])
         rows[2] = 1.0
-        growth = s * half_growth
+        growth = np.clip(s * half_growth, least, most)
         np.expm1(growth, out=rows[3])
         grown = np.exp(growth, out=growth)
         np.multiply(rows[1], rows[:2], out=rows[4:])
@@ -186,22 +190,28 @@ def similarity_slerp(segments: Segments) -> Curves:
     (rate, middle), (turned_rate, turned_middle) = _growing_share(half_growth), _growing_share(half_growth + 2.0j * h)
     outward = turned_rate.real * across + turned_rate.imag * around
     sideward = turned_rate.real * around - turned_rate.imag * across
+    mean = np.sqrt(segments.scales[0]) * np.sqrt(segments.scales[1])
     centre = segments.centre - middle.real * along - turned_middle.real * across - turned_middle.imag * around
     return Curves(
         quaternions=np.stack((segments.middle, segments.difference), axis=1),
         positions=np.stack((centre, rate.real * along + outward, 2.0 * sideward, -2.0 * outward), axis=1),
-        parameters=np.stack((h, half_growth, np.sqrt(segments.scales[0]) * np.sqrt(segments.scales[1]))),
+        parameters=np.stack((h, half_growth, mean, -MOST - np.log(mean), MOST - np.log(mean))),
         basis=basis,
     )
 
 
 def similarity_lerp(segments: Segments) -> Curves:
-    """The projected blend of two versors of CGA. A motor's where nothing grows."""
+    """The projected blend of two versors of CGA. A motor's where nothing grows.
+
+    With the roots k0 and k1 of the scales, the blend has no scale at |s| = (k0 + k1) / |k0 - k1|, where nothing turns,
+    or later, and a negative one behind that: half-way from the key to there the motion stops.
+    """
     if segments.scales is None:
         return motor_lerp(segments)
 
     def basis(s, parameters, narrow):
-        cosine, *roots = parameters
+        cosine, last, *roots = parameters
+        s = np.clip(s, -last, last)
         # A versor of scale k has 1 / sqrt(k) for the weight of its translation, and the mean of that and its inverse
         # for the weight of its rotor. See `algebras.cga.extract`.
         shares = np.stack((1.0 - s, 1.0 + s))
@@ -219,13 +229,14 @@ def similarity_lerp(segments: Segments) -> Curves:
         rows[4] = -shrinking[0] * shrinking[1] / weight
         return rows, dot(rotor, growing) / dot(rotor, shrinking)
 
-    h = segments.quarter_angle
+    h, (first, second) = segments.quarter_angle, np.sqrt(segments.scales)
+    last = 0.5 + 0.5 * (first + second) / np.maximum(np.abs(first - second), SMALLEST_ANGLE)
     _, _, around = segments.decompose()
     ends = segments.middle * np.cos(h), segments.difference * np.sin(h)
     return Curves(
         quaternions=np.stack((ends[0] - ends[1], ends[0] + ends[1]), axis=1),
         positions=np.stack((segments.centre, segments.chord, np.sin(2.0 * h) * around), axis=1),
-        parameters=np.stack((np.cos(2.0 * h), *np.sqrt(segments.scales))),
+        parameters=np.stack((np.cos(2.0 * h), last, first, second)),
         basis=basis,
     )
 
@@ -264,7 +275,7 @@ def _geometric_scales(s: np.ndarray, parameters: list[np.ndarray]) -> np.ndarray
     if len(parameters) < 3:
         return None
     growth, middle = parameters[-2:]
-    return np.exp(middle + 0.5 * s * growth)
+    return np.exp(np.clip(middle + 0.5 * s * growth, -MOST, MOST))
 
 
 def _growing_share(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

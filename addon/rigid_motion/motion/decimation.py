@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_times, number
+from .poses import numbers
 
 
 def decimate(times: ArrayLike, rate: float) -> np.ndarray:
@@ -43,7 +44,7 @@ def decimate(times: ArrayLike, rate: float) -> np.ndarray:
     rate = number(rate, "rate")
     if not (np.isfinite(rate) and rate > 0.0):
         raise ValueError(f"a rate of {rate} keys a second is not a positive number")
-    times = np.asarray(times, dtype=np.float64)
+    times = numbers(times, "times")
     check_times(times)
     if not len(times):
         raise ValueError("there are no times to decimate")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from . import twists
 from .checks import check_radius, check_recording, key_samples
 from .modes import MODES, interpolate, mode_named
-from .poses import Poses
+from .poses import Poses, numbers
 from .quaternions import align_signs, conjugate, multiply, normalise, rotate
 
 STEP = 1e-5
@@ -83,7 +83,7 @@ def fit_keys(times: ArrayLike, poses: Poses, keys: ArrayLike, mode: str = "motor
     check_radius(radius)
     if radius == 0.0:
         raise ValueError(f"a radius of {radius} is not above zero: turns would not count")
-    times = np.asarray(times, dtype=np.float64)
+    times = numbers(times, "times")
     check_recording(times, poses)
     keys = key_samples(keys, len(times))
     fitting = _Fitting(times, Poses(poses.positions, align_signs(poses.quaternions), poses.scales), keys, mode, radius)

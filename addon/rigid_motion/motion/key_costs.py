@@ -6,10 +6,8 @@ the keys that have a say in it.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -29,7 +27,16 @@ LOOKED_UP = 2**16
 """Segments looked up in one go."""
 
 REMEMBERED = 2**18
-"""Segments, about: then all are forgotten, so that long recordings do not fill the memory."""
+"""Segments at most, so that long recordings do not fill the memory."""
+
+REMEMBERED_EACH = 16
+"""Segments for each sample of a shorter recording."""
+
+FACTORS = np.array((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB86659FD93), dtype=np.uint64)
+"""Odd numbers that spread segments over the places they are remembered in."""
+
+NO_SAMPLE = -2
+"""Where nothing is remembered yet: -1 is where a segment has no key."""
 
 Found = tuple[np.ndarray, np.ndarray]
 """The costs and the peaks of segments."""
@@ -96,8 +103,7 @@ class Costs:
         """How many segments beyond the two next to it a key influences, on either side."""
         self.keys = 2 + 2 * self.reach
         """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
-        self._numbers: defaultdict[bytes, int] = defaultdict(itertools.count().__next__)
-        self._found = np.empty((REMEMBERED + LOOKED_UP, 2))
+        self._memory = _Memory(self.keys, min(REMEMBERED, REMEMBERED_EACH * len(recording.times)))
 
     def of(self, segments: np.ndarray) -> Found:
         """Costs and peaks (...) of segments (..., keys), zero where there is no sample between their keys."""
@@ -106,8 +112,13 @@ class Costs:
         found = np.zeros((len(rows), 2))
         for first in range(0, len(filled), LOOKED_UP):
             some = filled[first : first + LOOKED_UP]
-            found[some] = self._remembered(rows[some])
+            found[some] = self._memory.find(rows[some], self._work_out)
         return found[:, 0].reshape(segments.shape[:-1]), found[:, 1].reshape(segments.shape[:-1])
+
+    def total(self, keys: np.ndarray) -> float:
+        """Return the cost of all segments between keys (k,) of a recording of one track."""
+        ended = np.pad(keys, self.reach, constant_values=-1)
+        return float(self.of(np.lib.stride_tricks.sliding_window_view(ended, self.keys))[0].sum())
 
     def effort(self, segments: np.ndarray) -> float:
         """How many poses are to be looked at, at most, for segments (..., keys)."""
@@ -121,30 +132,16 @@ class Costs:
             errors[samples] = errors_there
         return errors
 
-    def _remembered(self, rows: np.ndarray) -> np.ndarray:
+    def _work_out(self, rows: np.ndarray) -> np.ndarray:
         """Costs beside peaks, shape (s, 2), of segments (s, keys) with samples in them."""
-        numbers = self._numbers
-        if len(numbers) > REMEMBERED:
-            self._numbers = numbers = defaultdict(itertools.count().__next__)
-        before = len(numbers)
-        codes = np.ascontiguousarray(rows).view(f"V{rows.itemsize * self.keys}").ravel().tolist()
-        places = np.fromiter(map(numbers.__getitem__, codes), np.int64, len(codes))
-        if len(numbers) > before:
-            new = np.flatnonzero(places >= before)
-            firsts = np.empty(len(numbers) - before, dtype=np.int64)
-            firsts[places[new] - before] = new
-            self._work_out(rows[firsts], self._found[before : len(numbers)])
-        return self._found[places]
-
-    def _work_out(self, rows: np.ndarray, out: np.ndarray) -> None:
-        """Fill out (s, 2) with the costs and peaks of segments (s, keys)."""
-        done = 0
+        out, done = np.empty((len(rows), 2)), 0
         for batch, counts in self._batches(rows):
             _, errors = self._errors(batch, counts)
             found, begins = out[done : done + len(batch)], np.cumsum(counts) - counts
             found[:, 0] = np.add.reduceat(self._powers(errors), begins)
             found[:, 1] = np.maximum.reduceat(errors, begins)
             done += len(batch)
+        return out
 
     def _powers(self, errors: np.ndarray) -> np.ndarray:
         """By squaring, which is quicker than a power."""
@@ -171,6 +168,43 @@ class Costs:
         of_all = (np.concatenate([numbers] * math.prod(together)) for numbers in (counts, progress))
         shown = within(*of_all, slice(None))
         return samples, np.minimum(recording.errors(samples, reshaped(shown, *together, -1)), WORST)
+
+
+class _Memory:
+    """Costs and peaks of segments, each in a place that its samples make; another one for that place replaces it."""
+
+    def __init__(self, keys: int, most: int) -> None:
+        bits = max(1, (most - 1).bit_length())
+        self._shift = np.uint64(64 - bits)
+        self._rows, self._found = np.full((2**bits, keys), NO_SAMPLE), np.empty((2**bits, 2))
+        self._last = np.empty(2**bits, dtype=np.int64)
+
+    def find(self, rows: np.ndarray, work_out: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return what there is for segments (s, keys), shape (s, 2), worked out where it is not remembered."""
+        places = self._places(rows)
+        found = self._found.take(places, axis=0)
+        new = np.flatnonzero((self._rows.take(places, axis=0) != rows).any(axis=1))
+        if len(new):
+            rows, places, numbers = rows[new], places[new], np.arange(len(new))
+            # Of those for one place the last stays: others are worked out only where they are not the same.
+            self._last[places] = numbers
+            last = self._last[places]
+            differs = (rows != rows[last]).any(axis=1)
+            stays = last == numbers
+            needed = stays | differs
+            of_needed = work_out(rows[needed])
+            found[new] = of_needed[(np.cumsum(needed) - 1)[np.where(differs, numbers, last)]]
+            self._rows[places[stays]], self._found[places[stays]] = rows[stays], of_needed[stays[needed]]
+        return found
+
+    def _places(self, rows: np.ndarray) -> np.ndarray:
+        mixed = np.zeros(len(rows), dtype=np.uint64)
+        for column in range(rows.shape[1]):
+            mixed ^= rows[:, column].astype(np.uint64)
+            mixed *= FACTORS[column % len(FACTORS)]
+            mixed ^= mixed >> np.uint64(29)
+        mixed *= FACTORS[0]
+        return (mixed >> self._shift).astype(np.int64)
 
 
 def _at(numbers: np.ndarray, samples: np.ndarray) -> np.ndarray:

@@ -17,12 +17,10 @@ keyframe selection for motion capture", 2019.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .key_search import Search
+from .key_costs import Costs
 
 ALIVE = 1.5
 """Tolerances that a segment may be off by, for it or a longer one to be looked at further."""
@@ -49,51 +47,55 @@ PRICE_STEPS = 10
 """Of bisection for the price."""
 
 
-def linked_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
+def linked_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
     """The fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
 
     Parameters
     ----------
-    search : Search
+    costs : Costs
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     found : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
+    tolerance : float
+        In tolerances of the recording.
     """
-    for width in WIDTHS[search.reach]:
-        candidates = _beside(search, found, width)
-        links = _links(search, candidates, found, 1.0 if search.reach == 0 else ALIVE, ALIVE**2)
+    for width in WIDTHS[costs.reach]:
+        candidates = _beside(costs, found, width)
+        links = _links(costs, candidates, found, (1.0 if costs.reach == 0 else ALIVE) * tolerance, ALIVE**2 * tolerance)
         if links is not None:
-            _, peak = search.costs.of(links)
-            links = links[peak <= WITHIN]
+            _, peak = costs.of(links)
+            links = links[peak <= WITHIN * tolerance]
             return _shortest(links, np.ones(len(links)), candidates)
     return min(found, key=len)
 
 
-def traded_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
+def traded_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
     """The fewest keys that prices allow, or the first that were found; at all costs that are too high.
 
     Parameters
     ----------
-    search : Search
+    costs : Costs
         Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
     found : list of array of int
         Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
+    tolerance : float
+        In tolerances of the recording.
     """
-    counts, costs = [len(keys) for keys in found], [search.measured(keys).cost.sum() for keys in found]
-    best, least, allowed = found[0], costs[0], float(len(search.recording.times))
-    if max(counts) == min(counts) or max(costs) == min(costs):
+    counts, totals = [len(keys) for keys in found], [costs.total(keys) for keys in found]
+    best, least, allowed = found[0], totals[0], tolerance**2 * len(costs.recording.times)
+    if max(counts) == min(counts) or max(totals) == min(totals):
         return best
-    price = (max(costs) - min(costs)) / (max(counts) - min(counts))
-    candidates = _beside(search, found, 0)
-    links = _links(search, candidates, found, DEAR * price, DEAR**2 * price)
+    price = (max(totals) - min(totals)) / (max(counts) - min(counts))
+    candidates = _beside(costs, found, 0)
+    links = _links(costs, candidates, found, DEAR * price, DEAR**2 * price)
     if links is None:
         return best
-    cost, _ = search.costs.of(links)
+    cost, _ = costs.of(links)
     low, high = -math.log(PRICES), math.log(PRICES)
     for _ in range(PRICE_STEPS):
         middle = 0.5 * (low + high)
         keys = _shortest(links, cost + price * math.exp(middle), candidates)
-        total = search.measured(keys).cost.sum()
+        total = costs.total(keys)
         if total > allowed:
             high = middle
             continue
@@ -103,47 +105,47 @@ def traded_keys(search: Search, found: list[np.ndarray]) -> np.ndarray:
     return best
 
 
-def _beside(search: Search, found: list[np.ndarray], width: int) -> np.ndarray:
+def _beside(costs: Costs, found: list[np.ndarray], width: int) -> np.ndarray:
     """The samples that are keys in what was found, and so many on either side of each."""
     beside = np.concatenate(found)[:, None] + np.arange(-width, width + 1)
-    return np.unique(np.clip(beside, 0, len(search.recording.times) - 1))
+    return np.unique(np.clip(beside, 0, len(costs.recording.times) - 1))
 
 
 def _links(
-    search: Search, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float
+    costs: Costs, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float
 ) -> np.ndarray | None:
     """The links that candidates allow: samples, -1 beyond the ends, (l, keys of a segment); None where there are many.
 
     Segments whose peak, or for the mean square whose cost, is above `good` are left out, and those above `alive` are
     made no longer; with neighbours as far away as they are long.
     """
-    pairs = _pairs(search, candidates, found, good, alive)
-    if search.reach == 0:
+    pairs = _pairs(costs, candidates, found, good, alive)
+    if costs.reach == 0:
         return candidates[pairs]
     before, after = _neighbours(pairs, len(candidates))
     # Links are many times the pairs: they are counted before any is made.
     poses = (before * after * (candidates[pairs[:, 1]] - candidates[pairs[:, 0]] - 1)).sum()
-    if poses > EFFORT * len(search.recording.times):
+    if poses > EFFORT * len(costs.recording.times):
         return None
     numbers = _with_neighbours(pairs, len(candidates))
     return np.where(numbers >= 0, candidates[np.maximum(numbers, 0)], -1)
 
 
-def _pairs(search: Search, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float) -> np.ndarray:
+def _pairs(costs: Costs, candidates: np.ndarray, found: list[np.ndarray], good: float, alive: float) -> np.ndarray:
     """Candidates that a segment may join, (p, 2), by the first and then the second."""
-    last, reach = len(candidates) - 1, search.reach
+    last, reach = len(candidates) - 1, costs.reach
     pairs = [np.searchsorted(candidates, np.stack((keys[:-1], keys[1:]), axis=1)) for keys in found]
     first, gap = np.arange(last), 1
     while len(first):
-        gaps = gap + np.arange(TOGETHER if search.recording.poses_each == 1.0 else 1)
+        gaps = gap + np.arange(TOGETHER if costs.recording.poses_each == 1.0 else 1)
         second = first[:, None] + gaps
         # A segment at the end has no neighbour there; all others have one, if not as far away.
         numbers = first[:, None, None] + gaps[:, None] * np.arange(-reach, 2 + reach)
         windows = candidates[np.clip(numbers, 0, last)]
         windows[first == 0, :, :reach] = -1
         windows[second >= last, 2 + reach :] = -1
-        cost, peak = search.costs.of(windows)
-        worth = cost if search.power == 2 else peak
+        cost, peak = costs.of(windows)
+        worth = cost if costs.power == 2 else peak
         worth[second > last] = math.inf
         lives = np.logical_and.accumulate(worth <= alive, axis=1)
         is_good = worth <= good

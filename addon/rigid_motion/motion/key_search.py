@@ -43,6 +43,21 @@ GAIN = 1e-4
 LOOSER = (1.6, 1.3, 1.15)
 """How many times the tolerance keys may pass while more of them are taken out, before some are put back."""
 
+START = {PEAK: 0.5, 2: 0.25}
+"""Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
+
+BUDGET_STEPS = (3, 6)
+"""Of quick and then of thorough searches for the tolerance that so many keys can keep to, at most."""
+
+NARROW = 0.01
+"""By how much of it the tolerance is known then."""
+
+FARTHEST = 0.3
+"""How far the next tolerance is from the only one that is known, by its logarithm."""
+
+POWER = 2.5
+"""Of the tolerance: it is thought to grow by this power as the number of keys falls."""
+
 OTHERS = (0.9, 1.1, 1.25)
 """Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
 
@@ -103,91 +118,168 @@ class Search:
         self.spacing = 2 + 2 * self.reach
         """Keys this far from one another, or further, can be tried without regard to each other."""
 
-    def within(self, tries: int) -> np.ndarray:
-        """Few samples that, as keys, keep to the tolerance."""
-        best = self._first(1.0)
+    def within(self, tries: int, tolerance: float = 1.0) -> np.ndarray:
+        """Few samples that, as keys, keep to so many times the tolerance."""
+        best = self._first(tolerance)
         if self.power == 2:
-            return self._traded(best, tries).indices
+            return self._traded(best, tries, tolerance).indices
         found = [best.indices]
         for looser in LOOSER[:tries]:
             # Keys that are too few find better places, also when some are put back between them.
+            looser *= tolerance
             fewer = self.moved(self.thinned(self.measured(best.indices), looser), looser)
-            keys = self.refined(self.densified(fewer))
-            best = self._better(best, keys)
+            keys = self.refined(self.densified(fewer, tolerance), tolerance)
+            best = self._better(best, keys, tolerance)
             found.append(keys.indices)
         if self._is_linkable and tries:
-            linked = linked_keys(self, found)
+            linked = linked_keys(self.costs, found, tolerance)
             if len(linked) < len(best.indices):
-                best = self.refined(self.measured(linked))
+                best = self.refined(self.measured(linked), tolerance)
         return best.indices
 
     def _first(self, tolerance: float) -> Keys:
-        """What is left of keys at all samples."""
-        every = self.measured(np.arange(len(self.recording.times)))
-        return self.refined(self.thinned(every, tolerance), tolerance)
+        """What is left of keys that are more than needed."""
+        return self.refined(self.thinned(self.started(tolerance), tolerance), tolerance)
 
-    def _traded(self, best: Keys, tries: int) -> Keys:
+    def started(self, tolerance: float) -> Keys:
+        """Keys to begin with: two for a track where that is enough, else at the ends of stretches of 2, 4, 8 samples...
+
+        Stretches double where their errors are a part of the tolerance, and those of both halves were.
+        """
+        recording, count, reach = self.recording, len(self.recording.times), self.reach
+        ends, ending = np.zeros(count, dtype=bool), np.full((len(recording.starts), reach), -1)
+        whole = np.column_stack((ending, recording.starts, recording.ends, ending))
+        enough = self.costs.of(whole)[1] <= tolerance
+        lengths = recording.ends - recording.starts + 1
+        is_key, good = ~np.repeat(enough, lengths), ~np.repeat(enough, lengths)
+        is_key[recording.starts] = is_key[recording.ends] = ends[recording.ends] = True
+        last = np.repeat(recording.ends, lengths)
+        places, half = np.arange(count) - np.repeat(recording.starts, lengths), 1
+        while good.any():
+            keys = self._at(np.flatnonzero((places % (2 * half) == 0) | ends))
+            numbers = np.flatnonzero(~ends[keys.indices])
+            begins = keys.indices[numbers]
+            middles = np.minimum(begins + half, last[begins])
+            both = good[begins] & (good[middles] | ends[middles])
+            numbers, begins, middles = numbers[both], begins[both], middles[both]
+            _, peak = self.costs.of(keys.windows(numbers, np.arange(-reach, 2 + reach)))
+            fine = (peak <= START[self.power] * tolerance) & ~ends[middles]
+            good[:] = False
+            good[begins[fine]] = True
+            # Half as long as is good enough, for the search to have a choice.
+            for quarter in (begins[fine], middles[fine]) if half > 1 else ():
+                is_key[np.minimum(quarter + half // 2, last[quarter])] = False
+            is_key[recording.ends] = True
+            half *= 2
+        keys = self.measured(np.flatnonzero(is_key))
+        return self.densified(keys, tolerance) if self.power != 2 else keys
+
+    def _traded(self, best: Keys, tries: int, tolerance: float) -> Keys:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
         if not (self._is_linkable and tries):
             return best
         found = [best.indices]
         for other in OTHERS[:tries]:
-            found.append(self._first(other).indices)
-        traded = traded_keys(self, found)
-        return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
+            found.append(self._first(other * tolerance).indices)
+        traded = traded_keys(self.costs, found, tolerance)
+        return self.refined(self.measured(traded), tolerance) if len(traded) < len(best.indices) else best
 
     @property
     def _is_linkable(self) -> bool:
         """Whether keys of several searches can be put together."""
         return self.reach <= 1 and len(self.recording.starts) == 1
 
-    def within_budget(self, budget: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found."""
+    def within_budget(self, budget: int, tries: int) -> np.ndarray:
+        """So many samples that are keys with as small an error as can be found: those of the least tolerance for it."""
+        best = self._fewest(budget)
+        least = self._error(best)
+        tolerance, high = least, None
+        # Quick searches come near the tolerance, and thorough ones, which need fewer keys for it, go on from there.
+        for thorough, steps in zip((0, tries), BUDGET_STEPS, strict=True) if least > 0.0 else ():
+            low = None
+            for _ in range(steps):
+                keys = self.measured(self.within(thorough, tolerance))
+                found = math.log(tolerance), math.log(len(keys.indices))
+                if len(keys.indices) > budget:
+                    low = found
+                else:
+                    high = found
+                    keys = self._filled(keys, budget)
+                    if self._error(keys) < least:
+                        best, least = keys, self._error(keys)
+                tolerance = math.exp(_between(low, high, math.log(budget + 0.5)))
+                if low and high and high[0] - low[0] < NARROW:
+                    break
+        return best.indices
+
+    def _fewest(self, budget: int) -> Keys:
+        """What is left of all samples, down to the budget, moved to where the sum of the powers of errors is least."""
         keys = self.thinned(self.measured(np.arange(len(self.recording.times))), math.inf, budget)
         for _ in range(ROUNDS):
             before = keys.cost.sum()
             keys = self.moved(keys, math.inf)
             if not keys.cost.sum() < 0.99 * before:
                 break
-        return keys.indices
+        return keys
+
+    def _filled(self, keys: Keys, budget: int) -> Keys:
+        """Keys with more of them where the motion is off most, as many as the budget has left."""
+        while (left := min(budget, len(self.recording.times)) - len(keys.indices)) > 0:
+            errors = self.costs.errors(self._segments(keys)[1])
+            errors[keys.indices] = -1.0
+            order = np.argsort(-errors, kind="stable")
+            segments = np.searchsorted(keys.indices, order, side="right")
+            # The first of each segment is where it is off most.
+            worst = order[np.sort(np.unique(segments, return_index=True)[1])]
+            worst = worst[errors[worst] >= 0.0][:left]
+            keys = self.moved(self.measured(np.union1d(keys.indices, worst)), math.inf)
+        return keys
+
+    def _error(self, keys: Keys) -> float:
+        """The largest error between keys, or the root of its mean square."""
+        return math.sqrt(keys.cost.sum() / len(self.recording.times)) if self.power == 2 else float(keys.peak.max())
 
     def measured(self, indices: np.ndarray) -> Keys:
         """Keys at these samples, rising, the outermost of each track among them, and everything between them."""
-        recording = self.recording
-        first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
-        counts = end - first + 1
-        keys = Keys(
-            indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
-        )
+        keys = self._at(indices)
         numbers, segments = self._segments(keys)
         keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
         return keys
+
+    def _at(self, indices: np.ndarray) -> Keys:
+        """The same, and nothing known of what is between them."""
+        recording = self.recording
+        first, end = np.searchsorted(indices, recording.starts), np.searchsorted(indices, recording.ends)
+        counts = end - first + 1
+        return Keys(
+            indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
+        )
 
     def _segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
         """The numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
 
-    def densified(self, keys: Keys) -> Keys:
+    def densified(self, keys: Keys, tolerance: float) -> Keys:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
-        while keys.peak.max() > 1.0:
+        while keys.peak.max() > tolerance:
             errors = self.costs.errors(self._segments(keys)[1])
             of_segments = np.maximum.reduceat(errors, keys.indices)
             counts = np.diff(keys.indices, append=len(errors))
-            worst = (errors == of_segments.repeat(counts)) & (errors > 1.0)
+            worst = (errors == of_segments.repeat(counts)) & (errors > tolerance)
             more = np.union1d(keys.indices, np.flatnonzero(worst))
             if len(more) == len(keys.indices):
                 break  # It is off by no more than rounding.
             keys = self.measured(more)
         return keys
 
-    def _better(self, best: Keys, other: Keys) -> Keys:
+    def _better(self, best: Keys, other: Keys, tolerance: float) -> Keys:
         """Of each track the keys that are fewer."""
         chosen = []
         for start, end in zip(self.recording.starts, self.recording.ends, strict=True):
             rows = [slice(*np.searchsorted(keys.indices, (start, end + 1))) for keys in (best, other)]
             fewer = rows[1].stop - rows[1].start < rows[0].stop - rows[0].start
-            takes_other = fewer and other.peak[rows[1]].max() <= 1.0
+            takes_other = fewer and other.peak[rows[1]].max() <= tolerance
             chosen.append(other.indices[rows[1]] if takes_other else best.indices[rows[0]])
         return self.measured(np.concatenate(chosen))
 
@@ -321,6 +413,19 @@ class Search:
         left = np.ix_(promising(cost, peak), outer)
         cost[left], peak[left] = self.costs.of(rows[left])
         return cost, peak
+
+
+def _between(low: tuple[float, float] | None, high: tuple[float, float] | None, count: float) -> float:
+    """Return the tolerance to try next for a count of keys, both by their logarithms, as what was found has them.
+
+    Where one tolerance was too low and one was not, it is between them, as straight lines have it; else beyond the one.
+    """
+    if low and high:
+        share = (count - high[1]) / (low[1] - high[1]) if low[1] > high[1] else 0.5
+        return high[0] + min(max(share, 0.2), 0.8) * (low[0] - high[0])
+    if low:
+        return low[0] + min(max(POWER * (low[1] - count), 2.0 * NARROW), FARTHEST)
+    return high[0] + max(min(POWER * (high[1] - count), -2.0 * NARROW), -FARTHEST)
 
 
 def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses, check_radii
-from .poses import Poses
+from .poses import Poses, numbers
 from .quaternions import angle_between, components, cross
 
 TINY = 1e-150
@@ -103,9 +103,9 @@ def measure(times: ArrayLike, poses: Poses, truth: Poses, radius: ArrayLike = 0.
     >>> errors.shell.round(6).tolist(), errors.rotation.round(6).tolist()
     ([0.0, 0.141421], [0.0, 1.570796])
     """
-    check_radii(radius)
+    radius = check_radii(radius)
     _check_pair(poses, truth)
-    times = np.asarray(times, dtype=np.float64)
+    times = numbers(times, "times")
     if times.shape not in (poses.shape, truth.shape, poses.shape[-1:]) or not times.shape:
         raise ValueError(f"times of shape {times.shape} do not fit poses of shape {poses.shape}")
     # Poses that are not finite have errors that are not finite, without a warning.
@@ -176,7 +176,7 @@ def shell_error(poses: Poses, truth: Poses, radius: ArrayLike = 0.1) -> np.ndarr
     [0.03, 0.23]
     """
     _check_pair(poses, truth)
-    radius = np.asarray(radius, dtype=np.float64)
+    radius = numbers(radius, "radii")
     (w, *xyz), (true_w, *true_xyz) = (components(some.quaternions) for some in (poses, truth))
     d, v = components(poses.positions - truth.positions), cross(true_xyz, xyz)
     for axis in range(3):
@@ -256,7 +256,8 @@ def rms(errors: ArrayLike) -> float:
     >>> rms([3.0, 4.0, 0.0, 0.0])
     2.5
     """
-    return float(np.sqrt(np.mean(np.square(errors)))) if np.size(errors) else 0.0
+    errors = numbers(errors, "errors")
+    return float(np.sqrt(np.mean(np.square(errors)))) if errors.size else 0.0
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from . import curves
 from .algebras import cga, dual_quaternions, pga, vector_quaternion
-from .checks import check_poses
-from .poses import LIMIT, SHORTEST, Poses
+from .checks import check_flag, check_poses
+from .poses import LIMIT, SHORTEST, Poses, numbers
 from .segments import Curves, Segments, interpolate_along, prepare_within
 
 
@@ -135,7 +135,9 @@ KEYFRAME_MODES: dict[str, Mode] = {name: mode for name, mode in MODES.items() if
 
 
 def mode_named(name: str) -> Mode:
-    """The mode of a name in `MODES`. Raises ValueError for another, and says which there are."""
+    """The mode of a name in `MODES`. Raises ValueError for another, and says which there are, TypeError for no name."""
+    if not isinstance(name, str):
+        raise TypeError(f"mode is {name!r}: give the name of one, such as 'dq_sclerp'")
     if name not in MODES:
         raise ValueError(no_such_mode(name, MODES))
     return MODES[name]
@@ -163,7 +165,8 @@ def interpolate(
     mode : str
         A name in `MODES`. All are written out, with their sources, in `docs/conventions.md`.
     extrapolate : bool
-        Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold.
+        Whether the motion of the first and last segment goes on outside the keys. Otherwise the end poses hold. Scales
+        stay positive: they stop at `1e40` and `1e-40`, and `cga_lerp` with growth stops before it has no scale.
 
     Returns
     -------
@@ -199,7 +202,8 @@ def interpolate(
     [[0.5, 0.0, 0.0]]
     """
     curves_of_mode = mode_named(mode).curves
-    key_times, times = np.asarray(key_times, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    key_times, times = numbers(key_times, "key times"), numbers(times, "times")
+    check_flag(extrapolate, "extrapolate")
     keys = _checked(key_times, keys)
     if keys.shape[-1] == 1:
         # A motion with a single key is a rest at all times: the segment from that key to itself.
@@ -241,7 +245,7 @@ def in_betweens(
         How many poses are wanted of each segment.
     progress : array-like, shape (m,), m the sum of the counts
         How far each has come in its segment, from 0 at the first key to 1 at the second. Where it passes them, the
-        motion of the segment goes on.
+        motion of the segment goes on, as in `interpolate` with `extrapolate`.
     mode : str
         A name in `MODES`.
 
@@ -312,7 +316,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
     [[1.0, 0.5, 0.0]]
     """
     curves_of_mode = mode_named(mode).curves
-    key_times = np.asarray(key_times, dtype=np.float64)
+    key_times = numbers(key_times, "key times")
     keys = _checked(key_times, keys)
     if keys.shape[-1] < 2:
         raise ValueError("in-betweens need at least two keys")
@@ -321,7 +325,7 @@ def prepare(key_times: ArrayLike, keys: Poses, mode: str = "dq_sclerp") -> Calla
 
     def poses(counts: ArrayLike, progress: ArrayLike, selected: slice = slice(None)) -> Poses:
         """The poses (m,) of the selected segments, by how many are wanted of each and how far each of them is."""
-        counts, progress = np.asarray(counts), np.asarray(progress, dtype=np.float64)
+        counts, progress = np.asarray(counts), numbers(progress, "progress")
         if counts.size and (not np.issubdtype(counts.dtype, np.integer) or counts.min() < 0):
             raise ValueError("counts of in-betweens need to be whole numbers from 0 on, one for each segment")
         expected = shape if selected == slice(None) else (len(range(*selected.indices(math.prod(shape)))),)

@@ -23,6 +23,27 @@ SHORTEST = 1e-30
 """Between two moments, for the same reason: what happens in less has a speed that is no float."""
 
 
+def numbers(values: ArrayLike, name: str) -> np.ndarray:
+    """Return an argument of this name as an array of float64, kept where it is one.
+
+    Raises TypeError where it is made of strings, complex numbers or anything else, ValueError for rows of different
+    lengths.
+    """
+    if type(values) is np.ndarray and values.dtype == np.float64:
+        return values
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name}: rows of different lengths make no array") from None
+    try:
+        if given.dtype.kind in "biufO":
+            return given.astype(np.float64)
+    except (TypeError, ValueError):
+        pass
+    kind = type(values).__name__ if given.dtype == object else given.dtype
+    raise TypeError(f"{name} need to be numbers, not {kind}: give floats, without quotes or units") from None
+
+
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Positions, rotations and, where the body grows or shrinks, scales.
@@ -42,8 +63,9 @@ class Poses:
     ValueError
         Where the shapes do not fit one another.
     TypeError
-        Where NumPy is to make one array of poses, or work on them as if they were one: a mean or a sum of quaternions
-        is no rotation. Take `positions` and `quaternions`.
+        Where positions, quaternions or scales are no numbers.
+        Also where NumPy is to make one array of poses, or work on them as if they were one: a mean or a sum of
+        quaternions is no rotation. Take `positions` and `quaternions`.
 
     See Also
     --------
@@ -79,14 +101,13 @@ class Poses:
     """Shape (..., n), or None for 1 everywhere."""
 
     def __init__(self, positions: ArrayLike, quaternions: ArrayLike, scales: ArrayLike | None = None) -> None:
-        positions = np.asarray(positions, dtype=np.float64)
-        quaternions = np.asarray(quaternions, dtype=np.float64)
+        positions, quaternions = numbers(positions, "positions"), numbers(quaternions, "quaternions")
         if positions.shape[-1:] != (3,):
             raise ValueError(f"positions need the shape (..., 3), not {positions.shape}")
         if quaternions.shape != (*positions.shape[:-1], 4):
             raise ValueError(f"quaternions need the shape {(*positions.shape[:-1], 4)}, not {quaternions.shape}")
         if scales is not None:
-            scales = np.asarray(scales, dtype=np.float64)
+            scales = numbers(scales, "scales")
             if scales.shape != positions.shape[:-1]:
                 raise ValueError(f"scales need the shape {positions.shape[:-1]}, not {scales.shape}")
         object.__setattr__(self, "positions", positions)

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_radius, check_recording, check_wishes
+from .checks import check_flag, check_radius, check_recording, check_wishes
 from .key_search import Recording, Search
 from .modes import mode_named
-from .poses import Poses
+from .poses import Poses, numbers
 from .quaternions import align_signs
 
 
@@ -58,7 +58,8 @@ def reduce_keys(
     Raises
     ------
     TypeError
-        Where the recording is no `Poses`.
+        Where the recording is no `Poses`, or an argument is of the wrong type: a tolerance in quotes, a budget that is
+        no int. The message names the argument.
     ValueError
         Where not exactly one of tolerance and budget is given, the mode is unknown, either of the two or the radius is
         no sensible number, or a sample is not finite, out of order or of no size. The message names the sample.
@@ -93,12 +94,13 @@ def reduce_keys(
     5
     """
     mode_named(mode)
-    check_wishes(tolerance, budget)
+    check_wishes(tolerance, budget, tries)
+    check_flag(rms, "rms")
     check_radius(radius)
-    times = np.asarray(times, dtype=np.float64)
+    times = numbers(times, "times")
     check_recording(times, poses)
     if len(times) <= 2:
         return np.arange(len(times))
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     search = Search(Recording(times, poses, mode, radius, tolerance or 1.0), rms=rms)
-    return search.within(tries) if tolerance is not None else search.within_budget(budget)
+    return search.within(tries) if tolerance is not None else search.within_budget(budget, tries)

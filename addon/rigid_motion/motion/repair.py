@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_poses
-from .poses import SHORTEST, Poses
+from .poses import SHORTEST, Poses, numbers
 from .quaternions import align_signs, normalise
 
 GAP = 1.75
@@ -117,7 +117,7 @@ def repair(times: ArrayLike, poses: Poses, rate: float | None = None) -> tuple[n
     dropped rows with numbers that are missing, not finite or too large (1: row 1)
     """
     check_poses(poses, "poses")
-    times = np.asarray(times, dtype=np.float64)
+    times = numbers(times, "times")
     if times.ndim != 1 or poses.shape[-1:] != times.shape:
         raise ValueError(f"times of shape {times.shape} do not fit poses of shape {poses.shape}")
     repairs: list[Repair] = []

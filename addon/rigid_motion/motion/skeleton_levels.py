@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from .bodies import Body
 from .key_costs import Recording
 from .measures import largest_displacement
 from .piecewise import blocks
 from .poses import PackedPoses, Poses, inverse, placed, reshaped
 from .quaternions import components, conjugate, cross, matrices, multiply
-
-if TYPE_CHECKING:
-    from .skeleton_reduction import Body
 
 AT_ONCE = 2**13
 """Joints that are looked at in one go, for the processor's caches."""
@@ -35,12 +31,13 @@ class Level(Recording):
 
     def __init__(self, body: Body, joints: np.ndarray, shown: Poses, tolerance: float) -> None:
         self.body, self.joints = body, joints
-        count, below = len(body.times), body.skeleton.below
+        count = len(body.times)
         starts = count * np.arange(len(joints))
         poses = reshaped(body.poses[joints], -1)
         super().__init__(np.tile(body.times, len(joints)), poses, body.mode, 0.0, tolerance, starts)
         weighs = body.weights.any(axis=1)
-        weighty = [below[joint][weighs[below[joint]]] for joint in joints.tolist()]
+        below = map(body.skeleton.below, joints.tolist())
+        weighty = [hanging[weighs[hanging]] for hanging in below]
         self.counts = np.array([len(hanging) for hanging in weighty])
         self.poses_each = self.counts.mean()
         self.first = np.cumsum(self.counts) - self.counts

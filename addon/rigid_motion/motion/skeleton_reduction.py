@@ -11,29 +11,29 @@ share are those of Roberts, Lewis and Anjyo, "Optimal and interactive keyframe s
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .checks import check_poses, check_recording, check_wishes
+from .bodies import Body
+from .checks import check_body, check_flag, check_poses, check_wishes
 from .key_costs import Recording
 from .key_search import Keys, Search
 from .measures import shell_error
-from .modes import interpolate, mode_named
-from .poses import LIMIT, PackedPoses, Poses, reshaped
-from .quaternions import align_signs, normalise
+from .modes import mode_named
+from .poses import LIMIT, PackedPoses, Poses, numbers, reshaped
+from .quaternions import align_signs
 from .skeleton_levels import Level
 from .skeletons import Skeleton
-
-SOME_TURN = 1e-12
-"""What a mean of quaternions is turned by, so that it has a length."""
 
 TINY = 1e-30
 """Stands for a weight of zero."""
 
 BUDGET_STEPS = 9
 """Of a search for the tolerance that a budget of keys of their own can keep to."""
+
+DEEPEST = 1000
+"""How many joints a joint with keys of its own may hang on: the work grows with the square of it."""
 
 LEAST = 12.0
 """How much smaller than that of a body at rest the tolerance may be, by its logarithm."""
@@ -93,8 +93,8 @@ def reduce_skeleton_keys(
     TypeError
         Where the recording is no `Poses`.
     ValueError
-        As `reduce_keys` does, and where joints hang on one another in a circle, or radii or weights make no sense. The
-        message names the joint.
+        As `reduce_keys` does, and where joints hang on one another in a circle, or without `shared` in chains of more
+        than 1000, or radii or weights make no sense. The message names the joint.
 
     See Also
     --------
@@ -121,13 +121,13 @@ def reduce_skeleton_keys(
     [[0], [0, 29]]
     """
     mode_named(mode)
-    check_wishes(tolerance, budget)
+    check_wishes(tolerance, budget, tries)
+    check_flag(shared, "shared")
     check_poses(poses, "poses")
-    skeleton, times = Skeleton(parents), np.asarray(times, dtype=np.float64)
+    skeleton, times = Skeleton(parents), numbers(times, "times")
     if poses.shape != (len(skeleton), *times.shape):
         raise ValueError(f"poses of shape {poses.shape} do not fit {len(skeleton)} joints and {times.size} times")
-    for joint in range(len(skeleton)):
-        check_recording(times, poses[joint], f"joint {joint}, ")
+    check_body(times, poses)
     radii = _one_for_each(radius, "radius", (len(skeleton),))
     weights = _one_for_each(1.0 if weights is None else weights, "weight", (len(skeleton),), poses.shape)
     if not np.any(weights > 0.0):
@@ -138,98 +138,41 @@ def reduce_skeleton_keys(
         raise ValueError(f"a budget of {budget} keys is too small for {np.count_nonzero(free)} joints: each may need 2")
     if len(times) <= 1:
         return (np.arange(len(times)),) * len(skeleton)
+    if not shared and skeleton.depths.max() > DEEPEST:
+        joint = int(skeleton.depths.argmax())
+        raise ValueError(
+            f"joint {joint} hangs on {skeleton.depths[joint]} others, and keys of their own are searched for where it "
+            f"is {DEEPEST} at most: shared=True finds key poses for longer chains"
+        )
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
     body = Body(times, poses, skeleton, mode, radii, weights, free)
     if shared:
-        keys = body.key_poses(tolerance, budget, tries)
+        keys = _key_poses(body, tolerance, budget, tries)
         every = np.arange(len(times))
         return tuple(keys if moves else every for moves in free.tolist())
-    return body.own_keys(tolerance) if tolerance is not None else body.own_keys_within(budget)
+    return _OwnKeys(body, tolerance).found() if tolerance is not None else _own_keys_within(body, budget)
 
 
-class Body:
-    """The recording of a body, and what it is measured by. Errors are weighted."""
+def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
+    if len(body.times) <= 2:
+        return np.arange(len(body.times))
+    search = Search(_WholeBody(body, tolerance or 1.0))
+    return search.within(tries) if tolerance is not None else search.within_budget(budget, tries)
 
-    def __init__(
-        self,
-        times: np.ndarray,
-        poses: Poses,
-        skeleton: Skeleton,
-        mode: str,
-        radii: np.ndarray,
-        weights: np.ndarray,
-        free: np.ndarray,
-    ) -> None:
-        self.times, self.poses, self.skeleton, self.mode = times, poses, skeleton, mode
-        self.radii, self.weights, self.free = radii, weights, free
-        with np.errstate(over="ignore", invalid="ignore"):
-            self.truth = skeleton.in_root_space(poses)
-        for joint in range(len(skeleton)):
-            check_recording(times, self.truth[joint], f"joint {joint}, in the root's space, ")
 
-    def errors(self, shown: Poses, samples: np.ndarray | None = None) -> np.ndarray:
-        """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
-        there = self.skeleton.in_root_space(shown)
-        if samples is None:
-            return shell_error(there, self.truth, self.radii[:, None]) * self.weights
-        return shell_error(there, self.packed_truth[samples], self.radii[:, None]) * self.weights[:, samples]
-
-    @cached_property
-    def packed_truth(self) -> PackedPoses:
-        return PackedPoses(self.truth)
-
-    def shown(self, joint: int, keys: np.ndarray) -> Poses:
-        """What a joint does between keys (k,), shape (n,)."""
-        return interpolate(self.times[keys], self.poses[joint][keys], self.times, self.mode)
-
-    def key_poses(self, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
-        if len(self.times) <= 2:
-            return np.arange(len(self.times))
-        search = Search(_WholeBody(self, tolerance or 1.0))
-        return search.within(tries) if tolerance is not None else search.within_budget(budget)
-
-    def own_keys_within(self, budget: int) -> tuple[np.ndarray, ...]:
-        """The keys of the smallest tolerance that so many can keep to, by bisection."""
-        best = tuple(_OwnKeys(self, math.inf).keys)
-        high = math.log(max(float(self.errors(self.at_rest()).max()), TINY))
-        low = high - LEAST
-        for _ in range(BUDGET_STEPS):
-            middle = 0.5 * (low + high)
-            keys = self.own_keys(math.exp(middle))
-            if sum(len(keys[joint]) for joint in np.flatnonzero(self.free).tolist()) <= budget:
-                high, best = middle, keys
-            else:
-                low = middle
-        return best
-
-    def own_keys(self, tolerance: float) -> tuple[np.ndarray, ...]:
-        return _OwnKeys(self, tolerance).found()
-
-    @cached_property
-    def middles(self) -> np.ndarray:
-        """The sample of each joint that is nearest to its mean pose, shape (joints,)."""
-        scales = self.poses.scales
-        means = Poses(
-            self.poses.positions.mean(axis=1, keepdims=True),
-            normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + SOME_TURN),
-            None if scales is None else scales.mean(axis=1, keepdims=True),
-        )
-        return np.argmin(shell_error(self.poses, _spread(means, self.poses), self.sizes), axis=1)
-
-    def at_rest(self) -> Poses:
-        """Every joint in its middle pose all the time, shape (joints, n)."""
-        joints = np.arange(len(self.skeleton))
-        return _spread(self.poses[joints[:, None], self.middles[:, None]], self.poses)
-
-    @cached_property
-    def sizes(self) -> np.ndarray:
-        """How far everything that hangs on a joint is from it, with the balls around it, shape (joints, n)."""
-        found = np.empty(self.poses.shape)
-        for joint, below in enumerate(self.skeleton.below):
-            away = self.truth.positions[below] - self.truth.positions[joint]
-            balls = self.radii[below, None] * (1.0 if self.truth.scales is None else self.truth.scales[below])
-            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls).max(axis=0)
-        return found
+def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:
+    """The keys of the smallest tolerance that so many can keep to, by bisection."""
+    best = tuple(_OwnKeys(body, math.inf).keys)
+    high = math.log(max(float(body.errors(body.at_rest()).max()), TINY))
+    low = high - LEAST
+    for _ in range(BUDGET_STEPS):
+        middle = 0.5 * (low + high)
+        keys = _OwnKeys(body, math.exp(middle)).found()
+        if sum(len(keys[joint]) for joint in np.flatnonzero(body.free).tolist()) <= budget:
+            high, best = middle, keys
+        else:
+            low = middle
+    return best
 
 
 class _WholeBody(Recording):
@@ -274,8 +217,7 @@ class _OwnKeys:
         body, count = self.body, len(self.body.times)
         sizes, shares = self._sizes_and_shares()
         rests = np.all(shell_error(body.at_rest(), body.poses, sizes) <= shares, axis=1)
-        for joint in np.flatnonzero(rests & body.free).tolist():
-            self._show(joint, self.keys[joint])
+        self.shown[rests & body.free] = body.at_rest()[rests & body.free]
         moving = np.flatnonzero(~rests & body.free)
         if len(moving):
             times, starts = np.tile(body.times, len(moving)), count * np.arange(len(moving))
@@ -296,7 +238,9 @@ class _OwnKeys:
         for joints in skeleton.levels[:0:-1]:
             parents = skeleton.parents[joints]
             np.maximum.at(beneath, parents, moves[parents] + beneath[joints])
-        weights = np.array([body.weights[below].max(axis=0) for below in skeleton.below])
+        weights = body.weights.copy()
+        for joints in skeleton.levels[:0:-1]:
+            np.maximum.at(weights, skeleton.parents[joints], weights[joints])
         longest_chain = np.maximum(above + beneath - moves, 1)
         shares = np.full(body.poses.shape, self.tolerance) / longest_chain[:, None]
         shares /= np.maximum(weights, TINY)
@@ -366,15 +310,6 @@ class _OwnKeys:
             self._show(joint, np.union1d(self.keys[joint], (*ends, *np.flatnonzero(wanted[joint]))))
 
 
-def _spread(one: Poses, over: Poses) -> Poses:
-    """Poses (joints, 1) for all moments of others (joints, n)."""
-    return Poses(
-        np.broadcast_to(one.positions, over.positions.shape),
-        np.broadcast_to(one.quaternions, over.quaternions.shape),
-        None if one.scales is None else np.broadcast_to(one.scales, over.scales.shape),
-    )
-
-
 def _moves(poses: Poses) -> np.ndarray:
     """Which joints (joints, n) ever change in their parents' space, shape (joints,)."""
     changes = (np.ptp(poses.positions, axis=1) > 0.0).any(axis=1) | (np.ptp(poses.quaternions, axis=1) > 0.0).any(
@@ -394,14 +329,17 @@ def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:
     return np.broadcast_to(mask, (joints,))
 
 
-def _one_for_each(numbers: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
+def _one_for_each(given: ArrayLike, name: str, *shapes: tuple[int, ...]) -> np.ndarray:
     """A number for each joint or sample, or one for all: no damage and not below zero."""
-    numbers = np.asarray(numbers, dtype=np.float64)
-    if numbers.shape not in ((), *shapes):
+    given = numbers(given, f"{name}s")
+    if given.shape not in ((), *shapes):
         wanted = " or ".join(map(str, shapes))
-        raise ValueError(f"{name} of shape {numbers.shape}: give one number, or an array of shape {wanted}")
-    numbers = np.broadcast_to(numbers, shapes[0]) if numbers.ndim == 0 else numbers
-    if not (valid := (numbers >= 0.0) & (numbers < LIMIT)).all():
+        raise ValueError(f"{name} of shape {given.shape}: give one number, or an array of shape {wanted}")
+    given = np.broadcast_to(given, shapes[0]) if given.ndim == 0 else given
+    if not (valid := (given == 0.0) | ((given > 1.0 / LIMIT) & (given < LIMIT))).all():
         joint = np.argwhere(~valid)[0]
-        raise ValueError(f"joint {joint[0]} has a {name} of {numbers[tuple(joint)]}")
-    return numbers
+        raise ValueError(
+            f"joint {joint[0]} has a {name} of {given[tuple(joint)]}: give 0, or a number from {1.0 / LIMIT:g} to "
+            f"{LIMIT:g}"
+        )
+    return given

@@ -64,28 +64,50 @@ class Skeleton:
         return f"Skeleton({self.parents.tolist()})"
 
     def _depths(self) -> np.ndarray:
-        depths, above = np.zeros(len(self.parents), dtype=np.int64), self.parents
-        for _ in range(len(self.parents)):
+        depths, above = (self.parents >= 0).astype(np.int64), self.parents
+        for _ in range(len(self.parents).bit_length()):
             if np.all(above < 0):
                 return depths
-            depths += above >= 0
-            above = np.where(above >= 0, self.parents[above], -1)
+            # Twice as far up in every step.
+            depths += np.where(above >= 0, depths[above], 0)
+            above = np.where(above >= 0, above[above], -1)
+        if np.all(above < 0):
+            return depths
         # So far up there is nothing but the circle.
         raise ValueError(f"joint {int(above[above >= 0].min())} hangs on itself, through its parents")
 
     @cached_property
     def levels(self) -> list[np.ndarray]:
         """The joints of each depth, from the roots on. No two of a level hang on one another."""
-        return [np.flatnonzero(self.depths == depth) for depth in range(self.depths.max() + 1)]
+        order = np.argsort(self.depths, kind="stable")
+        return np.split(order, np.cumsum(np.bincount(self.depths))[:-1])
 
     @cached_property
-    def below(self) -> list[np.ndarray]:
-        """Of each joint, itself and all that hang on it, rising."""
-        hangs = np.eye(len(self), dtype=bool)
+    def sizes(self) -> np.ndarray:
+        """How many joints hang on each, and itself, shape (joints,)."""
+        sizes = np.ones(len(self), dtype=np.int64)
         for joints in self.levels[:0:-1]:
-            for joint in joints.tolist():
-                hangs[self.parents[joint]] |= hangs[joint]
-        return [np.flatnonzero(row) for row in hangs]
+            np.add.at(sizes, self.parents[joints], sizes[joints])
+        return sizes
+
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """The place of each joint, (joints,), in an order that has all that hangs on a joint behind it, and that."""
+        first, order = np.zeros(len(self), dtype=np.int64), np.empty(len(self), dtype=np.int64)
+        for joints in self.levels:
+            parents = self.parents[joints]
+            joints = joints[np.argsort(parents, kind="stable")]
+            parents, sizes = self.parents[joints], self.sizes[joints]
+            before = np.cumsum(sizes) - sizes
+            siblings = np.searchsorted(parents, parents)
+            first[joints] = before - before[siblings] + np.where(parents >= 0, first[parents] + 1, 0)
+        order[first] = np.arange(len(self))
+        return first, order
+
+    def below(self, joint: int) -> np.ndarray:
+        """Return a joint and all that hang on it, rising, shape (sizes[joint],)."""
+        first, order = self._places
+        return np.sort(order[first[joint] : first[joint] + self.sizes[joint]])
 
     def in_root_space(self, poses: Poses) -> Poses:
         """Where joints are that have these poses in their parents' space.
