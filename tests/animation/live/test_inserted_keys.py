@@ -11,6 +11,7 @@ from mathutils import Euler, Matrix
 
 from rigid_motion.animation import key_frames, set_mode
 from rigid_motion.animation.compute.source_cache import MOST_BYTES, known, size_of
+from tests.animation.bones.rigs import key_all, new_rig
 from tests.animation.oracle import curves_of, expected_bases
 from tests.animation.scenes import key, new_object, push_down, tweak
 
@@ -206,3 +207,61 @@ def test_a_key_of_another_user_of_a_slot_has_the_pose_of_that_one(live_file):
     second.keyframe_insert("rotation_quaternion")
     bpy.context.view_layer.update()
     assert np.abs(np.array(second.matrix_world) - before).max() < 1e-5
+
+
+# -- outside of the keys ----------------------------------------------------------------------------------------------
+
+
+def goes_on(carrier, how: str) -> None:
+    """Let all channels go on before and behind their keys."""
+    for fcurve in curves_of(carrier).values():
+        if how == "LINEAR":
+            fcurve.extrapolation = "LINEAR"
+        else:
+            cycles = fcurve.modifiers.new("CYCLES")
+            cycles.mode_before = cycles.mode_after = how
+        fcurve.update()
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize("frame", [-7, 47])
+@pytest.mark.parametrize("how", ["LINEAR", "REPEAT", "REPEAT_OFFSET"])
+def test_a_key_outside_of_the_keys_keeps_the_pose_where_the_motion_goes_on(live_file, how, frame, mode):
+    live_file.scene.frame_start, live_file.scene.frame_end = -20, 60
+    obj = key(new_object())
+    set_mode(obj, mode)
+    goes_on(obj, how)
+    bpy.context.view_layer.update()
+    live_file.scene.frame_set(frame)
+    before = seen()
+    obj.keyframe_insert("location")
+    obj.keyframe_insert("rotation_quaternion")
+    assert np.abs(seen() - before).max() < 2e-5 * max(1.0, np.abs(before).max())
+
+
+def test_a_key_of_a_bone_outside_of_the_keys_keeps_the_pose(live_file):
+    live_file.scene.frame_end = 60
+    rig = key_all(new_rig())
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    for bone in rig.pose.bones:
+        goes_on(bone, "LINEAR")
+    bpy.context.view_layer.update()
+    live_file.scene.frame_set(50)
+
+    def hand() -> np.ndarray:
+        bpy.context.view_layer.update()
+        return np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones["Hand"].matrix)
+
+    before = hand()
+    for path in ("location", "rotation_quaternion"):
+        rig.pose.bones["Hand"].keyframe_insert(path)
+    assert np.abs(hand() - before).max() < 5e-5
+
+
+def test_a_key_behind_all_others_keeps_its_value_where_they_hold(live_file):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(50)
+    before = seen()
+    obj.keyframe_insert("location")
+    assert np.abs(seen() - before).max() < 2e-5

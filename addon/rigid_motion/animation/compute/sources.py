@@ -193,6 +193,11 @@ class Source:
         modes = self.mode.values[0, np.clip(np.searchsorted(self.mode.times, frames, side="right") - 1, 0, None)]
         return np.rint(modes).astype(int)
 
+    def mode_at(self, frame: float) -> int:
+        """Return the number of the mode on a frame, on that of the original where cycles repeat it."""
+        frames = np.array([frame])
+        return int(self.modes_at(frames if self.cyclic is None else cycled(self.cyclic, frames)[0])[0])
+
     @property
     def is_live(self) -> bool:
         """Whether there is a segment that is to be filled in otherwise than Blender does."""

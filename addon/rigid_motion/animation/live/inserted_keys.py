@@ -1,4 +1,6 @@
-"""The one place where a key of the animator's is changed: a key inserted in between keeps the pose that it is of.
+"""The one place where a key of the animator's is changed: one that is inserted where a mode acts keeps the pose it is of.
+
+That is between two keys, and before and behind all of them where cycles or an extrapolation go on.
 
 The screen shows Blender's own in-between with the difference on top; a key has no difference. What was keyed tells
 which of the two its value is:
@@ -166,12 +168,15 @@ def _identity(transform: Transform) -> tuple[int, str]:
 
 
 def _is_inserted(old: Source, new: Source, frame: float) -> bool:
-    """Whether the only change of key times is one more, on this frame, in a segment that is not Blender's own."""
+    """Return whether key times differ by one more alone, on this frame, where the motion is not Blender's own.
+
+    That is in a segment with a mode, or before or behind all keys where the motion goes on.
+    """
     before, after = old.keyed_frames, new.keyed_frames
-    if not before[0] < frame < before[-1] or np.abs(before - frame).min() < SAME_FRAME:
+    if not (before[0] < frame < before[-1] or old.goes_on) or np.abs(before - frame).min() < SAME_FRAME:
         return False
     others = after[np.abs(after - frame) >= SAME_FRAME]
-    return len(others) < len(after) and np.array_equal(others, before) and bool(old.modes_at(np.array([frame]))[0])
+    return len(others) < len(after) and np.array_equal(others, before) and bool(old.mode_at(frame))
 
 
 def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
