@@ -1,4 +1,4 @@
-"""The one place where a key of the animator's is changed: one that is inserted where a mode acts keeps the pose it is of.
+"""The one place where a key of the animator's is changed: a key set where a mode acts keeps the pose that it is of.
 
 That is between two keys, and before and behind all of them where cycles or an extrapolation go on.
 
