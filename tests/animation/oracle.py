@@ -158,7 +158,7 @@ def _components(
         share = progress(obj, first, last, frames[inside])
         if mode in SMOOTH:
             elapsed = np.clip((frames[inside] - first) / (last - first), 0.0, 1.0)
-            leaving, arriving = _passings(obj, keys, first)
+            leaving, arriving = _passings(obj, keys, first, own)
             share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
             poses = _smooth(obj, keys, first, share, mode, own, scaled, (leaving[0], arriving[0]))
         else:
@@ -248,42 +248,43 @@ def _parts(poses: Poses) -> tuple[np.ndarray, np.ndarray]:
     return poses.positions, poses.quaternions
 
 
-def _passings(obj: Carrier, keys: np.ndarray, first: float) -> list[tuple[float, float]]:
+def _passings(obj: Carrier, keys: np.ndarray, first: float, own: Own) -> list[tuple[float, float]]:
     """At both ends of a segment how long the tangent is, and what the slope of progress lacks."""
     place, codes = int(np.flatnonzero(keys == first)[0]), _codes(obj, first)
     passings = [(1.0, 0.0), (1.0, 0.0)]
     if "BEZIER" in codes and codes <= {"LINEAR", "BEZIER"}:
         if place > 0:
-            passings[0] = _passing(obj, *keys[place - 1 : place + 2], after=True)
+            passings[0] = _passing(obj, keys[place - 1 : place + 2], own, after=True)
         if place + 2 < len(keys):
-            passings[1] = _passing(obj, *keys[place : place + 3], after=False)
+            passings[1] = _passing(obj, keys[place : place + 3], own, after=False)
     return passings
 
 
-def _passing(obj: Carrier, before: float, key: float, behind: float, *, after: bool) -> tuple[float, float]:
+def _passing(obj: Carrier, keys: np.ndarray, own: Own, *, after: bool) -> tuple[float, float]:
     """The same before or after the key in the middle of three."""
-    begin, end = (key, behind) if after else (before, key)
-    steps = key + (end - begin) / 16.0 * (np.arange(4) if after else -np.arange(4))
-    values = []
-    for path in transform_paths(obj):
-        weight = 2.0 if path == "rotation_quaternion" else 1.0
-        for index in range(WIDTHS[path]):
-            fcurve = curve_of(obj, path, index)
-            if fcurve is not None and len(fcurve.keyframe_points) and not fcurve.mute:
-                values.append(weight * np.array(_timing(fcurve, [before, key, behind, *steps])))
-    rows = np.array(values)
-    slope = np.polyfit(steps - key, rows[:, 3:].T, 3)[2]
-    times, chords = (key - before, behind - key), (rows[:, 1] - rows[:, 0], rows[:, 2] - rows[:, 1])
+    times = np.diff(keys)
+    begin, end = keys[after : after + 2]
+    steps = keys[1] + times[int(after)] / 8.0 * (np.arange(4) if after else -np.arange(4))
+    screws = _twists(_key_poses(obj, keys, own, False), (0, 1), (1, 2)).T
+    native = np.polyfit(steps - keys[1], _twists(_key_poses(obj, steps, own, False), (0,) * 4, range(4)).T, 3)[2]
+    progressed = progress(obj, begin, end, steps)
+    slope = np.polyfit(steps - keys[1], progressed, 3)[2] * times[int(after)]
     share = _share(*times)
-    speeds = [part * chord / time for part, chord, time in zip((share, 1.0 - share), chords, times, strict=True)]
-    mean, chord = sum(speeds), chords[after]
+    speeds = [part * screw / time for part, screw, time in zip((share, 1.0 - share), screws, times, strict=True)]
+    mean = sum(speeds)
     squared = max(mean @ mean, 0.01 * sum(speed @ speed for speed in speeds))
-    if not (squared > 0.0 and chord.any()):
+    if not squared > 0.0:
         return 0.0, 0.0
-    length = (chord / times[after]) @ mean / squared
-    wanted = slope @ mean / squared / np.copysign(max(abs(length), 0.1), length)
-    progress = (slope @ chord) * times[after] / (chord @ chord)
-    return length, np.clip(wanted, -3.0, 3.0) - np.clip(progress, -3.0, 3.0)
+    length = screws[int(after)] / times[int(after)] @ mean / squared
+    if share == float(not after):
+        return length, 0.0
+    passed = native @ mean / squared / np.copysign(max(abs(length), 0.1), length)
+    return length, np.clip(passed, -3.0, 3.0) - np.clip(slope, -3.0, 3.0)
+
+
+def _twists(poses: Poses, froms: Sequence[int], tos: Sequence[int]) -> np.ndarray:
+    first, second = poses[list(froms)], poses[list(tos)]
+    return twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
 
 
 def _share(before: float, after: float) -> float:

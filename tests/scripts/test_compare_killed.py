@@ -35,7 +35,7 @@ def start(output: Path, clip: Path) -> subprocess.Popen:
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def workers_of(process: int) -> list[int]:
+def children_of(process: int) -> list[int]:
     try:
         return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
     except FileNotFoundError:
@@ -68,7 +68,9 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
     for number in range(MOMENTS):
         process = start(tmp_path, clip)
         time.sleep(chance.uniform(0.1, 0.9) * seconds)
-        workers = workers_of(process.pid)
+        # The command waits for the program, which has the workers.
+        programs = children_of(process.pid)
+        workers = [worker for program in programs for worker in children_of(program)]
         if number % 2 and workers:
             os.kill(chance.choice(workers), signal.SIGKILL)
             _, said = process.communicate(timeout=300)
@@ -78,7 +80,8 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
                 for path in [*tmp_path.rglob("*.mp4"), *tmp_path.rglob("keys.csv")]:
                     path.unlink()
         else:
-            process.kill()
+            for program in (*programs[: number % 4 // 2], process.pid):
+                os.kill(program, signal.SIGKILL)
             process.communicate()
         found = outputs(tmp_path)
         half = [path for path, content in found.items() if content not in (wanted.get(path), b"")]

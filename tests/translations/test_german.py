@@ -57,7 +57,7 @@ UNSEEN = {
     "Keys are not in memory as expected, and are read by Blender's own functions, which takes longer",
     "The paths could not be drawn",
     "The transform on the screen cannot be shown",
-    "a mode for keyframes can look one key behind and ahead of a segment: see _with_neighbours",
+    "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours",
     ": rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first",
     " frames do not fit poses of shape ",
     "list[FewerKeys] | Refused",

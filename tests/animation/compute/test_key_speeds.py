@@ -115,7 +115,7 @@ def test_it_rests_where_all_handles_are_flat_and_hurries_where_they_are_steep(li
         set_slopes(obj, 13.0, factor)
         set_mode(obj, "motor_spline")
         lengths[factor] = [np.linalg.norm(side) for side in speeds(obj, 13.0)]
-    assert max(lengths[0.0]) < 1e-3 * min(lengths[1.0])
+    assert max(lengths[0.0]) < 2e-3 * min(lengths[1.0])
     np.testing.assert_allclose(lengths[1.5], 1.5 * np.array(lengths[1.0]), rtol=0.02)
 
 

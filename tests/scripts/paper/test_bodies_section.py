@@ -243,7 +243,7 @@ def test_a_body_without_hands_has_the_other_parts():
 
 def test_names_that_somebody_else_gave_are_text_and_nothing_else():
     hostile = "a`|b\n# <i>\x1b[31m"
-    assert quoted(hostile) == "`a'/b # <i> [31m`"
+    assert quoted(hostile) == "`a'/b\\n# <i>\\x1b[31m`"
     assert quoted("") == "`?`"
     limbs = [replace(limb, joint=hostile) for limb in LIMB_ROWS]
     apart = [replace(row, joint=hostile) for row in ROWS["apart"]]

@@ -26,16 +26,19 @@ def turn_into_quaternions(rows: np.ndarray, order: str | None) -> None:
     quaternions /= lengths
 
 
-def key_poses(start: np.ndarray, end: np.ndarray, own: np.ndarray, source: Source) -> Poses:
-    """The poses that segments run between, shape (S, 2), with the objects' own delta transforms (10, S)."""
-    own = own[:, :, None]
-    for rows in (start, end):
-        turn_into_quaternions(rows, source.order)
-    ends = np.stack((start, end), axis=2)
+def body_poses(rows: np.ndarray, own: np.ndarray, axes: np.ndarray | None, source: Source) -> Poses:
+    """Return the poses (S, k) of S segments that channels (., S, k) give.
+
+    With the objects' own delta transforms (10, S, 1), and along the axes (S, 3, 3) that location has.
+    """
+    flat = rows.reshape(len(rows), -1).copy()
+    turn_into_quaternions(flat, source.order)
+    rows = flat.reshape(rows.shape)
+    positions = np.moveaxis(rows[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1)
     return Poses(
-        np.moveaxis(ends[ROWS[LOCATION]] + own[ROWS[LOCATION]], 0, -1),
-        multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(ends[ROWS[ROTATION]], 0, -1)),
-        ends[7] if source.uniform_scale else None,
+        positions if axes is None else np.einsum("sij,skj->ski", axes, positions),
+        multiply(np.moveaxis(own[ROWS[ROTATION]], 0, -1), np.moveaxis(rows[ROWS[ROTATION]], 0, -1)),
+        rows[7] if source.uniform_scale else None,
     )
 
 

@@ -17,15 +17,15 @@ from functools import partial
 
 import numpy as np
 
-from ...motion import KEYFRAME_MODES, Poses, prepare
+from ...motion import KEYFRAME_MODES, Poses, prepare, twists
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
 from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
-from .bodies import differ, key_poses, location_axes, turn_into_quaternions
+from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-from .key_speeds import MEASURED, corrected, end_slopes, tangents_and_lacks
+from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, with_neighbours
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
 
@@ -231,8 +231,14 @@ def _move(
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
     original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
     smooth = np.isin(modes, SMOOTH)
-    tangents, lacks = _at_keys(start, end, segments, smooth)
-    ends = _Ends.of(start, end, segments, smooth, tangents)
+    ends, lacks = _Ends.of(start, end, segments, smooth), None
+    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
+    if has_handles.any():
+        measured = _measured(ends.times, segments)
+        progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]
+        tangents, lacks = ends.at_keys(progress, measured, sources[0])
+        ends = replace(ends, tangents=np.where(has_handles, tangents, 1.0))
+        lacks = np.where(has_handles, lacks, 0.0)
 
     every_frame = np.concatenate(frames)
     for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
@@ -299,35 +305,41 @@ class _Ends:
     around: tuple[np.ndarray, Poses] | None
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
-    tangents: np.ndarray | None
-    """How long the tangents of smooth modes are at both, shape (2, S); None where all are 1."""
-
     axes: np.ndarray | None
     """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
+
+    own: np.ndarray
+    """The objects' own delta transforms, shape (10, S)."""
+
+    tangents: np.ndarray | None = None
+    """How long the tangents of smooth modes are at both keys, shape (2, S); None where all are 1."""
 
     prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
     """What each mode makes of all segments, once it has been asked for."""
 
     @classmethod
-    def of(
-        cls,
-        start: np.ndarray,
-        end: np.ndarray,
-        segments: list[tuple[Source, slice]],
-        smooth: np.ndarray,
-        tangents: np.ndarray | None,
-    ) -> _Ends:
+    def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> _Ends:
         """From the channels (10, S) at both ends, and which of the segments have a smooth mode."""
         sources = [source for source, _ in segments]
-        owners, times = _owners_and_times(segments)
-        keys = key_poses(start, end, np.stack([source.original for source in sources], axis=1)[:, owners], sources[0])
+        owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
+        firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
+        times = np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
+        own = np.stack([source.original for source in sources], axis=1)[:, owners]
         axes = location_axes(sources, owners)
-        if axes is not None:
-            keys = replace(keys, positions=np.einsum("sij,skj->ski", axes, keys.positions))
-        if not smooth.any():
-            return cls(owners, times, keys, None, None, axes)
-        holds = np.concatenate([source.holds for source in sources])
-        return cls(owners, times, keys, with_neighbours(owners, times, keys, holds), tangents, axes)
+        keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
+        around = None
+        if smooth.any():
+            holds = np.concatenate([source.holds for source in sources])
+            around = with_neighbours(owners, times, keys, holds)
+        return cls(owners, times, keys, around, axes, own)
+
+    def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
+        """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
+        first, second = self.keys[:, 0], self.keys[:, 1]
+        screws = twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
+        native = native_twists(self.keys, body_poses(measured, self.own[..., None], self.axes, source))
+        pairs = meeting(self.owners, self.times, self.keys)
+        return tangents_and_lacks(progress_slopes(progress), native, screws, self.times, pairs)
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
@@ -352,29 +364,12 @@ class _Ends:
         return prepare_within(partial(KEYFRAME_MODES[mode].curves, tangents=self.tangents[..., None]), *self.around)
 
 
-def _owners_and_times(segments: list[tuple[Source, slice]]) -> tuple[np.ndarray, np.ndarray]:
-    """The number of the source of each segment, shape (S,), and the frames of both its keys, shape (S, 2)."""
-    owners = np.repeat(np.arange(len(segments)), [place.stop - place.start for _, place in segments])
-    firsts, lasts = ([source.key_frames[part] for source, _ in segments] for part in (slice(-1), slice(1, None)))
-    return owners, np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
-
-
-def _at_keys(
-    start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray
-) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Return `tangents_and_lacks` of smooth segments that have handles; None where there are none."""
+def _measured(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.ndarray:
+    """The channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
     sources = [source for source, _ in segments]
-    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
-    if not has_handles.any():
-        return None, None
-    owners, times = _owners_and_times(segments)
     moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
     frames = [moments[place].ravel() for _, place in segments]
-    measured = _sampled(_each(sources, map(len, frames)), frames).reshape(len(start), -1, len(MEASURED))
-    pairs = meeting(owners, times, start, end)
-    slopes = end_slopes(start, end, measured)
-    tangents, lacks = tangents_and_lacks(slopes, end - start, times, pairs, sources[0].order is None)
-    return np.where(has_handles, tangents, 1.0), np.where(has_handles, lacks, 0.0)
+    return _sampled(_each(sources, map(len, frames)), frames).reshape(_height(sources), -1, len(MEASURED))
 
 
 def _sampled(

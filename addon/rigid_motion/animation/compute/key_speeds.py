@@ -2,28 +2,30 @@
 
 The direction of the tangent at a key is that of the mode, a mean of the twists before and after it. How far the motion
 has come in a segment is what the channels say, as in the other modes: their progress along the segment's chord. The
-chords on both sides of a key differ in length and direction. So the tangent is made as long on either side as the
-chord is along the mean of both, which makes the speed the same where handles are smooth and the path is straight; what
-is lacking on a bent path is added to the progress. With two keys, and where nothing eases, nothing changes.
+screws on both sides of a key differ in speed and direction. So the tangent is made as long on either side as the screw
+is along the mean of both, which makes the speed the same where handles are smooth and the path is straight; what is
+lacking on a bent path, for the speed that Blender's own in-betweens have in that direction, is added to the progress.
+With two keys, and where no handle has a say, nothing changes.
 
-Arrays have the ten components of location, rotation and scale as rows, segments along the last axis.
+Twists (6, S) are along the body's own axes at the key, a radian counting as much as a unit of length; segments stand
+along the last axis.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ...motion import Poses, twists
 from ...motion.curves import _shares as twist_shares
-from .components import ROTATION, ROWS
 
-STEP = 1.0 / 16.0
+STEP = 1.0 / 8.0
 """What part of a segment slopes are measured over: exact for cubics in time, and finite for vertical handles."""
 
-SLOPES = np.array((-11.0, 18.0, -9.0, 2.0)) / (6.0 * STEP)
-"""The slope of the cubic through four values that are `STEP` apart, at the first of them."""
+SLOPES = np.array((18.0, -9.0, 2.0)) / (6.0 * STEP)
+"""The slope at 0 of the cubic through 0 and three values that are `STEP` apart."""
 
 MEASURED = np.concatenate((np.arange(1, 4) * STEP, 1.0 - np.arange(3, 0, -1) * STEP))
-"""The progress in time of the samples that slopes are measured from."""
+"""How far in its time a segment is where it is measured: next to its first key, and next to its second."""
 
 FASTEST = 3.0
 """The largest slope of progress that is corrected: up to here a cubic between two keys does not turn back.
@@ -37,18 +39,29 @@ SMALL = 0.01
 is no direction to measure along."""
 
 
-def end_slopes(start: np.ndarray, end: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Return the slopes of the channels at both ends of S segments, for segments of duration 1, shape (2, rows, S).
+def progress_slopes(progress: np.ndarray) -> np.ndarray:
+    """Return the slopes at both ends (2, S) from the progress at the moments `MEASURED` (S, 6), in unit time."""
+    return np.stack((progress[:, :3] @ SLOPES, (1.0 - progress[:, :2:-1]) @ SLOPES))
 
-    `measured` (rows, S, 6) are their values at the moments `MEASURED`, start and end (rows, S) those at the keys.
+
+def native_twists(keys: Poses, measured: Poses) -> np.ndarray:
+    """Return Blender's own twists at both ends, shape (2, 6, S), in unit time.
+
+    From the poses at both keys (S, 2) and those of Blender's own in-betweens at the moments `MEASURED` (S, 6).
     """
-    first = np.concatenate((start[..., None], measured[..., :3]), axis=-1)
-    last = np.concatenate((end[..., None], measured[..., :2:-1]), axis=-1)
-    return np.stack((first @ SLOPES, -(last @ SLOPES)))
+    ends = np.zeros(6, dtype=int)
+    ends[3:] = 1
+    found = twists.between(
+        keys.positions[:, ends].reshape(-1, 3),
+        keys.quaternions[:, ends].reshape(-1, 4),
+        measured.positions.reshape(-1, 3),
+        measured.quaternions.reshape(-1, 4),
+    ).reshape(6, -1, 6)
+    return np.stack((found[..., :3] @ SLOPES, -(found[..., :2:-1] @ SLOPES)))
 
 
 def tangents_and_lacks(
-    slopes: np.ndarray, chord: np.ndarray, times: np.ndarray, pairs: tuple[np.ndarray, np.ndarray], by_quaternion: bool
+    slopes: np.ndarray, native: np.ndarray, screws: np.ndarray, times: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the lengths of tangents at both ends of S segments, and what the slopes of progress lack there, (2, S).
 
@@ -56,46 +69,33 @@ def tangents_and_lacks(
 
     Parameters
     ----------
-    slopes : array, shape (2, rows, S)
-        As `end_slopes` has them.
-    chord : array, shape (rows, S)
-        From the first key of each segment to the second.
+    slopes : array, shape (2, S)
+        Of progress, as `progress_slopes` has them.
+    native : array, shape (2, 6, S)
+        As `native_twists` has them.
+    screws : array, shape (6, S)
+        The twists that lead from key to key in unit time.
     times : array, shape (S, 2)
         The frames of both keys.
     pairs : tuple of array of int, shape (p,)
         The segments that meet at a key: those before it, and those after it.
-    by_quaternion : bool
-        Whether rotation is by quaternions, which move by half of the angle.
     """
-    weights = np.ones(len(chord))
-    if by_quaternion:
-        weights[ROWS[ROTATION]] = 4.0
-
-    def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.einsum("r,rs,rs->s", weights, a, b)
-
-    tangents, lacks = np.ones((2, chord.shape[1])), np.zeros((2, chord.shape[1]))
-    before, after = pairs
+    tangents, lacks = np.ones(slopes.shape), np.zeros(slopes.shape)
     durations = times[:, 1] - times[:, 0]
-    speeds = chord / np.where(durations > 0.0, durations, np.inf)
+    speeds = screws / np.where(durations > 0.0, durations, np.inf)
+    before, after = pairs
     share = twist_shares(durations[before], durations[after])
     parts = share * speeds[:, before], (1.0 - share) * speeds[:, after]
     mean = parts[0] + parts[1]
-    squared = np.maximum(dot(mean, mean), SMALL * sum(dot(part, part) for part in parts))
-    for side, segments in ((1, before), (0, after)):
-        length = _ratio(dot(speeds[:, segments], mean), squared)
-        slope = slopes[side][:, segments]
-        speed = _ratio(dot(slope, mean), durations[segments] * squared)
-        progress = _ratio(dot(slope, chord[:, segments]), dot(chord, chord)[segments])
+    squared = np.maximum(_dot(mean, mean), SMALL * sum(_dot(part, part) for part in parts))
+    for side, segments, alone in ((1, before, share == 1.0), (0, after, share == 0.0)):
+        length = _ratio(_dot(speeds[:, segments], mean), squared)
+        speed = _ratio(_dot(native[side][:, segments], mean), durations[segments] * squared)
+        slope = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
         tangents[side, segments] = length
-        wanted = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
-        lacks[side, segments] = np.clip(wanted, -FASTEST, FASTEST) - np.clip(progress, -FASTEST, FASTEST)
+        lack = np.clip(slope, -FASTEST, FASTEST) - np.clip(slopes[side, segments], -FASTEST, FASTEST)
+        lacks[side, segments] = np.where(alone, 0.0, lack)
     return tangents, lacks
-
-
-def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a / b, 0 where b is 0."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b != 0.0)
 
 
 def corrected(progress: np.ndarray, elapsed: np.ndarray, lacks: np.ndarray) -> np.ndarray:
@@ -103,3 +103,12 @@ def corrected(progress: np.ndarray, elapsed: np.ndarray, lacks: np.ndarray) -> n
     left = 1.0 - elapsed
     added = elapsed * left * (left * lacks[0] - elapsed * lacks[1])
     return np.where((elapsed > 0.0) & (left > 0.0), progress + added, progress)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("rs,rs->s", a, b)
+
+
+def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a / b, 0 where b is 0."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b != 0.0)

@@ -18,7 +18,7 @@ def with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: n
     # Between two keys on one frame there is nothing, and what is on either side meets there.
     lasts = times[:, 1] > times[:, 0]
     duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
-    left, right = meeting(owners, times, rows[:, 0].T, rows[:, 1].T)
+    left, right = meeting(owners, times, keys)
     previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
     following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
     before, behind = duration.copy(), duration.copy()
@@ -31,11 +31,11 @@ def with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: n
     )
 
 
-def meeting(owners: np.ndarray, times: np.ndarray, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The segments (p,) before and after each key at which two of them meet: with the values (., S) that both have."""
-    lasts = np.flatnonzero(times[:, 1] > times[:, 0])
+def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there."""
+    rows, lasts = _packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
     left, right = lasts[:-1], lasts[1:]
-    meet = (owners[right] == owners[left]) & np.all(start[:, right] == end[:, left], axis=0)
+    meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
     return left[meet], right[meet]
 
 

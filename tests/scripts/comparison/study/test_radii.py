@@ -93,7 +93,7 @@ def test_joints_of_any_name_have_their_radius(
             (f"joint,radius_m\nHand,{number}\n", 2, f"{number!r} is no number of metres above 0")
             for number in ("", "0", "-0.1", "nan", "inf", "-inf", "0.1 m", "10cm", "0x1")
         ),
-        ("a\x1b[2J\n", 1, "the columns joint and radius_m are needed, and it has a [2j"),
+        ("a\x1b[2J\n", 1, "the columns joint and radius_m are needed, and it has a\\x1b[2j"),
     ],
 )
 def test_what_is_wrong_is_told_with_the_file_and_the_line(
