@@ -84,12 +84,12 @@ RULES = {
     "2": bounded(2.0),
     "1.5": bounded(1.5),
     "1": bounded(1.0),
-    "1, none up to 1/6": bounded(1.0, least_part=1.0 / 6.0),
+    "1, none up to 1/16": bounded(1.0, least_part=1.0 / 16.0),
     "0.75": bounded(0.75),
     "squared": bounded(1.0, 2.0),
     "between_neighbours": lambda before, after: before / (before + after),
 }
-"""Rules for the share of the twist before a key; that of the program is "1, none up to 1/6"."""
+"""Rules for the share of the twist before a key; that of the program is "1, none up to 1/16"."""
 
 PARTS = {"whole": 1.0, "none": 0.0}
 """How much of what the parabola adds a key of `motor_spline_causal` could have, where the program gives half."""
@@ -202,7 +202,7 @@ def _by_rule(clips: Sequence[Clip], name: str) -> dict[str, dict[str, float]]:
     """By way to have keys and rate, what `motor_spline` needs under a rule."""
     _say(f"rule {name} ...")
     with mock.patch.object(curves, "_shares", RULES[name]):
-        return _needed(clips, ("motor_spline",), fit=name in ("parabola", "1, none up to 1/6"))["motor_spline"]
+        return _needed(clips, ("motor_spline",), fit=name in ("parabola", "1, none up to 1/16"))["motor_spline"]
 
 
 # -- the best mode of each segment -------------------------------------------------------------------------------------

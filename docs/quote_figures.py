@@ -199,13 +199,13 @@ RULES = {
     "2": "share at most 2 short / long",
     "1.5": "at most 1.5 short / long",
     "1": "at most short / long",
-    "1, none up to 1/6": "at most short / long, and none up to 1/6",
+    "1, none up to 1/16": "at most short / long, and none up to 1/16",
     "0.75": "at most 0.75 short / long",
     "squared": "at most (short / long)^2",
     "between_neighbours": "slope between the neighbours, h0 / (h0 + h1)",
 }
 
-OWN_RULE = "1, none up to 1/6"
+OWN_RULE = "1, none up to 1/16"
 
 
 def rules(sources: Sources) -> str:

@@ -138,7 +138,7 @@ def test_no_page_says_a_negative_percentage():
         assert not found, f"{path.name}: {found}"
 
 
-TIMES = np.array((1.0, 12.0, 1.0, 0.5)), np.array((12.0, 1.0, 1.0, 0.7))
+TIMES = np.array((1.0, 20.0, 1.0, 0.5)), np.array((20.0, 1.0, 1.0, 0.7))
 """Of segments before and after a key."""
 
 

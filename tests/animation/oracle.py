@@ -289,7 +289,7 @@ def _twists(poses: Poses, froms: Sequence[int], tos: Sequence[int]) -> np.ndarra
 
 def _share(before: float, after: float) -> float:
     """Of the twist before a key in that of the key."""
-    if max(before, after) >= 6.0 * min(before, after):
+    if max(before, after) >= 16.0 * min(before, after):
         return float(before > after)
     return min(max(after / (before + after), 1.0 - after / before), before / after)
 

@@ -177,7 +177,7 @@ def test_what_makes_no_sense_is_refused():
 @pytest.mark.parametrize(("tolerance", "mode"), [(0.01, "motor_spline"), (0.01, "lerp_slerp"), (0.01, "dq_sclerp")])
 def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it(tolerance, mode):
     """Where another mode is nearer on the whole, and passes it. The keys' own may be off by rounding more than it."""
-    for seed in range(48):
+    for seed in range(16):
         times, poses = wandering(300, seed)
         keys = reduce_keys(times, poses, mode, tolerance, RADIUS, tries=0)
         largest = shell_errors(times, poses, keys, mode).max()
@@ -186,6 +186,6 @@ def test_a_segment_at_the_very_tolerance_does_not_fall_for_a_mode_that_passes_it
             for most in (None, largest * (1.0 - 1e-13))
         )
         assert bound <= tolerance * (1.0 + 1e-9)
-        if free > 1.005 * tolerance:
+        if free > 1.02 * tolerance:
             return
     pytest.fail("no mode was tempting")

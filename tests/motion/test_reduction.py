@@ -170,8 +170,7 @@ def test_scale_is_part_of_the_pose():
     keys = reduce_keys(times, growing, tolerance=0.002)
     shown = interpolate(times[keys], growing[keys], times, "motor_spline")
     assert RADIUS * np.abs(shown.scales - scales).max() <= 0.002 + 1e-9
-    still = Poses(np.zeros((300, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (300, 1)), scales)
-    assert len(reduce_keys(times, still, tolerance=0.002)) > 10
+    assert len(keys) > len(reduce_keys(times, poses, tolerance=0.002))
 
 
 GOOD = wandering(20, 1)

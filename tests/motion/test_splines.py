@@ -167,9 +167,9 @@ def slow_spline(times: np.ndarray, keys: Poses, moments: np.ndarray, mode: str) 
     speeds = [ways[0] / h[0]]
     for i in range(1, len(h)):
         # The slope at 0 of the parabola through what lies behind, here, and ahead, unless the shorter one's share in it
-        # is more than its part of the longer one's time; up to a sixth of that it has none.
+        # is more than its part of the longer one's time; up to a sixteenth of that it has none.
         short, long = (i - 1, i) if h[i - 1] < h[i] else (i, i - 1)
-        share = min(h[long] / (h[long] + h[short]), h[short] / h[long]) if h[short] > h[long] / 6.0 else 0.0
+        share = min(h[long] / (h[long] + h[short]), h[short] / h[long]) if h[short] > h[long] / 16.0 else 0.0
         speeds.append(share * ways[short] / h[short] + (1.0 - share) * ways[long] / h[long])
     speeds.append(ways[-1] / h[-1])
     if mode == CAUSAL:

@@ -119,7 +119,7 @@ def motor_spline_causal(segments: Segments) -> Curves:
     return replace(_bent(segments, at_keys), fades=None if np.all(fades == 1.0) else fades)
 
 
-SHORT = 1.0 / 6.0
+SHORT = 1.0 / 16.0
 """The part of its neighbour's time up to which a segment passes no twist on."""
 
 

@@ -64,6 +64,9 @@ OTHERS = (0.9, 1.1, 1.25)
 MUCH = 2**13
 """Poses to look at in one go, that are worth being put off for what may make some of them needless."""
 
+SHORT = 2**13
+"""Samples, to which every one of them is a key at first: it takes longer, and finds fewer keys."""
+
 SWEEPS = 8
 """Of all keys, for those to be changed at once."""
 
@@ -153,6 +156,8 @@ class Search:
         lengths = recording.ends - recording.starts + 1
         is_key, good = ~np.repeat(enough, lengths), ~np.repeat(enough, lengths)
         is_key[recording.starts] = is_key[recording.ends] = ends[recording.ends] = True
+        if count <= SHORT:
+            return self.measured(np.flatnonzero(is_key))
         last = np.repeat(recording.ends, lengths)
         places, half = np.arange(count) - np.repeat(recording.starts, lengths), 1
         while good.any():
