@@ -1,4 +1,4 @@
-"""Smooth Screw on keys that the I key sets: it starts and stops as gently as Screw, and a key far away changes little."""
+"""Smooth Screw on keys that the I key sets: it eases as Screw does, and a key far away changes little."""
 
 from __future__ import annotations
 
