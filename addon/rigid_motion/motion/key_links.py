@@ -88,7 +88,7 @@ def least_keys(costs: Costs, best: np.ndarray, found: list[np.ndarray], budget: 
         Others, as few or more, that are candidates.
     budget : int
     """
-    width = WIDTHS[costs.reach][0] if costs.recording.poses_each == 1.0 else 0
+    width = WIDTHS[0][0 if costs.recording.poses_each == 1.0 else 1]
     candidates = np.union1d(_beside(costs, [best], width if costs.reach == 0 else 0), np.concatenate(found))
     worst = costs.peak(best) * WITHIN
     wider = ALIVE if costs.reach else 1.0

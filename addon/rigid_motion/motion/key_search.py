@@ -187,9 +187,12 @@ class Search:
         """So many samples that are keys with as small an error as can be found, never more than that of `_fewest`."""
         best = self._fewest(budget)
         least, found, factor = self._error(best), [best.indices], LESS
-        for _ in range(tries if least > 0.0 else 0):
+        for number in range(tries - 1 if least > 0.0 else 0):
             # From the keys that there are, most segments are known already: a try takes a part of the first search.
-            keys = self._swapped(best.indices, budget) if self.power == 2 else self._tightened(best, factor * least)
+            if self.power == 2:
+                keys = self._swapped(best.indices, budget)
+            else:
+                keys = self._tightened(best, factor * least) if number else self._first(factor * least)
             found.append(keys.indices)
             best, better = self._least(best, keys, budget)
             factor = factor if better else math.sqrt(factor)
