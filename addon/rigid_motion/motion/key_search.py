@@ -187,8 +187,12 @@ class Search:
         """So many samples that are keys with as small an error as can be found, never more than that of `_fewest`."""
         best = self._fewest(budget)
         least, found, factor = self._error(best), [best.indices], LESS
-        for number in range(tries - 1 if least > 0.0 else 0):
-            # From the keys that there are, most segments are known already: a try takes a part of the first search.
+        # Where whole ways are compared in the end, that is the last try.
+        links = tries and self._is_linkable and (self.power == 2 or not self.reach)
+        for number in range(tries - bool(links)):
+            if least == 0.0:
+                return best.indices
+            # The first try begins anew; from the keys that there are, others take a part of its time.
             if self.power == 2:
                 keys = self._swapped(best.indices, budget)
             else:
@@ -197,7 +201,7 @@ class Search:
             best, better = self._least(best, keys, budget)
             factor = factor if better else math.sqrt(factor)
             least = self._error(best)
-        if self._is_linkable and tries and least > 0.0:
+        if links and least > 0.0:
             if self.power == 2:
                 linked = traded_keys(self.costs, found, budget=budget)
             else:
@@ -206,7 +210,7 @@ class Search:
         return best.indices
 
     def _tightened(self, keys: Keys, tolerance: float) -> Keys:
-        """As few keys as keep to a tolerance, from keys that do not."""
+        """Few keys that keep to a tolerance, from others that do not."""
         return self.refined(self.densified(self.measured(keys.indices), tolerance), tolerance)
 
     def _swapped(self, indices: np.ndarray, budget: int) -> Keys:
