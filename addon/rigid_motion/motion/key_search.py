@@ -188,7 +188,7 @@ class Search:
         best = self._fewest(budget)
         least, found, factor = self._error(best), [best.indices], LESS
         # Where whole ways are compared in the end, that is the last try.
-        links = tries and self._is_linkable and (self.power == 2 or not self.reach)
+        links = tries and self._is_linkable
         for number in range(tries - bool(links)):
             if least == 0.0:
                 return best.indices
