@@ -187,14 +187,14 @@ class Search:
         """So many samples that are keys with as small an error as can be found, never more than that of `_fewest`."""
         best = self._fewest(budget)
         least, found, factor = self._error(best), [best.indices], LESS
-        # Where whole ways are compared in the end, that is the last try.
-        links = tries and self._is_linkable
+        links = tries and self._is_linkable  # The last try.
         for number in range(tries - bool(links)):
             if least == 0.0:
                 return best.indices
             # The first try begins anew; from the keys that there are, others take a part of its time.
             if self.power == 2:
-                keys = self._swapped(best.indices, budget)
+                # Some more where the motion is off most, moved together.
+                keys = self._filled(self.measured(best.indices), math.ceil(SWAPPED * budget))
             else:
                 keys = self._tightened(best, factor * least) if number else self._first(factor * least)
             found.append(keys.indices)
@@ -213,15 +213,8 @@ class Search:
         """Few keys that keep to a tolerance, from others that do not."""
         return self.refined(self.densified(self.measured(keys.indices), tolerance), tolerance)
 
-    def _swapped(self, indices: np.ndarray, budget: int) -> Keys:
-        """Keys with some more where the motion is off most, moved together."""
-        return self._filled(self.measured(indices), math.ceil(SWAPPED * budget))
-
     def _least(self, best: Keys, other: Keys, budget: int) -> tuple[Keys, bool]:
-        """Of keys and others, made as many as the budget, those with the smaller error, and whether it is the others'.
-
-        Nothing is ever worse for being tried.
-        """
+        """Of keys and others, brought to the budget, those with the smaller error; and whether it is the others."""
         keys = self.measured(other.indices)
         if len(keys.indices) > budget:
             keys = self.thinned(keys, math.inf, budget)
