@@ -84,23 +84,29 @@ def test_a_budget_is_spent_and_not_passed(count, seed, budget, rms, mode):
 
 @pytest.mark.parametrize("rms", [False, True])
 @pytest.mark.parametrize(("mode", "budget"), [("lerp_slerp", 12), ("motor_spline", 12), ("motor_spline", 40)])
-def test_a_budget_is_spent_nearly_as_well_as_by_trying_tolerances(mode, budget, rms):
-    times, poses = wandering(250, budget)
+def test_a_budget_is_spent_about_as_well_as_by_trying_tolerances(mode, budget, rms):
+    ratios = []
+    for seed in (budget, 1, 2, 3, 4, 5):
+        times, poses = wandering(250, seed)
 
-    def error_of(keys: np.ndarray) -> float:
-        errors = shell_errors(times, poses, keys, mode)
-        return float(np.sqrt(np.mean(errors**2)) if rms else errors.max())
+        def error_of(keys: np.ndarray, times: np.ndarray = times, poses: Poses = poses) -> float:
+            errors = shell_errors(times, poses, keys, mode)
+            return float(np.sqrt(np.mean(errors**2)) if rms else errors.max())
 
-    error = error_of(reduce_keys(times, poses, mode, budget=budget, rms=rms))
-    low, high, best = np.log(error / 4.0), np.log(2.0 * error), np.inf
-    for _ in range(8):
-        middle = 0.5 * (low + high)
-        keys = reduce_keys(times, poses, mode, np.exp(middle), rms=rms)
-        if len(keys) > budget:
-            low = middle
-        else:
-            high, best = middle, min(best, error_of(keys))
-    assert error <= 1.05 * best
+        error = error_of(reduce_keys(times, poses, mode, budget=budget, rms=rms))
+        first = error_of(reduce_keys(times, poses, mode, budget=budget, rms=rms, tries=0))
+        assert error <= first * (1.0 + 1e-9)
+        low, high, best = np.log(error / 4.0), np.log(2.0 * error), np.inf
+        for _ in range(8):
+            middle = 0.5 * (low + high)
+            keys = reduce_keys(times, poses, mode, np.exp(middle), rms=rms)
+            if len(keys) > budget:
+                low = middle
+            else:
+                high, best = middle, min(best, error_of(keys))
+        ratios.append(error / best)
+    assert np.median(ratios) <= 1.05
+    assert max(ratios) <= 1.2
 
 
 @pytest.mark.parametrize("mode", MODES)

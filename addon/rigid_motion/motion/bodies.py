@@ -10,8 +10,8 @@ from .checks import check_body
 from .measures import shell_error
 from .modes import interpolate
 from .poses import PackedPoses, Poses
-from .quaternions import normalise
-from .skeletons import Skeleton
+from .quaternions import components, normalise
+from .skeletons import AT_ONCE, Skeleton
 
 SOME_TURN = 1e-12
 """What a mean of quaternions is turned by, so that it has a length."""
@@ -40,8 +40,22 @@ class Body:
         """Of all joints (joints, m), where these poses (joints, m) in their parents' space are shown, at samples."""
         there = self.skeleton.in_root_space(shown)
         if samples is None:
-            return shell_error(there, self.truth, self.radii[:, None]) * self.weights
+            return self.shell_errors(there, self.truth, self.radii[:, None]) * self.weights
         return shell_error(there, self.packed_truth[samples], self.radii[:, None]) * self.weights[:, samples]
+
+    def shell_errors(self, shown: Poses, truth: Poses, sizes: np.ndarray) -> np.ndarray:
+        """Those of balls of some sizes where poses are shown, both (joints, 1) or (joints, n), shape (joints, n)."""
+        found = np.empty(truth.shape)
+        for some in self._blocks:
+            balls = sizes if sizes.shape[1] == 1 else sizes[:, some]
+            found[:, some] = shell_error(shown if shown.shape[1] == 1 else shown[:, some], truth[:, some], balls)
+        return found
+
+    @cached_property
+    def _blocks(self) -> list[slice]:
+        """Samples that are looked at in one go."""
+        step = max(1, AT_ONCE // len(self.skeleton))
+        return [slice(first, first + step) for first in range(0, len(self.times), step)]
 
     @cached_property
     def packed_truth(self) -> PackedPoses:
@@ -60,12 +74,12 @@ class Body:
             normalise(self.poses.quaternions.mean(axis=1, keepdims=True) + SOME_TURN),
             None if scales is None else scales.mean(axis=1, keepdims=True),
         )
-        return np.argmin(shell_error(self.poses, _spread(means, self.poses), self.sizes), axis=1)
+        return np.argmin(self.shell_errors(means, self.poses, self.sizes), axis=1)
 
     def at_rest(self) -> Poses:
-        """Every joint in its middle pose all the time, shape (joints, n)."""
+        """Every joint in its middle pose all the time, shape (joints, 1)."""
         joints = np.arange(len(self.skeleton))
-        return _spread(self.poses[joints[:, None], self.middles[:, None]], self.poses)
+        return self.poses[joints[:, None], self.middles[:, None]]
 
     @cached_property
     def sizes(self) -> np.ndarray:
@@ -73,17 +87,12 @@ class Body:
         balls = np.broadcast_to(self.radii[:, None], self.poses.shape)
         balls = balls if self.truth.scales is None else balls * self.truth.scales
         found = balls.copy()
-        for joint in np.flatnonzero(self.skeleton.sizes > 1).tolist():
-            below = self.skeleton.below(joint)
-            away = self.truth.positions[below] - self.truth.positions[joint]
-            found[joint] = (np.sqrt(np.einsum("jni,jni->jn", away, away)) + balls[below]).max(axis=0)
+        with_more = [(joint, self.skeleton.below(joint)) for joint in np.flatnonzero(self.skeleton.sizes > 1).tolist()]
+        for some in self._blocks:
+            places = components(self.truth.positions[:, some])
+            for joint, below in with_more:
+                away = places[:, below] - places[:, [joint]]
+                away *= away
+                reached = np.sqrt(away[0] + away[1] + away[2]) + balls[below, some]
+                found[joint, some] = reached.max(axis=0)
         return found
-
-
-def _spread(one: Poses, over: Poses) -> Poses:
-    """Poses (joints, 1) for all moments of others (joints, n)."""
-    return Poses(
-        np.broadcast_to(one.positions, over.positions.shape),
-        np.broadcast_to(one.quaternions, over.quaternions.shape),
-        None if one.scales is None else np.broadcast_to(one.scales, over.scales.shape),
-    )

@@ -117,8 +117,15 @@ class Costs:
 
     def total(self, keys: np.ndarray) -> float:
         """Return the cost of all segments between keys (k,) of a recording of one track."""
+        return float(self._of_track(keys)[0].sum())
+
+    def peak(self, keys: np.ndarray) -> float:
+        """Return the largest error between keys (k,) of a recording of one track."""
+        return float(self._of_track(keys)[1].max())
+
+    def _of_track(self, keys: np.ndarray) -> Found:
         ended = np.pad(keys, self.reach, constant_values=-1)
-        return float(self.of(np.lib.stride_tricks.sliding_window_view(ended, self.keys))[0].sum())
+        return self.of(np.lib.stride_tricks.sliding_window_view(ended, self.keys))
 
     def effort(self, segments: np.ndarray) -> float:
         """How many poses are to be looked at, at most, for segments (..., keys)."""

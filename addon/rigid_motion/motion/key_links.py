@@ -46,6 +46,12 @@ PRICES = 8.0
 PRICE_STEPS = 10
 """Of bisection for the price."""
 
+LEAST = 0.7
+"""Of the largest error of keys: so small it may become with as many others."""
+
+LEAST_STEPS = 7
+"""Of bisection for it."""
+
 
 def linked_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
     """The fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
@@ -65,12 +71,50 @@ def linked_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -
         if links is not None:
             _, peak = costs.of(links)
             links = links[peak <= WITHIN * tolerance]
-            return _shortest(links, np.ones(len(links)), candidates)
+            return _fewest(links, candidates)
     return min(found, key=len)
 
 
-def traded_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
+def least_keys(costs: Costs, best: np.ndarray, found: list[np.ndarray], budget: int) -> np.ndarray:
+    """The keys with the smallest largest error that candidates allow, as many as a budget at most.
+
+    Parameters
+    ----------
+    costs : Costs
+        As for `linked_keys`.
+    best : array of int
+        Keys within the budget, from the first sample to the last; they are the result where there are none better.
+    found : list of array of int
+        Others, as few or more, that are candidates.
+    budget : int
+    """
+    width = WIDTHS[0][0 if costs.recording.poses_each == 1.0 else 1]
+    candidates = np.union1d(_beside(costs, [best], width if costs.reach == 0 else 0), np.concatenate(found))
+    worst = costs.peak(best) * WITHIN
+    wider = ALIVE if costs.reach else 1.0
+    links = _links(costs, candidates, [best], wider * worst, wider**2 * worst)
+    if links is None:
+        return best
+    _, peak = costs.of(links)
+    low, high = LEAST * worst, worst
+    for _ in range(LEAST_STEPS):
+        middle = math.sqrt(low * high)
+        keys = _fewest(links[peak <= middle], candidates)
+        if keys is None or len(keys) > budget:
+            low = middle
+        else:
+            best, high = keys, min(middle, costs.peak(keys))
+        if low >= high:
+            break
+    return best
+
+
+def traded_keys(
+    costs: Costs, found: list[np.ndarray], tolerance: float = 1.0, *, budget: int | None = None
+) -> np.ndarray:
     """The fewest keys that prices allow, or the first that were found; at all costs that are too high.
+
+    With a budget, those of them that cost least, as many as it at most.
 
     Parameters
     ----------
@@ -80,9 +124,12 @@ def traded_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -
         Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
     tolerance : float
         In tolerances of the recording.
+    budget : int, optional
+        The most keys, instead of a tolerance.
     """
     counts, totals = [len(keys) for keys in found], [costs.total(keys) for keys in found]
-    best, least, allowed = found[0], totals[0], tolerance**2 * len(costs.recording.times)
+    allowed = tolerance**2 * len(costs.recording.times)
+    best, least = found[0], (counts[0], totals[0]) if budget is None else (totals[0], counts[0])
     if max(counts) == min(counts) or max(totals) == min(totals):
         return best
     price = (max(totals) - min(totals)) / (max(counts) - min(counts))
@@ -96,12 +143,12 @@ def traded_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -
         middle = 0.5 * (low + high)
         keys = _shortest(links, cost + price * math.exp(middle), candidates)
         total = costs.total(keys)
-        if total > allowed:
-            high = middle
-            continue
-        low = middle
-        if (len(keys), total) < (len(best), least):
-            best, least = keys, total
+        worth = (len(keys), total) if budget is None else (total, len(keys))
+        fits = total <= allowed if budget is None else len(keys) <= budget
+        # What does not fit has keys that are too dear, or with a budget too cheap.
+        low, high = (middle, high) if fits == (budget is None) else (low, middle)
+        if fits and worth < least:
+            best, least = keys, worth
     return best
 
 
@@ -183,8 +230,30 @@ def _with_neighbours(pairs: np.ndarray, count: int) -> np.ndarray:
     )
 
 
-def _shortest(links: np.ndarray, lengths: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+def _fewest(links: np.ndarray, candidates: np.ndarray) -> np.ndarray | None:
+    """The way over the fewest links, rising by the key that they begin at; None where they lead nowhere."""
+    if links.shape[1] > 2:
+        return _shortest(links, np.ones(len(links)), candidates)
+    begins = np.searchsorted(links[:, 0], candidates, side="left"), np.searchsorted(links[:, 0], candidates, "right")
+    ends = np.searchsorted(candidates, links[:, 1])
+    steps, back = np.full(len(candidates), len(candidates)), np.zeros(len(candidates), dtype=np.int64)
+    steps[0] = 0
+    for number, (begin, end) in enumerate(zip(*(bounds.tolist() for bounds in begins), strict=True)):
+        onwards = ends[begin:end]
+        onwards = onwards[steps[onwards] > steps[number] + 1]
+        steps[onwards], back[onwards] = steps[number] + 1, number
+    if steps[-1] == len(candidates):
+        return None
+    way = [len(candidates) - 1]
+    while way[-1]:
+        way.append(int(back[way[-1]]))
+    return candidates[way[::-1]]
+
+
+def _shortest(links: np.ndarray, lengths: np.ndarray, candidates: np.ndarray) -> np.ndarray | None:
     """The way from the first candidate to the last that is shortest, by the length of each link; all samples on it.
+
+    None where they do not lead there.
 
     Successive links have all keys in common but one.
     """
@@ -201,6 +270,8 @@ def _shortest(links: np.ndarray, lengths: np.ndarray, candidates: np.ndarray) ->
                 shortest, last = way, link
         elif way < reached.get(link[1:], math.inf):
             reached[link[1:]], back[link[1:]] = way, link
+    if not last:
+        return None
     samples = [end, last[second - 1]]
     while samples[-1] != start:
         last = back[last[:-1]]

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .key_costs import Costs, Found, Recording
-from .key_links import linked_keys, traded_keys
+from .key_links import least_keys, linked_keys, traded_keys
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
@@ -46,17 +46,11 @@ LOOSER = (1.6, 1.3, 1.15)
 START = {PEAK: 0.5, 2: 0.25}
 """Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
 
-BUDGET_STEPS = (3, 6)
-"""Of quick and then of thorough searches for the tolerance that so many keys can keep to, at most."""
+LESS = 0.85
+"""How many times the error that a budget of keys has, the next try is to have; nearer to it where that fails."""
 
-NARROW = 0.01
-"""By how much of it the tolerance is known then."""
-
-FARTHEST = 0.3
-"""How far the next tolerance is from the only one that is known, by its logarithm."""
-
-POWER = 2.5
-"""Of the tolerance: it is thought to grow by this power as the number of keys falls."""
+SWAPPED = 1.15
+"""How many times the budget keys may be in between, for the mean square, to find better places."""
 
 OTHERS = (0.9, 1.1, 1.25)
 """Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
@@ -195,27 +189,42 @@ class Search:
         return self.reach <= 1 and len(self.recording.starts) == 1
 
     def within_budget(self, budget: int, tries: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found: those of the least tolerance for it."""
+        """So many samples that are keys with as small an error as can be found, never more than that of `_fewest`."""
         best = self._fewest(budget)
-        least = self._error(best)
-        tolerance, high = least, None
-        # Quick searches come near the tolerance, and thorough ones, which need fewer keys for it, go on from there.
-        for thorough, steps in zip((0, tries), BUDGET_STEPS, strict=True) if least > 0.0 else ():
-            low = None
-            for _ in range(steps):
-                keys = self.measured(self.within(thorough, tolerance))
-                found = math.log(tolerance), math.log(len(keys.indices))
-                if len(keys.indices) > budget:
-                    low = found
-                else:
-                    high = found
-                    keys = self._filled(keys, budget)
-                    if self._error(keys) < least:
-                        best, least = keys, self._error(keys)
-                tolerance = math.exp(_between(low, high, math.log(budget + 0.5)))
-                if low and high and high[0] - low[0] < NARROW:
-                    break
+        least, found, factor = self._error(best), [best.indices], LESS
+        links = tries and self._is_linkable  # The last try.
+        for number in range(tries - bool(links)):
+            if least == 0.0:
+                return best.indices
+            # The first try begins anew; from the keys that there are, others take a part of its time.
+            if self.power == 2:
+                # Some more where the motion is off most, moved together.
+                keys = self._filled(self.measured(best.indices), math.ceil(SWAPPED * budget))
+            else:
+                keys = self._tightened(best, factor * least) if number else self._first(factor * least)
+            found.append(keys.indices)
+            best, better = self._least(best, keys, budget)
+            factor = factor if better else math.sqrt(factor)
+            least = self._error(best)
+        if links and least > 0.0:
+            if self.power == 2:
+                linked = traded_keys(self.costs, found, budget=budget)
+            else:
+                linked = least_keys(self.costs, best.indices, found, budget)
+            best, _ = self._least(best, self.measured(linked), budget)
         return best.indices
+
+    def _tightened(self, keys: Keys, tolerance: float) -> Keys:
+        """Few keys that keep to a tolerance, from others that do not."""
+        return self.refined(self.densified(self.measured(keys.indices), tolerance), tolerance)
+
+    def _least(self, best: Keys, other: Keys, budget: int) -> tuple[Keys, bool]:
+        """Of keys and others, brought to the budget, those with the smaller error; and whether it is the others."""
+        keys = self.measured(other.indices)
+        if len(keys.indices) > budget:
+            keys = self.thinned(keys, math.inf, budget)
+        keys = self._filled(self.moved(keys, math.inf), budget)
+        return (keys, True) if self._error(keys) < self._error(best) else (best, False)
 
     def _fewest(self, budget: int) -> Keys:
         """What is left of all samples, down to the budget, moved to where the sum of the powers of errors is least."""
@@ -418,19 +427,6 @@ class Search:
         left = np.ix_(promising(cost, peak), outer)
         cost[left], peak[left] = self.costs.of(rows[left])
         return cost, peak
-
-
-def _between(low: tuple[float, float] | None, high: tuple[float, float] | None, count: float) -> float:
-    """Return the tolerance to try next for a count of keys, both by their logarithms, as what was found has them.
-
-    Where one tolerance was too low and one was not, it is between them, as straight lines have it; else beyond the one.
-    """
-    if low and high:
-        share = (count - high[1]) / (low[1] - high[1]) if low[1] > high[1] else 0.5
-        return high[0] + min(max(share, 0.2), 0.8) * (low[0] - high[0])
-    if low:
-        return low[0] + min(max(POWER * (low[1] - count), 2.0 * NARROW), FARTHEST)
-    return high[0] + max(min(POWER * (high[1] - count), -2.0 * NARROW), -FARTHEST)
 
 
 def _spaced(order: np.ndarray, distance: int, count: int) -> np.ndarray:

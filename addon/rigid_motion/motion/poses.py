@@ -7,6 +7,7 @@ one object has arrays of shape (n, 3) and (n, 4), and many objects have (objects
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -171,6 +172,12 @@ class PackedPoses:
             rows.append(poses.scales[None])
         self._rows = np.concatenate(rows)
 
+    @classmethod
+    def _view(cls, rows: np.ndarray) -> PackedPoses:
+        view = cls.__new__(cls)
+        view._rows = rows
+        return view
+
     def __getitem__(self, samples: np.ndarray) -> Poses:
         """Those at some numbers (m,) or (k, m) of the last axis, shape (..., m) or (..., k, m)."""
         return _of_rows(self._rows.take(samples, axis=-1))
@@ -178,6 +185,15 @@ class PackedPoses:
     def of(self, objects: np.ndarray | slice) -> Poses:
         """Those at some numbers (k,) of the first axis, shape (k, ..., n)."""
         return _of_rows(self._rows[:, objects])
+
+    def blocks(self, most: int) -> Iterator[PackedPoses]:
+        """The same poses (k, ..., n) by ranges of their last axis, so many poses in each. Views: `put` is seen here."""
+        count = self._rows.shape[-1] if self._rows.ndim > 2 else 0
+        step = max(1, most // max(1, math.prod(self._rows.shape[1:-1])))
+        for first in range(0, count, step) if count > step else ():
+            yield self._view(self._rows[..., first : first + step])
+        if count <= step:
+            yield self
 
     def put(self, objects: np.ndarray, poses: Poses) -> None:
         """Others (k, ..., n) in the place of those."""

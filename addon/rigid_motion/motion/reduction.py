@@ -42,13 +42,16 @@ def reduce_keys(
     radius : float
         Of the shell, in the unit of the positions; not below zero.
     budget : int, optional
-        The most keys, at least 2, instead of a tolerance: the error is then as small as can be found.
+        The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find. In most cases
+        it is within a twentieth of what bisecting the tolerance reaches, in some a fifth above it; it takes about the
+        time of two or three searches, where bisecting takes that of eight or more.
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
         How many more searches there are, up to three: what they have found is put together. Each begins with fewer keys
         than the tolerance allows, and puts some back where the motion is off, which takes about half as long as the
-        first search; under `rms` it keeps to another tolerance, and takes as long.
+        first search; under `rms` it keeps to another tolerance, and takes as long. With a budget, 0 is the first
+        search alone, and every try goes on from there with a smaller tolerance.
 
     Returns
     -------

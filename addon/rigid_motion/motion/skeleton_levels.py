@@ -62,7 +62,7 @@ class Level(Recording):
     def may_rest(self) -> np.ndarray:
         """Which of the joints need not move at all, shape (joints,)."""
         matter, count = self.counts > 0, len(self.body.times)
-        still = reshaped(self.body.at_rest()[self.joints[matter]], -1)
+        still = self.body.at_rest()[np.repeat(self.joints[matter], count), 0]
         errors = self.errors(np.flatnonzero(np.repeat(matter, count)), still)
         rest = ~matter
         rest[matter] = errors.reshape(-1, count).max(axis=1) <= 1.0

@@ -19,7 +19,6 @@ from .bodies import Body
 from .checks import check_body, check_flag, check_poses, check_wishes
 from .key_costs import Recording
 from .key_search import Keys, Search
-from .measures import shell_error
 from .modes import mode_named
 from .poses import LIMIT, PackedPoses, Poses, numbers, reshaped
 from .quaternions import align_signs
@@ -31,6 +30,12 @@ TINY = 1e-30
 
 BUDGET_STEPS = 9
 """Of a search for the tolerance that a budget of keys of their own can keep to."""
+
+FARTHEST = 1.5
+"""How far the next tolerance is from one that needs too few keys, by its logarithm."""
+
+NARROW = 0.01
+"""By how much of it the tolerance is known in the end."""
 
 DEEPEST = 1000
 """How many joints a joint with keys of its own may hang on: the work grows with the square of it."""
@@ -73,7 +78,8 @@ def reduce_skeleton_keys(
         Key poses: all joints have keys at the same samples. Otherwise each has its own, the fewest in all.
     budget : int, optional
         The most keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at least 2 for
-        each. The error is then as small as can be found.
+        each. The error is then as small as can be found: for key poses as `reduce_keys` does, in two or three times
+        the time of one search; for keys of their own by bisecting the tolerance, in that of ten or so.
     weights : array-like, shape (joints,) or (joints, n), optional
         How many times the error of each joint counts, at each sample: more for feet that stand (see `standing`) and
         hands that hold, 0 for joints that do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
@@ -161,18 +167,39 @@ def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: i
 
 
 def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:
-    """The keys of the smallest tolerance that so many can keep to, by bisection."""
-    best = tuple(_OwnKeys(body, math.inf).keys)
-    high = math.log(max(float(body.errors(body.at_rest()).max()), TINY))
-    low = high - LEAST
+    """The keys with the smallest error among those of several tolerances that so many can keep to, and what is left."""
+    free = np.flatnonzero(body.free).tolist()
+    best = _OwnKeys(body, math.inf)
+    least = float(body.errors(body.at_rest()).max())
+    # The logarithms of tolerances that need more and that need no more keys, and how many by their logarithm.
+    low, high = None, (math.log(max(least, TINY)), math.log(len(free) or 1))
+    lowest = high[0] - LEAST
     for _ in range(BUDGET_STEPS):
-        middle = 0.5 * (low + high)
-        keys = _OwnKeys(body, math.exp(middle)).found()
-        if sum(len(keys[joint]) for joint in np.flatnonzero(body.free).tolist()) <= budget:
-            high, best = middle, keys
-        else:
-            low = middle
-    return best
+        logarithm = _between(low, high, math.log(budget))
+        if logarithm < lowest or (low and high[0] - low[0] < NARROW):
+            break
+        search = _OwnKeys(body, math.exp(logarithm))
+        count = sum(len(keys) for joint, keys in enumerate(search.found()) if body.free[joint])
+        if count > budget:
+            low = logarithm, math.log(count)
+            continue
+        high, error = (logarithm, math.log(count)), float(body.errors(search.shown).max())
+        if error <= least:
+            best, least = search, error
+    best.spend(budget)
+    return tuple(best.keys)
+
+
+def _between(low: tuple[float, float] | None, high: tuple[float, float], count: float) -> float:
+    """The logarithm of the tolerance to try next for the logarithm of a count of keys.
+
+    It is where a straight line between a tolerance that is too low and one that is not has it, and never near its ends:
+    counts are no smooth function of tolerances.
+    """
+    if low is None:
+        return high[0] - FARTHEST
+    share = (count - high[1]) / (low[1] - high[1]) if low[1] > high[1] else 0.5
+    return high[0] + min(max(share, 0.25), 0.75) * (low[0] - high[0])
 
 
 class _WholeBody(Recording):
@@ -212,11 +239,25 @@ class _OwnKeys:
         self._prove()
         return tuple(self.keys)
 
+    def spend(self, budget: int) -> None:
+        """Put keys in where errors are largest, one place after the other, as long as that makes them smaller."""
+        least = self.body.errors(self.shown).max()
+        while True:
+            errors = self.body.errors(self.shown)
+            keys, shown = list(self.keys), self.shown.copy()
+            self._put_back(np.argmax(errors, keepdims=False)[None])
+            count = sum(len(keys) for joint, keys in enumerate(self.keys) if self.body.free[joint])
+            error = self.body.errors(self.shown).max()
+            if count > budget or not error < least:
+                self.keys, self.shown = keys, shown
+                return
+            least = error
+
     def _share_out(self) -> None:
         """Keys of all joints, each within its share of the tolerance."""
         body, count = self.body, len(self.body.times)
         sizes, shares = self._sizes_and_shares()
-        rests = np.all(shell_error(body.at_rest(), body.poses, sizes) <= shares, axis=1)
+        rests = np.all(body.shell_errors(body.at_rest(), body.poses, sizes) <= shares, axis=1)
         self.shown[rests & body.free] = body.at_rest()[rests & body.free]
         moving = np.flatnonzero(~rests & body.free)
         if len(moving):
@@ -281,12 +322,14 @@ class _OwnKeys:
         """Put keys back where errors are over the tolerance after all, which takes more than rounding to happen."""
         allowed, many = self.tolerance * (1.0 + 1e-9), 1
         while True:
-            errors = self.body.errors(self.shown)
+            # What rests all over is in one place.
+            rests = all(len(keys) == 1 for keys in self.keys)
+            errors = self.body.errors(self.body.at_rest() if rests else self.shown)
             errors[self._keyed()] = 0.0  # Whatever is left there is rounding, and may be more than a tiny tolerance.
-            worst = np.argsort(-errors, axis=None)[:many]
-            worst = worst[errors.flat[worst] > allowed]
-            if not len(worst):
+            over = np.flatnonzero(errors > allowed)
+            if not len(over):
                 return
+            worst = over[np.argsort(-errors.flat[over], kind="stable")[:many]]
             self._put_back(worst)
             many *= 2
 
@@ -312,10 +355,8 @@ class _OwnKeys:
 
 def _moves(poses: Poses) -> np.ndarray:
     """Which joints (joints, n) ever change in their parents' space, shape (joints,)."""
-    changes = (np.ptp(poses.positions, axis=1) > 0.0).any(axis=1) | (np.ptp(poses.quaternions, axis=1) > 0.0).any(
-        axis=1
-    )
-    return changes if poses.scales is None else changes | (np.ptp(poses.scales, axis=1) > 0.0)
+    numbers = [poses.positions, poses.quaternions] + ([] if poses.scales is None else [poses.scales])
+    return np.any([(rows != rows[:, :1]).reshape(len(rows), -1).any(axis=1) for rows in numbers], axis=0)
 
 
 def _mask(fixed: ArrayLike | None, joints: int) -> np.ndarray:

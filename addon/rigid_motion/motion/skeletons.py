@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from .checks import check_poses
 from .poses import PackedPoses, Poses, placed
 
+AT_ONCE = 2**15
+"""Poses that are looked at in one go, for the processor's caches."""
+
 
 class Skeleton:
     """Which joint hangs on which, and where that puts them.
@@ -133,6 +136,7 @@ class Skeleton:
         if poses.shape[:1] != (len(self),):
             raise ValueError(f"poses of shape {poses.shape} do not fit {len(self)} joints, which come first")
         there = PackedPoses(poses)
-        for joints in self.levels[1:]:
-            there.put(joints, placed(there.of(self.parents[joints]), there.of(joints)))
+        for part in there.blocks(AT_ONCE):
+            for joints in self.levels[1:]:
+                part.put(joints, placed(part.of(self.parents[joints]), part.of(joints)))
         return there.of(slice(None))
