@@ -43,8 +43,8 @@ def reduce_keys(
         Of the shell, in the unit of the positions; not below zero.
     budget : int, optional
         The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find. In most cases
-        it is within a twentieth of what bisecting the tolerance reaches, in some up to a third above it; it takes about the
-        time of two or three searches, where bisecting takes that of eight or more.
+        it is within a twentieth of what bisecting the tolerance reaches, in some up to a third above it; it takes about
+        the time of two or three searches, where bisecting takes that of eight or more.
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
