@@ -40,7 +40,7 @@ from rigid_motion_batch.streaming.needed import NeededSender
 from rigid_motion_batch.streaming.playing import HEARTBEAT, Playing
 from rigid_motion_batch.streaming.relay import Outgoing, Relay
 from rigid_motion_batch.streaming.sources import EvenSource, NeededSource, Source
-from rigid_motion_batch.supervising import report
+from rigid_motion_batch.supervising import report, stop_signals
 from rigid_motion_batch.trajectories import TrajectoryError
 from rigid_motion_batch.trajectories.arguments import add_reading_options, reading_options
 
@@ -332,13 +332,12 @@ def relay(options: argparse.Namespace, stopped: list[int]) -> None:
 def stopping() -> Iterator[list[int]]:
     """The signals that ask for an end come into this list; the second of them ends the program as ever."""
     received: list[int] = []
-    signals = (signal.SIGINT, signal.SIGTERM)
 
     def handle(which: int, _: object) -> None:
         received.append(which)
         restore()
 
-    before = {which: signal.signal(which, handle) for which in signals}
+    before = {which: signal.signal(which, handle) for which in stop_signals()}
 
     def restore() -> None:
         for which, handler in before.items():

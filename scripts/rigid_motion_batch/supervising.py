@@ -22,7 +22,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -49,11 +49,18 @@ STOPPED = "Stopped. What was written by then is complete."
 PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
 
+ASK = getattr(signal, "SIGUSR1", None)
+"""What the parent asks its child with to end. Any other signal may come to both of them, from a terminal or a farm, and
+would ask twice. On Windows, where there is none, the console sends Ctrl-C to both, and the parent waits."""
+
 _journal: int | None = None
+_is_child = False
 
 
 def stop_signals() -> list[signal.Signals]:
-    """The signals that stop a command. Those that are ignored, as by nohup, go on being ignored."""
+    """The signals that stop this process. Those that are ignored, as by nohup, go on being ignored."""
+    if _is_child and ASK:
+        return [ASK]
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     known = [getattr(signal, name) for name in names if hasattr(signal, name)]
     return [one for one in known if signal.getsignal(one) is not signal.SIG_IGN]
@@ -81,14 +88,16 @@ def supervise(program: str) -> int:
 
     def handle(number: int, _: object) -> None:
         received.append((number, time.monotonic()))
-        if child is not None:
-            _pass_on(child, number)
+        if len(received) == 1 and child is not None and ASK:
+            child.send_signal(ASK)
 
     before = {one: signal.signal(one, handle) for one in stop_signals()}
     try:
-        child = subprocess.Popen(_this_command(), env=_environment(folder))
-        for number, _ in list(received):
-            _pass_on(child, number)
+        with _held_back(before):
+            early = bool(received)
+            child = subprocess.Popen(_this_command(), env=_environment(folder))
+        if early and ASK:
+            child.send_signal(ASK)
         while child.poll() is None:
             with suppress(subprocess.TimeoutExpired):
                 child.wait(LOOK)
@@ -112,9 +121,24 @@ def supervise(program: str) -> int:
             signal.signal(one, signal.SIG_DFL if handler is None else handler)
 
 
+@contextmanager
+def _held_back(signals: Iterable[int]) -> Iterator[None]:
+    """Hold signals back meanwhile, and in processes that are started meanwhile until these let them through."""
+    if ASK:
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    try:
+        yield
+    finally:
+        if ASK:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def begin_child() -> bool:
-    """Whether this process is the child. It then reports in the journal, and does not outlive its parent."""
-    global _journal
+    """Whether this process is the child.
+
+    It then reports in the journal, leaves what becomes of signals to its parent, and does not outlive that.
+    """
+    global _journal, _is_child
     # Programs that the child starts are not to take themselves for children.
     folder = os.environ.pop(VARIABLE, None)
     if folder is None:
@@ -123,6 +147,17 @@ def begin_child() -> bool:
         with suppress(OSError):
             _journal = os.open(Path(folder) / JOURNAL, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     end_with_parent()
+    if ASK:
+        parent, signals = os.getppid(), stop_signals()
+
+        def relay(number: int, _: object) -> None:
+            with suppress(OSError):
+                os.kill(parent, number)
+
+        for one in signals:
+            signal.signal(one, relay)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
+    _is_child = True
     return True
 
 
@@ -218,11 +253,6 @@ def _this_command() -> Sequence[str]:
     """What this process was started with: Python, or a Blender that runs a script."""
     blender = getattr(getattr(sys.modules.get("bpy"), "app", None), "binary_path", "")
     return [blender, *sys.argv[1:]] if blender else [sys.executable, *sys.orig_argv[1:]]
-
-
-def _pass_on(child: subprocess.Popen, number: int) -> None:
-    if os.name != "nt":  # There the console sends Ctrl-C to both.
-        child.send_signal(number)
 
 
 def _death(code: int, at: str) -> str:

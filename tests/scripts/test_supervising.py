@@ -159,3 +159,33 @@ def test_ctrl_c_within_an_importer_is_no_fault_of_the_file(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         importing._import(tmp_path / "walk.fbx", importer)
+
+
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_all_processes_at_once_leaves_the_film_of_a_receiver(tmp_path, by):
+    options = ("receive", "--port", 0, "--output", "shown.csv")
+    run = start(tmp_path, "stream.py", *options, where="no such file")
+    assert run.process.stdout.readline().startswith("Listening on 127.0.0.1:")
+    time.sleep(0.3)
+    os.killpg(run.process.pid, by)
+    printed, said, seconds = run.end()
+    assert run.process.returncode == 128 + by
+    assert "no sender came" in said
+    assert "Traceback" not in printed + said
+    assert seconds < SOON
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.02, 0.05, 0.1, 0.2, 0.4])
+def test_ctrl_c_at_the_very_beginning_is_no_traceback(tmp_path, moment):
+    write_csv(tmp_path / "slow.csv")
+    run = start(tmp_path, "reduce.py", "slow.csv", where="slow.csv")
+    time.sleep(0.15 + moment)
+    os.killpg(run.process.pid, signal.SIGINT)
+    printed, said, seconds = run.end()
+    assert printed == ""
+    assert seconds < SOON
+    assert files(tmp_path) == ["slow.csv"]
+    if run.process.returncode != -signal.SIGINT:  # Before the program had begun, Python ends as it does.
+        assert run.process.returncode == 130
+        assert said.splitlines()[-1].startswith("Stopped. ")
+        assert "Traceback" not in said
