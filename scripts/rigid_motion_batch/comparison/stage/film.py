@@ -17,6 +17,7 @@ import bpy
 
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.supervising import stop_signals
 
 LOSSLESS = "HUFFYUV", "MKV", ".mkv"
 """Codec, container and extension of pieces of a film: exact to the bit, and quicker than PNG or FFV1."""
@@ -195,12 +196,13 @@ def _interruptible() -> Iterator[None]:
         if interrupted:
             scene.frame_current = scene.frame_end
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    before = {one: signal.signal(one, interrupt) for one in stop_signals()}
     bpy.app.handlers.render_post.append(skip)
     try:
         yield
     finally:
         bpy.app.handlers.render_post.remove(skip)
-        signal.signal(signal.SIGINT, before)
+        for one, handler in before.items():
+            signal.signal(one, signal.SIG_DFL if handler is None else handler)
     if interrupted:
         raise KeyboardInterrupt
