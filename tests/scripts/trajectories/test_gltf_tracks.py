@@ -86,7 +86,7 @@ def test_what_is_damaged_is_left_to_blender(tmp_path: Path) -> None:
         damaged, numbers = copy.deepcopy(document), bytearray(data)
         for _ in range(random.randint(1, 3)):
             part, name = random.choice([*parts(damaged)])
-            part[name] = random.choice(WRONG)
+            part[name] = copy.deepcopy(random.choice(WRONG))
         for _ in range(random.choice((0, 20))):
             numbers[random.randrange(len(numbers))] = random.randrange(256)
         changed += bool(straightened(damaged, lambda _, numbers=bytes(numbers): numbers)[0])
