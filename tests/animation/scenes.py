@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+import addon_utils
 import bpy
 import numpy as np
 
@@ -96,6 +97,19 @@ def new_strip(
     strip = obj.animation_data.nla_tracks.new().strips.new(slot.name_display, start, action)
     strip.action_slot, strip.action_frame_start, strip.action_frame_end = slot, 1, last
     return strip
+
+
+@contextmanager
+def enabled(*addons: str) -> Iterator[None]:
+    """Blender's own add-ons of these names switched on; those that were off are so again afterwards."""
+    switched_on = [name for name in addons if addon_utils.check(name) != (True, True)]
+    for name in switched_on:
+        addon_utils.enable(name)
+    try:
+        yield
+    finally:
+        for name in switched_on:
+            addon_utils.disable(name)
 
 
 @contextmanager

@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ import pytest
 from rigid_motion.animation import refresh, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, expected_worlds, matrices, shown_worlds, snapshot
-from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object
+from tests.animation.scenes import FRAMES, enabled, give_own_deltas, key, new_object
 
 PLAYED = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
 PATHS = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
@@ -26,10 +25,9 @@ Y_UP = np.array(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1)), dtype
 @pytest.fixture
 def exporter(live_file) -> Iterator[None]:
     """The frames to export, and Blender's own glTF importer and exporter switched on."""
-    addon_utils.enable("io_scene_gltf2")
     live_file.scene.frame_start, live_file.scene.frame_end = int(PLAYED[0]), int(PLAYED[-1])
-    yield
-    addon_utils.disable("io_scene_gltf2")
+    with enabled("io_scene_gltf2"):
+        yield
 
 
 def export(path: Path, **options: object) -> Path:

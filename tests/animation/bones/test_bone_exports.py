@@ -7,7 +7,6 @@ import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import ARM, FRAMES, PLAYED, Rest, key_all, key_wanted, new_rig, wanted_bases
 from tests.animation.oracle import snapshot
-from tests.animation.scenes import push_down
+from tests.animation.scenes import enabled, push_down
 
 EXPORTED = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
 
@@ -26,13 +25,9 @@ EXPORTED = np.arange(FRAMES[0], FRAMES[-1] + 1.0)
 @pytest.fixture
 def exporter(live_file) -> Iterator[None]:
     """The frames to export, and Blender's own exporters switched on."""
-    names = ("io_scene_gltf2", "io_scene_fbx")
-    for name in names:
-        addon_utils.enable(name)
     live_file.scene.frame_start, live_file.scene.frame_end = int(PLAYED[0]), int(PLAYED[-1])
-    yield
-    for name in names:
-        addon_utils.disable(name)
+    with enabled("io_scene_gltf2", "io_scene_fbx"):
+        yield
 
 
 def export(kind: str, path: Path, **options: object) -> Path:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-import addon_utils
 import bpy
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from tests.animation.bones.poses import assert_same_poses, expected_poses, shown
 from tests.animation.bones.rigs import in_turn
 from tests.animation.bones.test_rig_reducing import largest, matrices
 from tests.animation.oracle import curves_of
+from tests.animation.scenes import enabled
 from tests.recordings import RECORDINGS
 from tests.thoroughness import sample, tried
 
@@ -40,12 +40,8 @@ FILES = {
 
 @pytest.fixture
 def importers(live_file):
-    names = [name for name in ("io_anim_bvh", "io_scene_fbx") if addon_utils.check(name) != (True, True)]
-    for name in names:
-        addon_utils.enable(name)
-    yield
-    for name in names:
-        addon_utils.disable(name)
+    with enabled("io_anim_bvh", "io_scene_fbx"):
+        yield
 
 
 def imported(name: str) -> bpy.types.Object:
