@@ -53,7 +53,7 @@ LEAST_STEPS = 7
 """Of bisection for it."""
 
 
-def linked_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -> np.ndarray:
+def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
     """The fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
 
     Parameters
@@ -62,15 +62,13 @@ def linked_keys(costs: Costs, found: list[np.ndarray], tolerance: float = 1.0) -
         Of one track, for the largest error, under a mode that reaches no further than one key beyond a segment.
     found : list of array of int
         Keys that keep to the tolerance, each from the first sample to the last.
-    tolerance : float
-        In tolerances of the recording.
     """
     for width in WIDTHS[costs.reach]:
         candidates = _beside(costs, found, width)
-        links = _links(costs, candidates, found, (1.0 if costs.reach == 0 else ALIVE) * tolerance, ALIVE**2 * tolerance)
+        links = _links(costs, candidates, found, 1.0 if costs.reach == 0 else ALIVE, ALIVE**2)
         if links is not None:
             _, peak = costs.of(links)
-            links = links[peak <= WITHIN * tolerance]
+            links = links[peak <= WITHIN]
             return _fewest(links, candidates)
     return min(found, key=len)
 
@@ -109,9 +107,7 @@ def least_keys(costs: Costs, best: np.ndarray, found: list[np.ndarray], budget: 
     return best
 
 
-def traded_keys(
-    costs: Costs, found: list[np.ndarray], tolerance: float = 1.0, *, budget: int | None = None
-) -> np.ndarray:
+def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = None) -> np.ndarray:
     """The fewest keys that prices allow, or the first that were found; at all costs that are too high.
 
     With a budget, those of them that cost least, as many as it at most.
@@ -122,13 +118,11 @@ def traded_keys(
         Of one track, for the mean square, under a mode that reaches no further than one key beyond a segment.
     found : list of array of int
         Keys from the first sample to the last: some that keep to the tolerance, and then more and fewer.
-    tolerance : float
-        In tolerances of the recording.
     budget : int, optional
         The most keys, instead of a tolerance.
     """
     counts, totals = [len(keys) for keys in found], [costs.total(keys) for keys in found]
-    allowed = tolerance**2 * len(costs.recording.times)
+    allowed = float(len(costs.recording.times))
     best, least = found[0], (counts[0], totals[0]) if budget is None else (totals[0], counts[0])
     if max(counts) == min(counts) or max(totals) == min(totals):
         return best

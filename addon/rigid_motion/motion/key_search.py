@@ -115,23 +115,22 @@ class Search:
         self.spacing = 2 + 2 * self.reach
         """Keys this far from one another, or further, can be tried without regard to each other."""
 
-    def within(self, tries: int, tolerance: float = 1.0) -> np.ndarray:
-        """Few samples that, as keys, keep to so many times the tolerance."""
-        best = self._first(tolerance)
+    def within(self, tries: int) -> np.ndarray:
+        """Few samples that, as keys, keep to the tolerance."""
+        best = self._first(1.0)
         if self.power == 2:
-            return self._traded(best, tries, tolerance).indices
+            return self._traded(best, tries).indices
         found = [best.indices]
         for looser in LOOSER[:tries]:
             # Keys that are too few find better places, also when some are put back between them.
-            looser *= tolerance
             fewer = self.moved(self.thinned(self.measured(best.indices), looser), looser)
-            keys = self.refined(self.densified(fewer, tolerance), tolerance)
-            best = self._better(best, keys, tolerance)
+            keys = self.refined(self.densified(fewer, 1.0))
+            best = self._better(best, keys)
             found.append(keys.indices)
         if self._is_linkable and tries:
-            linked = linked_keys(self.costs, found, tolerance)
+            linked = linked_keys(self.costs, found)
             if len(linked) < len(best.indices):
-                best = self.refined(self.measured(linked), tolerance)
+                best = self.refined(self.measured(linked))
         return best.indices
 
     def _first(self, tolerance: float) -> Keys:
@@ -173,15 +172,15 @@ class Search:
         keys = self.measured(np.flatnonzero(is_key))
         return self.densified(keys, tolerance) if self.power != 2 else keys
 
-    def _traded(self, best: Keys, tries: int, tolerance: float) -> Keys:
+    def _traded(self, best: Keys, tries: int) -> Keys:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
         if not (self._is_linkable and tries):
             return best
         found = [best.indices]
         for other in OTHERS[:tries]:
-            found.append(self._first(other * tolerance).indices)
-        traded = traded_keys(self.costs, found, tolerance)
-        return self.refined(self.measured(traded), tolerance) if len(traded) < len(best.indices) else best
+            found.append(self._first(other).indices)
+        traded = traded_keys(self.costs, found)
+        return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     @property
     def _is_linkable(self) -> bool:
@@ -287,13 +286,13 @@ class Search:
             keys = self.measured(more)
         return keys
 
-    def _better(self, best: Keys, other: Keys, tolerance: float) -> Keys:
+    def _better(self, best: Keys, other: Keys) -> Keys:
         """Of each track the keys that are fewer."""
         chosen = []
         for start, end in zip(self.recording.starts, self.recording.ends, strict=True):
             rows = [slice(*np.searchsorted(keys.indices, (start, end + 1))) for keys in (best, other)]
             fewer = rows[1].stop - rows[1].start < rows[0].stop - rows[0].start
-            takes_other = fewer and other.peak[rows[1]].max() <= tolerance
+            takes_other = fewer and other.peak[rows[1]].max() <= 1.0
             chosen.append(other.indices[rows[1]] if takes_other else best.indices[rows[0]])
         return self.measured(np.concatenate(chosen))
 

@@ -112,7 +112,7 @@ def not_promised(rig: WholeRig) -> str:
 
 def _doubt(targets: Sequence[Transform], tolerance: Tolerance | None, unit: float) -> str:
     """What to think of where a tolerance is in metres, and a rig hardly is: importers leave it in units of its own."""
-    size = rig_size(targets[0].animated) * unit if targets[0].prefix else 0.0
+    size = rig_size(targets[0].animated) * unit if targets[0].is_part else 0.0
     name, length = unit_of(size)
     if tolerance is None or not tolerance.is_length or length == 1.0:
         return ""
@@ -139,7 +139,7 @@ def _written(metres: float) -> Tolerance:
 
 def _has_bones(target: Transform) -> bool:
     """Whether the name of an object stands for the bones of a rig."""
-    return not target.prefix and target.carrier.pose is not None
+    return not target.is_part and target.carrier.pose is not None
 
 
 def _reason(target: Transform, refusal: Refused) -> str:

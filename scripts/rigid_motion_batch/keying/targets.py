@@ -97,7 +97,7 @@ def _fits(name: str, pattern: str) -> bool:
 
 def title_of(targets: Sequence[Transform]) -> str:
     """One target by its name, several bones by how many they are of which rig, and the rig itself along with them."""
-    rig, bones = targets[0].animated.name, sum(bool(target.prefix) for target in targets)
+    rig, bones = targets[0].animated.name, sum(target.is_part for target in targets)
     if len(targets) == 1:
         return targets[0].name
     return f"{rig}: {bones} bone{'s' if bones > 1 else ''}{' and its own keys' if bones < len(targets) else ''}"

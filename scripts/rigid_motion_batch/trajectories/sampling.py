@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigid_motion.motion import Poses, Skeleton
+from rigid_motion.motion.decimation import nearest
 from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import angle_between
 
@@ -101,10 +102,7 @@ def merged(even: np.ndarray, keys: np.ndarray, step: float) -> np.ndarray:
 
 def away(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
     """How far the nearest of others, which rise, is from each of some frames; shape of the frames."""
-    if not len(others):
-        return np.full(len(frames), np.inf)
-    behind = np.searchsorted(others, frames).clip(1, max(len(others) - 1, 1))
-    return np.minimum(np.abs(frames - others[behind - 1]), np.abs(frames - others[behind.clip(max=len(others) - 1)]))
+    return np.abs(frames - others[nearest(others, frames)]) if len(others) else np.full(len(frames), np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -302,14 +302,17 @@ class _Ends:
     keys: Poses
     """The poses at both, shape (S, 2)."""
 
-    around: tuple[np.ndarray, Poses] | None
-    """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
-
     axes: np.ndarray | None
     """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
 
     own: np.ndarray
     """The objects' own delta transforms, shape (10, S)."""
+
+    pairs: tuple[np.ndarray, np.ndarray] | None = None
+    """For smooth modes the segments that meet at a key, before it and after it."""
+
+    around: tuple[np.ndarray, Poses] | None = None
+    """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
     tangents: np.ndarray | None = None
     """How long the tangents of smooth modes are at both keys, shape (2, S); None where all are 1."""
@@ -327,19 +330,17 @@ class _Ends:
         own = np.stack([source.original for source in sources], axis=1)[:, owners]
         axes = location_axes(sources, owners)
         keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
-        around = None
-        if smooth.any():
-            holds = np.concatenate([source.holds for source in sources])
-            around = with_neighbours(owners, times, keys, holds)
-        return cls(owners, times, keys, around, axes, own)
+        if not smooth.any():
+            return cls(owners, times, keys, axes, own)
+        holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys)
+        return cls(owners, times, keys, axes, own, pairs, with_neighbours(times, keys, holds, pairs))
 
     def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
         """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
         first, second = self.keys[:, 0], self.keys[:, 1]
         screws = twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
         native = native_twists(self.keys, body_poses(measured, self.own[..., None], self.axes, source))
-        pairs = meeting(self.owners, self.times, self.keys)
-        return tangents_and_lacks(progress_slopes(progress), native, screws, self.times, pairs)
+        return tangents_and_lacks(progress_slopes(progress), native, screws, self.times, self.pairs)
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).

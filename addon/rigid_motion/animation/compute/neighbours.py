@@ -8,17 +8,20 @@ from ...motion import Poses
 from ...motion.poses import beyond
 
 
-def with_neighbours(owners: np.ndarray, times: np.ndarray, keys: Poses, holds: np.ndarray) -> tuple[np.ndarray, Poses]:
+def with_neighbours(
+    times: np.ndarray, keys: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, Poses]:
     """Frames and poses (S, 4) of the keys around each segment, from those (S, 2) at its ends.
 
-    Where there is none, or a cycle jumps, the motion goes on as in the segment; where a segment holds, it rests.
+    `pairs` are the segments that meet, as `meeting` finds them. Where there is none, or a cycle jumps, the motion goes
+    on as in the segment; where a segment holds, it rests.
     """
     rows = _packed(keys)
     previous, following = _packed(beyond(keys[:, 0], keys[:, 1])), _packed(beyond(keys[:, 1], keys[:, 0]))
     # Between two keys on one frame there is nothing, and what is on either side meets there.
     lasts = times[:, 1] > times[:, 0]
     duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
-    left, right = meeting(owners, times, keys)
+    left, right = pairs
     previous[right] = np.where(holds[left, None], rows[right, 0], rows[left, 0])
     following[left] = np.where(holds[right, None], rows[left, 1], rows[right, 1])
     before, behind = duration.copy(), duration.copy()
