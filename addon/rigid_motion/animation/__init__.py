@@ -31,7 +31,7 @@ from .baking.reducing import (
 )
 from .baking.sizes import radius_of
 from .compute.sources import MODE_IDS
-from .edits.mode_keys import set_mode
+from .edits.mode_keys import set_mode, set_turns
 from .edits.repair import constraint_trouble, restore_constraints
 from .live import edit_mode, follower
 from .live.follower import refresh, set_enabled
@@ -65,6 +65,7 @@ __all__ = [
     "restore_keys",
     "set_enabled",
     "set_mode",
+    "set_turns",
     "total_reduction",
     "unbake",
     "unregister",

@@ -7,6 +7,8 @@ names that these were first given, so no property is ever renamed.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -21,10 +23,12 @@ from bpy.props import (
 )
 
 from ..motion import KEYFRAME_MODES
+from .actions.refusals import MOST_TURNS
 from .baking.copies import BAKED, REDUCED
+from .compute.sources import SCREW_AXIS, TURN_AXES
 from .edits import mode_keys
 from .live import follower
-from .transforms import OWN_WORDS, transform_of
+from .transforms import OWN_WORDS, Refused, Transform, transform_of
 
 FIRST = ("motor_spline", "dq_sclerp")
 """The modes that menus show first: those to take where nothing speaks for another."""
@@ -39,6 +43,17 @@ MODE_ITEMS = [
 """The modes as items of an enumeration. Files have the numbers."""
 
 
+TURN_AXIS_ITEMS = [
+    (SCREW_AXIS, "Screw", "About the axis that a segment turns about anyway, or the local Z axis where it does not turn"),
+    *((axis, axis, f"Always about the local {axis} axis") for axis in TURN_AXES if axis != SCREW_AXIS),
+]
+"""What turns are about."""
+
+
+def _on_turns_axis(record: SlotRecord, _context: bpy.types.Context) -> None:
+    follower.follower.refresh_edited({record.id_data})
+
+
 class SlotRecord(bpy.types.PropertyGroup):
     """One transform in one slot: its mode, and what its in-betweens were made from."""
 
@@ -47,6 +62,13 @@ class SlotRecord(bpy.types.PropertyGroup):
     mode: EnumProperty(items=MODE_ITEMS, options={"HIDDEN"})
     digest: StringProperty(options={"HIDDEN"})
     rows: StringProperty(options={"HIDDEN"})
+    turns_axis: EnumProperty(
+        name="Axis of Turns",
+        description="What the body turns about by whole turns more, in all segments of its Action",
+        items=TURN_AXIS_ITEMS,
+        options=set(),
+        update=_on_turns_axis,
+    )
     constraint: StringProperty(
         description="What the constraint of a bone is called, where that is not its usual name", options={"HIDDEN"}
     )
@@ -102,14 +124,24 @@ class ChangedAction(bpy.types.PropertyGroup):
 
 
 def _on_mode(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
-    if follower.is_busy():
-        return
+    if not follower.is_busy():
+        mode_keys.on_property(_transform_with(motion))
+
+
+def _on_turns(motion: ObjectMotion | BoneMotion, _context: bpy.types.Context) -> None:
+    if not follower.is_busy():
+        # What refuses to turn says so in the panel.
+        with suppress(Refused):
+            mode_keys.on_turns(_transform_with(motion))
+
+
+def _transform_with(motion: ObjectMotion | BoneMotion) -> Transform:
+    """What has these properties."""
     obj = motion.id_data
     if isinstance(motion, BoneMotion):
         # Blender has no way from it to its bone.
-        mode_keys.on_property(transform_of(next(bone for bone in obj.pose.bones if bone.rigid_motion == motion)))
-    else:
-        mode_keys.on_property(transform_of(obj))
+        return transform_of(next(bone for bone in obj.pose.bones if bone.rigid_motion == motion))
+    return transform_of(obj)
 
 
 def _on_original(motion: ObjectMotion, _context: bpy.types.Context) -> None:
@@ -126,6 +158,20 @@ class _Motion:
         options={"ANIMATABLE"},
         override={"LIBRARY_OVERRIDABLE"},
         update=_on_mode,
+    )
+    turns: IntProperty(
+        name="Turns",
+        description=(
+            "Whole turns that the body makes more between two keys, in the sense in which it turns anyway; against it "
+            "where negative. A key of this property decides from its frame on"
+        ),
+        min=-MOST_TURNS,
+        max=MOST_TURNS,
+        soft_min=-20,
+        soft_max=20,
+        options={"ANIMATABLE"},
+        override={"LIBRARY_OVERRIDABLE"},
+        update=_on_turns,
     )
     awaited: EnumProperty(
         description="The mode that was chosen before there was an Action to keep it",

@@ -78,22 +78,26 @@ def motor_lerp(segments: Segments) -> Curves:
     )
 
 
-def motor_spline(segments: Segments, tangents: np.ndarray | None = None) -> Curves:
+def motor_spline(
+    segments: Segments, tangents: np.ndarray | None = None, spins: np.ndarray | None = None
+) -> Curves:
     """A screw from key to key, bent so that its twist goes on through every key.
 
     A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their
     segment, and none has any where the body rests before or after. `tangents` is how many times as long the twist at
-    either end of each segment is, shape (2, ..., S), for keys that are passed at speeds of their own.
+    either end of each segment is, shape (2, ..., S), for keys that are passed at speeds of their own. `spins` are the
+    angular velocities (3, 2, ..., n - 1) that are added to the curve at both ends of the segments in their own time:
+    the twist that goes on through a key is that with them.
     """
 
-    def at_keys(twists, before, after, rests):
+    def at_keys(leaving, arriving, before, after, rests):
         share = _shares(before, after)
-        inner = share * twists[..., :-1] + (1.0 - share) * twists[..., 1:]
+        inner = share * arriving[..., :-1] + (1.0 - share) * leaving[..., 1:]
         if rests.any():
             inner[:, rests[..., :-1] | rests[..., 1:]] = 0.0
-        return np.concatenate((twists[..., :1], inner, twists[..., -1:]), axis=-1)
+        return np.concatenate((leaving[..., :1], inner, arriving[..., -1:]), axis=-1)
 
-    return _bent(segments, at_keys, 1.0 if tangents is None else tangents)
+    return _bent(segments, at_keys, 1.0 if tangents is None else tangents, spins)
 
 
 def motor_spline_causal(segments: Segments) -> Curves:
@@ -105,7 +109,7 @@ def motor_spline_causal(segments: Segments) -> Curves:
     that it is left with dies away in that time, and the screw goes on alone.
     """
 
-    def at_keys(twists, before, after, rests):
+    def at_keys(twists, _, before, after, rests):
         share = np.minimum(after / (before + after), before / after)
         inner = twists[..., 1:] + 0.5 * share * (twists[..., 1:] - twists[..., :-1])
         if rests.any():
@@ -141,7 +145,12 @@ def _shares(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     return np.where(after <= SHORT * before, 1.0, np.where(before <= SHORT * after, 0.0, shares))
 
 
-def _bent(segments: Segments, at_keys: Callable[..., np.ndarray], tangents: np.ndarray | float = 1.0) -> Curves:
+def _bent(
+    segments: Segments,
+    at_keys: Callable[..., np.ndarray],
+    tangents: np.ndarray | float = 1.0,
+    spins: np.ndarray | None = None,
+) -> Curves:
     """A screw from key to key, bent so that the body has certain twists at the keys.
 
     Between the poses M and M exp(r), with twists of w and w' at either end, in the segment's own time from 0 to 1, runs
@@ -151,13 +160,20 @@ def _bent(segments: Segments, at_keys: Callable[..., np.ndarray], tangents: np.n
     Each factor is a function of twists in the body's own axes, so that neither the axes of the world nor those of the
     body matter. Where twists at keys do not tell before from after, it is the same motion backwards.
 
-    `at_keys` makes the twists at the n + 1 keys (7, ..., n + 1) from those of the screws of n segments, from how long
-    the segments but the last and those but the first take, and from where the body rests (..., n).
+    `at_keys` makes the twists at the n + 1 keys (7, ..., n + 1) from those with which n segments leave their first
+    keys and arrive at their second ones, from how long the segments but the last and those but the first take, and
+    from where the body rests (..., n). Those are the twists of the screws, with the `spins` of `motor_spline` on top.
     """
-    screws, duration, rests, wanted = segments.screws, segments.durations, segments.are_still, segments.wanted
-    twists = at_keys(screws / duration, duration[..., :-1], duration[..., 1:], rests)
+    duration, rests, wanted = segments.durations, segments.are_still, segments.wanted
+    ways = segments.screws[:, None]
+    if spins is not None:
+        ways = np.concatenate((ways[:3] + spins, ways[3:].repeat(2, axis=1)))
+        rests = rests & ~spins.any(axis=(0, 1))
+    rates = ways / duration
+    leaving, arriving = rates[:, 0], rates[:, -1]
+    twists = at_keys(leaving, arriving, duration[..., :-1], duration[..., 1:], rests)
     ends = np.stack([twists[..., keys][..., wanted] for keys in (slice(None, -1), slice(1, None))], axis=1)
-    ends = ends * (duration[..., wanted] * tangents) - screws[:, None, ..., wanted]
+    ends = ends * (duration[..., wanted] * tangents) - ways[..., wanted]
     if rests.any():
         ends[..., rests[..., wanted]] = 0.0
     return replace(screw(segments), bends=ends.reshape(7, 2, -1))

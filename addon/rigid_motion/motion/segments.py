@@ -143,7 +143,7 @@ class Segments:
         """
         (begin, end), (first, second) = ([_flat(rows).T for rows in two] for two in (self.positions, self.quaternions))
         rows = np.zeros((7, *self.positions[0].shape[1:]))
-        rows[:6] = twists.between(begin, first, end, second).reshape(6, *rows.shape[1:])
+        rows[:6] = twists.between(begin, first, end, second, shortest=False).reshape(6, *rows.shape[1:])
         if self.keys.scales is not None:
             rows[6] = np.log(self.keys.scales[..., 1:] / self.keys.scales[..., :-1])
         return rows
@@ -265,14 +265,21 @@ Within = Callable[[np.ndarray, np.ndarray, slice], Poses]
 
 
 def prepare_within(
-    curves: Callable[[Segments], Curves], key_times: np.ndarray, keys: Poses, wanted: slice = slice(None)
+    curves: Callable[[Segments], Curves],
+    key_times: np.ndarray,
+    keys: Poses,
+    wanted: slice = slice(None),
+    *,
+    is_aligned: bool = False,
 ) -> Within:
     """What makes poses between keys where each segment says how many there are in it, and each how far it has come.
 
     `key_times` and keys are (..., n), at least two a row and with unit quaternions; of each row, the `wanted` segments
-    are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both.
+    are counted throughout. Progress is 0 at a segment's first key and 1 at its second, and may pass both. Where
+    `is_aligned`, the signs of the quaternions say which way round a segment turns, which matters at half a turn.
     """
-    segments = Segments.between(key_times, Poses(keys.positions, align_signs(keys.quaternions), keys.scales), wanted)
+    quaternions = keys.quaternions if is_aligned else align_signs(keys.quaternions)
+    segments = Segments.between(key_times, Poses(keys.positions, quaternions, keys.scales), wanted)
     mode, no_numbers = curves(segments), np.empty((0, segments.start.size))
 
     def within(counts: np.ndarray, progress: np.ndarray, selected: slice) -> Poses:

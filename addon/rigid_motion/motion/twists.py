@@ -37,14 +37,18 @@ def exponential(twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return quaternions, translations
 
 
-def logarithm(quaternions: np.ndarray, translations: np.ndarray) -> np.ndarray:
-    """The twists (6, n) of motions: unit quaternions (4, n) of either sign and translations (3, n)."""
+def logarithm(quaternions: np.ndarray, translations: np.ndarray, *, shortest: bool = True) -> np.ndarray:
+    """The twists (6, n) of motions: unit quaternions (4, n) and translations (3, n).
+
+    They turn by the shorter way, or else by that which the sign of the quaternion says: more than half a turn where its
+    first component is negative.
+    """
     sine = np.sqrt(np.einsum("kn,kn->n", quaternions[1:], quaternions[1:]))
     np.maximum(sine, np.sqrt(SMALLEST), out=sine)
-    cosine = np.abs(quaternions[0])
+    cosine = np.abs(quaternions[0]) if shortest else quaternions[0]
     angle = 2.0 * np.arctan2(sine, cosine)
     ratio = angle / sine
-    turn = np.where(quaternions[0] < 0.0, -ratio, ratio) * quaternions[1:]
+    turn = np.where(cosine != quaternions[0], -ratio, ratio) * quaternions[1:]
     across = cross(turn, translations)
     # Of the angle a: (1 - (a / 2) cot(a / 2)) / a^2. For small angles it has few digits, as in `exponential`.
     bend = (1.0 - 0.5 * ratio * cosine) / (angle * angle)
@@ -52,8 +56,15 @@ def logarithm(quaternions: np.ndarray, translations: np.ndarray) -> np.ndarray:
 
 
 def between(
-    first_positions: np.ndarray, first: np.ndarray, second_positions: np.ndarray, second: np.ndarray
+    first_positions: np.ndarray,
+    first: np.ndarray,
+    second_positions: np.ndarray,
+    second: np.ndarray,
+    *,
+    shortest: bool = True,
 ) -> np.ndarray:
     """The twists (6, n) from poses to others in a unit of time: positions (n, 3), quaternions (n, 4)."""
     back = conjugate(first)
-    return logarithm(multiply(back, second).T, rotate(back, second_positions - first_positions).T)
+    return logarithm(
+        multiply(back, second).T, rotate(back, second_positions - first_positions).T, shortest=shortest
+    )

@@ -32,6 +32,7 @@ def _draw_modes(
 
 
 def _draw_rest(layout: bpy.types.UILayout, pie: str, *, posing: bool) -> None:
+    layout.operator("rigid_motion.set_turns", text="Set Turns...")
     layout.separator()
     layout.operator("rigid_motion.bake", text="Bake to Keys...")
     layout.operator("rigid_motion.unbake")

@@ -10,7 +10,9 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .. import animation
+from ..animation.actions.records import record_of
 from ..animation.compute.components import SCALE
+from ..animation.queries.keyed import active_place
 from ..animation.queries.polls import with_in_betweens
 from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
 from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
@@ -18,7 +20,7 @@ from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
-from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, degrees, length, reduction_rows
+from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, length, reduction_rows, turn
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
@@ -53,6 +55,8 @@ class _Main:
             labelled(layout, label).prop(target.motion, "mode", text="")
         if segment is not None:
             _draw_segment(context, layout, segment)
+            if segment.mode != "BLENDER":
+                _draw_turns(layout, target, segment)
         for icon, text in notes:
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:
@@ -134,10 +138,19 @@ def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segmen
     column = layout.column(align=True)
     for label, text in (
         (iface_("Frames", OWN_WORDS), f"{segment.first:g} \N{EN DASH} {segment.last:g}"),
-        (iface_("Turn", OWN_WORDS), degrees(segment.turn)),
+        (iface_("Turn", OWN_WORDS), turn(segment)),
         (iface_("Distance", OWN_WORDS), length(context.scene, segment.distance)),
     ):
         labelled(column, label).label(text=text, translate=False)
+
+
+def _draw_turns(layout: bpy.types.UILayout, target: Transform, segment: SegmentFacts) -> None:
+    """Turns of the segment, to be set; and what they are about once there are any."""
+    row = labelled(layout, iface_("Turns", OWN_WORDS))
+    row.prop(target.motion, "turns", text="")
+    place = active_place(target) if segment.turns else None
+    if place is not None and (record := record_of(place)) is not None:
+        row.prop(record, "turns_axis", text="")
 
 
 def _draw_mode_menu(layout: bpy.types.UILayout, scope: str, modes: set[str]) -> None:

@@ -17,7 +17,7 @@ from ..animation import Refused, key_frames, modes_of
 from ..animation.queries.keyed import source_of
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.queries.segments import frame_in_action, segment_at
-from ..animation.transforms import MODE_PROPERTY, WIDTHS, Transform, bone_name, split_path, transform_of
+from ..animation.transforms import SEGMENT_PROPERTIES, WIDTHS, Transform, bone_name, split_path, transform_of
 
 KEY_EDITORS = ("DOPESHEET_EDITOR", "GRAPH_EDITOR")
 
@@ -146,7 +146,7 @@ def _shown_in_editor(context: bpy.types.Context) -> Iterator[Transform]:
         found = set()
         for fcurve in fcurves_of(obj):
             prefix, prop = split_path(fcurve.data_path)
-            if prefix not in found and (prop in WIDTHS or prop == MODE_PROPERTY) and fcurve.as_pointer() in shown:
+            if prefix not in found and (prop in WIDTHS or prop in SEGMENT_PROPERTIES) and fcurve.as_pointer() in shown:
                 found.add(prefix)
                 if (carrier := _carrier(obj, prefix)) is not None:
                     yield transform_of(carrier)

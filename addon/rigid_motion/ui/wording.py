@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..animation import Reduction, WholeRig
 from ..animation.properties import MODE_ITEMS, OWN_WORDS
-from ..animation.queries.segments import SegmentFacts
+from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
 from ..animation.transforms import Transform
 from ..animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 
@@ -56,23 +56,27 @@ COUNTED = {
 }
 """Several targets by their number."""
 
-NEAR_HALF_TURN = math.radians(170.0)
-"""From here on a small change of a key may send the object round the other way."""
-
 
 def cautions(segment: SegmentFacts) -> list[str]:
     """What an animator may not expect of a segment, and what to do about it. Nothing where it is Blender's own."""
     if segment.mode == "BLENDER":
         return []
     texts = []
-    if segment.long_way:
+    if segment.long_way and not segment.turns:
         texts.append(
             iface_(
                 "Blender turns this segment by more than half a turn; the mode goes the short way. "
-                "To go the long way, set a key in between"
+                "To go the long way, set Turns"
             )
         )
-    if segment.turn > NEAR_HALF_TURN:
+    if segment.two_axes:
+        texts.append(
+            iface_(
+                "Two angles go by more than half a turn here, and whole turns are made about the axis of the larger one "
+                "alone. For both, set a key in between"
+            )
+        )
+    if segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure):
         texts.append(
             iface_(
                 "{angle} is nearly half a turn: a small change of a key can send it the other way round. "
@@ -87,6 +91,14 @@ def cautions(segment: SegmentFacts) -> list[str]:
 def degrees(angle: float) -> str:
     """An angle in radians, to be read."""
     return f"{math.degrees(angle):.1f}°"
+
+
+def turn(segment: SegmentFacts) -> str:
+    """By how much a segment turns, to be read."""
+    angle = degrees(segment.turn)
+    if not segment.turns:
+        return angle
+    return iface_("{angle} ({turns} turns)").format(angle=angle, turns=f"{segment.turn / math.tau:.4g}")
 
 
 def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:

@@ -11,7 +11,15 @@ from collections.abc import Iterable, Sequence
 from ..compute.sources import MODE_NAMES, MODE_NUMBERS
 from ..transforms import Transform
 from .duplicates import mode_before_move, original_of
-from .records import NOTHING_RECORDED, has_in_betweens, has_mode, record_mode, recorded, recorded_mode
+from .records import (
+    NOTHING_RECORDED,
+    has_in_betweens,
+    has_mode,
+    record_mode,
+    record_turns_axis,
+    recorded,
+    recorded_mode,
+)
 from .slots import SlotTransform
 
 
@@ -52,6 +60,8 @@ def show_modes(places: Iterable[SlotTransform]) -> None:
                 motion.awaited = "BLENDER"
             if not keyed and motion.mode != mode:
                 motion.mode = mode
+            if motion.turns and user.turns_channel not in place.curves:
+                motion.turns = 0
 
 
 def show_pending_modes(transforms: Iterable[Transform]) -> None:
@@ -88,6 +98,7 @@ def _adopt(place: SlotTransform, users: Sequence[Transform]) -> None:
         waiting = MODE_NAMES[number]
     if waiting is None and (original := original_of(place)) is not None:
         waiting = MODE_NAMES.get(recorded_mode(original))
+        record_turns_axis(place, recorded(original).turns_axis)
     if waiting is None and has_in_betweens(place):
         waiting = next((user.motion.mode for user in users if user.motion.mode not in ("BLENDER", "")), None)
     if waiting:

@@ -12,7 +12,7 @@ from ..compute.sources import Source
 from ..curves import Keys
 from ..transforms import Refused, Transform
 from .key_reading import read_keys
-from .records import recorded_digest, recorded_mode
+from .records import recorded, recorded_digest, recorded_mode
 from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
 from .slots import SlotTransform
 
@@ -83,9 +83,12 @@ def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refu
         found.append(users)
     readable = [keyed for users in found for keyed in users if isinstance(keyed, _Keyed)]
     channels = iter(read_keys([list(keyed.channels.values()) for keyed in readable]))
-    modes = iter(read_keys([keyed.modes for keyed in readable]))
+    modes, turns = (iter(read_keys(curves)) for curves in ([k.modes for k in readable], [k.turns for k in readable]))
     return [
-        [_source(keyed, place, next(channels), next(modes)) if isinstance(keyed, _Keyed) else keyed for keyed in users]
+        [
+            _source(keyed, place, next(channels), next(modes), next(turns)) if isinstance(keyed, _Keyed) else keyed
+            for keyed in users
+        ]
         for place, users in zip(places, found, strict=True)
     ]
 
@@ -123,6 +126,9 @@ class _Keyed:
     modes: list[bpy.types.FCurve]
     """The mode channel, if there is one with keys."""
 
+    turns: list[bpy.types.FCurve]
+    """The channel of turns likewise."""
+
 
 def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
@@ -138,13 +144,19 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.
         for row, (path, index) in user.channels.items()
         if row not in keyed and PART_OF[row] in names
     }
-    mode = place.curves.get(user.mode_channel)
-    modes = [mode] if mode is not None and _has_say(user, mode) else []
-    return _Keyed(user, names, keyed, rest, modes)
+    modes, turns = (
+        [fcurve] if (fcurve := place.curves.get(channel)) is not None and _has_say(user, fcurve) else []
+        for channel in (user.mode_channel, user.turns_channel)
+    )
+    return _Keyed(user, names, keyed, rest, modes, turns)
 
 
 def _source(
-    keyed: _Keyed, place: SlotTransform, channels: list[tuple[list[int], Keys]], modes: list[tuple[list[int], Keys]]
+    keyed: _Keyed,
+    place: SlotTransform,
+    channels: list[tuple[list[int], Keys]],
+    modes: list[tuple[list[int], Keys]],
+    turns: list[tuple[list[int], Keys]],
 ) -> Source:
     """What is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
     user, rows = keyed.user, list(keyed.channels)
@@ -157,6 +169,8 @@ def _source(
         original=user.original(),
         location_axes=user.location_axes,
         mode=modes[0][1] if modes else recorded_mode(place),
+        turns=turns[0][1] if turns else None,
+        turns_axis=recorded(place).turns_axis,
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
     )

@@ -1,4 +1,4 @@
-"""What an Action keeps about each transform in each of its slots: its mode, and what its in-betweens were made from.
+"""What an Action keeps about each transform in each of its slots: its mode, what its turns are about, and what its in-betweens were made from.
 
 It goes where the Action goes: to another object, into another file, into a strip. The mode of a transform is in its
 mode channel where there is one with keys, and in its record otherwise; nowhere else.
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import bpy
 
-from ..compute.sources import MODE_NAMES, MODE_NUMBERS, UNKNOWN
+from ..compute.sources import MODE_NAMES, MODE_NUMBERS, SCREW_AXIS, UNKNOWN
 from .slots import Slot, SlotTransform
 
 
@@ -24,6 +24,7 @@ class Recorded(NamedTuple):
     digest: str = ""
     rows: str = ""
     constraint: str = ""
+    turns_axis: str = SCREW_AXIS
 
 
 NOTHING_RECORDED = Recorded()
@@ -33,12 +34,12 @@ def recorded(place: SlotTransform) -> Recorded:
     """What is kept about a transform in a slot: looked up once, and again after it was changed by way of here."""
     found = place.__dict__.get("recorded")
     if found is None:
-        record = _record_of(place)
+        record = record_of(place)
         if record is None:
             found = NOTHING_RECORDED
         else:
             mode = record.mode if record.is_property_set("mode") else None
-            found = Recorded(mode, record.digest, record.rows, record.constraint)
+            found = Recorded(mode, record.digest, record.rows, record.constraint, record.turns_axis or SCREW_AXIS)
         place.__dict__["recorded"] = found
     return found
 
@@ -91,7 +92,7 @@ def record_mode(place: SlotTransform, number: int) -> None:
     """Keep the mode that a transform has throughout, and have its users show it."""
     mode = MODE_NAMES[number]
     if number == 0:
-        if (record := _record_of(place)) is not None:
+        if (record := record_of(place)) is not None:
             record.property_unset("mode")
             _tidy(place, record)
     elif recorded(place).mode != mode:
@@ -102,12 +103,19 @@ def record_mode(place: SlotTransform, number: int) -> None:
             user.motion.mode = mode
 
 
+def record_turns_axis(place: SlotTransform, axis: str) -> None:
+    """Keep what turns are about, one of `TURN_AXES`."""
+    if axis != recorded(place).turns_axis:
+        _ensure_record(place).turns_axis = axis
+        place.__dict__.pop("recorded", None)
+
+
 def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -> None:
     """Keep what in-betweens were made from, and which components they are in."""
     if digest:
         record = _ensure_record(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
-    elif recorded(place).digest and (record := _record_of(place)) is not None:
+    elif recorded(place).digest and (record := record_of(place)) is not None:
         record.digest = record.rows = ""
         _tidy(place, record)
     place.__dict__.pop("recorded", None)
@@ -149,7 +157,8 @@ def forget_in_betweens(slot: Slot, prefixes: Iterable[str]) -> None:
             record.digest = ""
 
 
-def _record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
+def record_of(place: SlotTransform) -> bpy.types.PropertyGroup | None:
+    """What an Action keeps about a transform, None where that is nothing."""
     records, key = place.slot.action.rigid_motion.slots, _key(place.slot, place.prefix)
     number = _numbers.get(key, -1)
     if not (0 <= number < len(records) and records[number].name == key):
@@ -174,7 +183,7 @@ def _key(slot: Slot, prefix: str) -> str:
 
 def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
     """The record of a transform in a slot, made where there is none yet."""
-    record = _record_of(place)
+    record = record_of(place)
     if record is not None:
         return record
     record = place.slot.action.rigid_motion.slots.add()
@@ -185,6 +194,6 @@ def _ensure_record(place: SlotTransform) -> bpy.types.PropertyGroup:
 
 def _tidy(place: SlotTransform, record: bpy.types.PropertyGroup) -> None:
     """Take out a record that says nothing."""
-    if not record.digest and not record.is_property_set("mode"):
+    if not record.digest and not record.is_property_set("mode") and record.turns_axis == SCREW_AXIS:
         records = place.slot.action.rigid_motion.slots
         records.remove(next(number for number, one in enumerate(records) if one == record))

@@ -20,6 +20,9 @@ from .slots import SlotTransform, is_filled_in
 MOST_FRAMES = 250_000
 """The longest motion that is filled in: two hours and a quarter at 30 frames a second."""
 
+MOST_TURNS = 1000
+"""Whole turns from one key to the next."""
+
 COMPONENTS = (
     *(n_("Location X"), n_("Location Y"), n_("Location Z")),
     *(n_("Rotation W"), n_("Rotation X"), n_("Rotation Y"), n_("Rotation Z")),
@@ -140,6 +143,7 @@ def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
 def refuse_numbers(name: str, source: Source) -> None:
     """Raise `Refused` where the numbers of a source make no motion, or too long a one."""
     _refuse_modes(name, source.mode)
+    _refuse_turns(name, source.turns)
     if not source.channels:
         return
     numbers = (*source.original.tolist(), *source.rest.values())
@@ -228,6 +232,20 @@ def _refuse_modes(name: str, mode: int | Keys) -> None:
                 "{name}: key {number} of the mode channel has no mode that this version knows: "
                 "delete it (Dope Sheet, X), or choose a mode for the whole object"
             ).format(name=name, number=int(np.argmin(known)) + 1)
+        )
+
+
+def _refuse_turns(name: str, turns: Keys | None) -> None:
+    """Raise `Refused` where a key of the channel of turns has more of them than anything turns."""
+    if turns is None:
+        return
+    usable = (np.abs(turns.values[0]) <= MOST_TURNS) & np.isfinite(turns.times)
+    if not usable.all():
+        raise Refused(
+            rpt_(
+                "{name}: key {number} of the channel Turns does not have a number of turns up to {most}: "
+                "delete it (Dope Sheet, X), or set the turns anew"
+            ).format(name=name, number=int(np.argmin(usable)) + 1, most=MOST_TURNS)
         )
 
 

@@ -18,7 +18,7 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from ..transforms import (
     CONSTRAINT,
     GROUP,
-    MODE_PROPERTY,
+    SEGMENT_PROPERTIES,
     WIDTHS,
     Channel,
     Transform,
@@ -142,7 +142,7 @@ def transforms_in(slot: Slot, prefixes: Collection[str] | None = None) -> list[S
     for fcurve in () if channelbag is None else channelbag.fcurves:
         path = fcurve.data_path
         prefix, prop = split_path(path)
-        if prefix in curves or prop in WIDTHS or prop == MODE_PROPERTY or prop.startswith(_TIMES):
+        if prefix in curves or prop in WIDTHS or prop in SEGMENT_PROPERTIES or prop.startswith(_TIMES):
             curves.setdefault(prefix, {})[path, fcurve.array_index] = fcurve
     for record in slot.action.rigid_motion.slots:
         if record.handle == slot.handle:

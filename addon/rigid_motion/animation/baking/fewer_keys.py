@@ -288,4 +288,4 @@ def with_keys(source: Source, frames: np.ndarray, values: dict[int, np.ndarray],
         if places:
             channels.append(([own[place] for place in places], keys.only(places)))
     rest = {row: value for row, value in source.rest.items() if row not in values}
-    return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode])
+    return replace(source, channels=tuple(channels), rest=rest, mode=MODE_NUMBERS[mode], turns=None)

@@ -287,8 +287,9 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
         fcurve = copy.ensure_curve(channel)
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
-    if transform.mode_channel in copy.curves:
-        fcurves.remove(copy.curves.pop(transform.mode_channel))
+    for channel in (transform.mode_channel, transform.turns_channel):
+        if channel in copy.curves:
+            fcurves.remove(copy.curves.pop(channel))
     for mode in np.unique(fewer.modes):
         set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
 

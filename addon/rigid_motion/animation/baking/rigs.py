@@ -15,10 +15,10 @@ import numpy as np
 
 from ..actions.channels import copy_fcurve, key_fields
 from ..actions.key_reading import read_keys
-from ..actions.records import record_mode, recorded_mode
+from ..actions.records import record_mode, record_turns_axis, recorded, recorded_mode
 from ..actions.renaming import keep_names
 from ..actions.slots import Slot, SlotTransform, in_action, slots_of, transforms_in
-from ..transforms import MODE_PROPERTY, WIDTHS, Transform
+from ..transforms import SEGMENT_PROPERTIES, WIDTHS, Transform
 from .copies import Lookup, copied, exchange, in_copy, let_rest, note, used_in
 
 
@@ -96,12 +96,13 @@ def _is_as_in(action: bpy.types.Action, place: SlotTransform) -> bool:
 
 def _is_as(one: SlotTransform, other: SlotTransform) -> bool:
     """Whether a transform has the same keys and modes in these two."""
-    return _summary(one) == _summary(other) and recorded_mode(one) == recorded_mode(other)
+    settings = [(recorded_mode(place), recorded(place).turns_axis) for place in (one, other)]
+    return settings[0] == settings[1] and _summary(one) == _summary(other)
 
 
 def _animators(place: SlotTransform) -> dict[tuple[str, int], bpy.types.FCurve]:
-    """The channels that the animator has keyed, that of modes among them."""
-    names = (*WIDTHS, MODE_PROPERTY)
+    """The channels that the animator has keyed, those of modes and turns among them."""
+    names = (*WIDTHS, *SEGMENT_PROPERTIES)
     return {channel: curve for channel, curve in place.curves.items() if channel[0].removeprefix(place.prefix) in names}
 
 
@@ -131,6 +132,7 @@ def _copy_channels(source: SlotTransform, target: SlotTransform) -> None:
     for channel, fcurve in _animators(source).items():
         target.curves[channel] = copy_fcurve(fcurve, target.channelbag)
     record_mode(target, recorded_mode(source))
+    record_turns_axis(target, recorded(source).turns_axis)
 
 
 def _go_back_to(rig: bpy.types.Object, changed: bpy.types.Action, original: bpy.types.Action, slot: Slot) -> None:

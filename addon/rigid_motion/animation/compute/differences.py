@@ -26,8 +26,9 @@ from ..curves import Keys, evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
-from .neighbours import meeting, with_neighbours
+from .neighbours import meeting, spins_of_neighbours, with_neighbours
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
+from .turning import Turning, are_idle, idle_progress, needs_turning, turning, without_spins
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -232,10 +233,16 @@ def _move(
     original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
     smooth = np.isin(modes, SMOOTH)
     ends, lacks = _Ends.of(start, end, segments, smooth), None
+    idle = np.zeros(len(counts), dtype=bool)
+    if ends.turning is not None:
+        idle = are_idle(weights, ends.turning.spins.turns)
     has_handles = smooth & np.concatenate([source.has_handles for source in sources])
     if has_handles.any():
         measured = _measured(ends.times, segments)
         progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]
+        for segment in np.flatnonzero(idle & has_handles):
+            moments = ends.times[segment, 0] + np.ptp(ends.times[segment]) * MEASURED
+            progress[segment] = ends.idle_progress(segment, moments, sources)
         tangents, lacks = ends.at_keys(progress, measured, sources[0])
         ends = replace(ends, tangents=np.where(has_handles, tangents, 1.0))
         lacks = np.where(has_handles, lacks, 0.0)
@@ -245,6 +252,10 @@ def _move(
         progress = np.empty((1, place.stop - place.start))
         combine(weights[None, :, some], timing[:, place], counts[some], progress)
         progress = progress[0] - offsets[some].repeat(counts[some])
+        bounds = np.concatenate(((0,), np.cumsum(counts[some])))
+        for number in np.flatnonzero(idle[some] & (counts[some] > 0)):
+            own = slice(*bounds[number : number + 2])
+            progress[own] = ends.idle_progress(some.start + number, every_frame[place][own], sources)
         turn_into_quaternions(native[:, place], order)
         default = original[:, ends.owners[some]]
         if lacks is not None:
@@ -314,6 +325,12 @@ class _Ends:
     around: tuple[np.ndarray, Poses] | None = None
     """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
 
+    turning: Turning | None = None
+    """How they turn, None where all of them go the shortest way."""
+
+    spins: np.ndarray | None = None
+    """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
+
     tangents: np.ndarray | None = None
     """How long the tangents of smooth modes are at both keys, shape (2, S); None where all are 1."""
 
@@ -330,17 +347,45 @@ class _Ends:
         own = np.stack([source.original for source in sources], axis=1)[:, owners]
         axes = location_axes(sources, owners)
         keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
+        turned = _turning(sources, start, end, keys, own) if any(map(needs_turning, sources)) else None
+        ends = cls(owners, times, keys, axes, own, turning=turned)
         if not smooth.any():
-            return cls(owners, times, keys, axes, own)
+            return ends
         holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys)
-        return cls(owners, times, keys, axes, own, pairs, with_neighbours(times, keys, holds, pairs))
+        (frames, around), spins = with_neighbours(times, keys, holds, pairs), None
+        if turned is not None:
+            around, spins = spins_of_neighbours(turned.signs, turned.twists, around, holds, pairs)
+        return replace(ends, pairs=pairs, around=(frames, around), spins=spins)
+
+    def idle_progress(self, segment: int, frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
+        """Return the progress on frames (m,) of a segment that turns although no channel changes in it."""
+        first, last = (np.full(len(frames), end) for end in self.times[segment])
+        return idle_progress(sources[self.owners[segment]], frames, first, last)
 
     def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
         """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
+        (first, second), slopes = self.signed, progress_slopes(progress)
+        screws = twists.between(
+            first.positions, first.quaternions, second.positions, second.quaternions, shortest=self.turning is None
+        )
+        screws, poses = np.stack((screws, screws)), body_poses(measured, self.own[..., None], self.axes, source)
+        if self.turning is not None:
+            # Angles turn by spins, too. These are known, and what is left is less than half a turn.
+            poses = without_spins(poses, self.turning.by_angles, progress)
+        native = native_twists(self.keys, poses)
+        if self.turning is not None:
+            added = np.moveaxis(self.turning.twists, 1, 0)
+            screws[:, :3] += added
+            native[:, :3] += slopes[:, None] * added
+        return tangents_and_lacks(slopes, native, screws, self.times, self.pairs)
+
+    @property
+    def signed(self) -> tuple[Poses, Poses]:
+        """The poses at both keys, with signs that say which way round a segment turns, (S,) each."""
         first, second = self.keys[:, 0], self.keys[:, 1]
-        screws = twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
-        native = native_twists(self.keys, body_poses(measured, self.own[..., None], self.axes, source))
-        return tangents_and_lacks(progress_slopes(progress), native, screws, self.times, self.pairs)
+        if self.turning is None:
+            return first, second
+        return first, replace(second, quaternions=second.quaternions * self.turning.signs[:, None])
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
@@ -350,19 +395,42 @@ class _Ends:
         axes = None if self.axes is None else self.axes[some].repeat(counts, axis=0)
         if mode not in self.prepared:
             self.prepared[mode] = self._prepare(mode)
+        within, of_each = some, counts
         if KEYFRAME_MODES[mode].is_smooth:
             # Of the three segments between four keys the one in the middle.
-            some = slice(3 * some.start, 3 * some.stop)
-            counts = np.multiply.outer(counts, (0, 1, 0)).ravel()
-        poses = self.prepared[mode](counts, progress, some)
+            within = slice(3 * some.start, 3 * some.stop)
+            of_each = np.multiply.outer(counts, (0, 1, 0)).ravel()
+        poses = self.prepared[mode](of_each, progress, within)
+        if self.turning is not None:
+            poses = self.turning.spins.add_to(poses, counts, progress, some)
         return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
 
     def _prepare(self, mode: str) -> Callable[..., Poses]:
+        curves, turned = KEYFRAME_MODES[mode].curves, self.turning
         if not KEYFRAME_MODES[mode].is_smooth:
-            return prepare(np.broadcast_to((0.0, 1.0), self.times.shape), self.keys, mode)
-        if self.tangents is None:
+            times, keys = np.broadcast_to((0.0, 1.0), self.times.shape), self.keys
+            if turned is None:
+                return prepare(times, keys, mode)
+            quaternions = np.stack([keys.quaternions for keys in self.signed], axis=1)
+            return prepare_within(curves, times, replace(keys, quaternions=quaternions), is_aligned=True)
+        if self.tangents is None and turned is None:
             return prepare(*self.around, mode)
-        return prepare_within(partial(KEYFRAME_MODES[mode].curves, tangents=self.tangents[..., None]), *self.around)
+        tangents = None if self.tangents is None else self.tangents[..., None]
+        curves = partial(curves, tangents=tangents, spins=self.spins)
+        return prepare_within(curves, *self.around, is_aligned=turned is not None)
+
+
+def _turning(sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, own: np.ndarray) -> Turning:
+    """How S segments turn, from the channels (10, S) at both ends and what they make of the body, (S, 2)."""
+    turns, backwards = (
+        np.concatenate(parts)
+        for parts in (
+            [source.segment_turns for source in sources],
+            [source.run_backwards for source in sources],
+        )
+    )
+    axes = np.repeat([source.turns_axis for source in sources], [len(source.segment_turns) for source in sources])
+    return turning(start, end, keys, own[ROWS[ROTATION]].T, sources[0].order, turns, axes, backwards)
 
 
 def _measured(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.ndarray:

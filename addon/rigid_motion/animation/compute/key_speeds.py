@@ -73,8 +73,8 @@ def tangents_and_lacks(
         Of progress, as `progress_slopes` has them.
     native : array, shape (2, 6, S)
         As `native_twists` has them.
-    screws : array, shape (6, S)
-        The twists that lead from key to key in unit time.
+    screws : array, shape (2, 6, S)
+        The twists that lead from key to key in unit time, as they are at both ends: spins turn about axes of their own.
     times : array, shape (S, 2)
         The frames of both keys.
     pairs : tuple of array of int, shape (p,)
@@ -85,11 +85,11 @@ def tangents_and_lacks(
     speeds = screws / np.where(durations > 0.0, durations, np.inf)
     before, after = pairs
     share = twist_shares(durations[before], durations[after])
-    parts = share * speeds[:, before], (1.0 - share) * speeds[:, after]
+    parts = share * speeds[1][:, before], (1.0 - share) * speeds[0][:, after]
     mean = parts[0] + parts[1]
     squared = np.maximum(_dot(mean, mean), SMALL * sum(_dot(part, part) for part in parts))
     for side, segments, alone in ((1, before, share == 1.0), (0, after, share == 0.0)):
-        length = _ratio(_dot(speeds[:, segments], mean), squared)
+        length = _ratio(_dot(speeds[side][:, segments], mean), squared)
         speed = _ratio(_dot(native[side][:, segments], mean), durations[segments] * squared)
         slope = speed / np.copysign(np.maximum(np.abs(length), SHORTEST), length)
         tangents[side, segments] = length

@@ -34,6 +34,26 @@ def with_neighbours(
     )
 
 
+def spins_of_neighbours(
+    signs: np.ndarray, spins: np.ndarray, around: Poses, holds: np.ndarray, pairs: tuple[np.ndarray, np.ndarray]
+) -> tuple[Poses, np.ndarray]:
+    """What spins make of `with_neighbours`: the keys (S, 4) in signs that say which way round segments turn, and the
+    angular velocities (3, 2, S, 3) that spins add at both ends of the three segments between them.
+
+    From the signs (S,) and velocities (3, 2, S) of the segments.
+    """
+    quaternions = around.quaternions.copy()
+    # Where nothing is beside a segment, its motion goes on.
+    steps = signs[:, None].repeat(3, axis=1)
+    beside = np.stack((spins[:, [0, 0]], spins, spins[:, [1, 1]]), axis=3)
+    left, right = pairs
+    for segments, others, place in ((right, left, 0), (left, right, 2)):
+        steps[segments, place] = np.where(holds[others], 1.0, signs[others])
+        beside[:, :, segments, place] = np.where(holds[others], 0.0, spins[:, :, others])
+    quaternions[:, 1:] *= np.cumprod(steps, axis=1)[..., None]
+    return Poses(around.positions, quaternions, around.scales), beside
+
+
 def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndarray, np.ndarray]:
     """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there."""
     rows, lasts = _packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])

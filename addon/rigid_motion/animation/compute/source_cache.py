@@ -68,6 +68,7 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
         and np.array_equal(old.original, new.original)
         and _axes_bytes(old) == _axes_bytes(new)
         and _mode_bytes(old) == _mode_bytes(new)
+        and _turns_bytes(old) == _turns_bytes(new)
         and [rows for rows, _ in old.channels] == [rows for rows, _ in new.channels]
     )
     if not alike:
@@ -148,3 +149,7 @@ def _axes_bytes(source: Source) -> bytes | None:
 
 def _mode_bytes(source: Source) -> bytes | int:
     return source.mode.raw if isinstance(source.mode, Keys) else source.mode
+
+
+def _turns_bytes(source: Source) -> bytes | None:
+    return None if source.turns is None else source.turns.raw + source.turns_axis.encode()

@@ -34,6 +34,15 @@ LAYOUT = b"2"
 
 FULL_TURN = 2.0 * np.pi
 
+HALF_TURN = np.pi - 1e-4
+"""Half a turn between two keys by angles, of which single precision has lost a little."""
+
+SCREW_AXIS = "SCREW"
+"""Turns are about the axis that a segment turns about anyway, and the local Z axis where it does not turn."""
+
+TURN_AXES = (SCREW_AXIS, "X", "Y", "Z")
+"""What turns are about: the axis of the segment's screw, or always the same local axis."""
+
 SAME_FRAME = 0.01
 """Keys closer than this are one key to Blender, and here."""
 
@@ -65,6 +74,12 @@ class Source:
     mode: int | Keys
     """The number of the mode of all segments, or the mode channel."""
 
+    turns: Keys | None = None
+    """The channel of whole turns more, of segments from the frames of its keys on; None where it has no say."""
+
+    turns_axis: str = SCREW_AXIS
+    """One of `TURN_AXES`."""
+
     location_axes: np.ndarray | None = None
     """The axes that location runs along, as columns (3, 3) in those of the body at rest; None where they are one."""
 
@@ -88,6 +103,10 @@ class Source:
         if self.location_axes is not None:
             summary.update(self.location_axes.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
+        if self.turns is not None:
+            summary.update(self.turns.raw + self.turns_axis.encode())
+        if self.has_half_turns:
+            summary.update(b"spins")
         span = self.seen if self.goes_on and not self.repeats else None
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
         return summary.hexdigest()
@@ -197,6 +216,34 @@ class Source:
         """Return the number of the mode on a frame, on that of the original where cycles repeat it."""
         frames = np.array([frame])
         return int(self.modes_at(frames if self.cyclic is None else cycled(self.cyclic, frames)[0])[0])
+
+    @cached_property
+    def segment_turns(self) -> np.ndarray:
+        """The whole turns more of each segment that is not Blender's own, shape (n - 1,)."""
+        if self.turns is None:
+            return np.zeros(len(self.key_frames) - 1, dtype=int)
+        starts = self.key_frames[:-1] + SAME_FRAME
+        if self.cyclic is not None:
+            starts = cycled(self.cyclic, starts)[0]
+        at = np.searchsorted(self.turns.times, starts, side="right") - 1
+        turns = np.where(at < 0, 0.0, self.turns.values[0, np.clip(at, 0, None)])
+        return np.where(self.modes == 0, 0, np.rint(turns)).astype(int)
+
+    @cached_property
+    def run_backwards(self) -> np.ndarray:
+        """Whether cycles run through a segment backwards, shape (n - 1,)."""
+        starts = self.key_frames[:-1] + SAME_FRAME
+        return np.zeros(len(starts), dtype=bool) if self.cyclic is None else cycled(self.cyclic, starts)[1]
+
+    @cached_property
+    def has_half_turns(self) -> bool:
+        """Whether an Euler angle goes by half a turn or more from one of its keys to the next."""
+        return self.order is not None and any(
+            np.any(np.abs(np.diff(values)) >= HALF_TURN)
+            for rows, keys in self.channels
+            for row, values in zip(rows, keys.values, strict=True)
+            if 3 <= row < 6
+        )
 
     @property
     def is_live(self) -> bool:

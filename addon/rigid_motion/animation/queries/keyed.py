@@ -66,7 +66,7 @@ def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
 def key_frames(carrier: bpy.types.Object | Transform, *, selected: bool = False) -> np.ndarray:
     """The frames of location, rotation and scale keys, or of the selected ones alone, shape (n,), rising.
 
-    Keys of the mode channel count among the selected ones.
+    Keys of the channels of modes and turns count among the selected ones.
     """
     transform = transform_of(carrier)
     place = active_place(transform, places_of(transform))
@@ -93,7 +93,7 @@ def frames_in(place: SlotTransform, *, selected: bool = False) -> np.ndarray:
     transform = place.users[0]
     for channel, fcurve in place.curves.items():
         path = channel[0].removeprefix(place.prefix)
-        if path in WIDTHS or (selected and channel == transform.mode_channel):
+        if path in WIDTHS or (selected and channel in (transform.mode_channel, transform.turns_channel)):
             keys = fcurve.keyframe_points
             points, chosen = np.empty(2 * len(keys), np.float32), np.ones(len(keys), dtype=bool)
             keys.foreach_get("co", points)
@@ -112,6 +112,19 @@ def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
     else:
         modes = [_mode_at(fcurve, frame) for frame in frames.tolist()]
     return [mode if mode in MODE_NAMES else 0 for mode in modes]
+
+
+def turns_in(place: SlotTransform, frames: np.ndarray) -> np.ndarray:
+    """The whole turns more of the segments at these frames, shape (n,)."""
+    fcurve = place.curves.get(place.users[0].turns_channel)
+    if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
+        return np.zeros(len(frames), dtype=int)
+    keys = fcurve.keyframe_points
+    points = np.empty(2 * len(keys), np.float32)
+    keys.foreach_get("co", points)
+    at = np.searchsorted(points[::2], frames + 0.5 * SAME_FRAME, side="right") - 1
+    turns = np.where(at < 0, 0.0, points[1::2][np.clip(at, 0, None)])
+    return np.rint(np.nan_to_num(turns)).astype(int)
 
 
 def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...motion.eulers import quaternions_from_extrinsic_eulers
 from ..actions.records import recorded_digest
 from ..actions.slots import places_of
 from ..compute.components import PART_OF
 from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
+from ..compute.turning import turning_in
 from ..curves import cycled
 from ..transforms import Transform, transform_of
 from ..writers.table import writer_of
@@ -23,6 +23,9 @@ from .visible_pose import visible_components
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
+
+NEAR_HALF_TURN = np.radians(170.0)
+"""From here on a small change of a key may send a body that turns the shortest way round the other way."""
 
 NEAR = 1e-6
 """What differs by less is the same."""
@@ -51,13 +54,22 @@ class SegmentFacts:
     """The name of its mode."""
 
     turn: float
-    """The angle from its first pose to its last, 0 to pi."""
+    """By how much it turns, spins included."""
+
+    turns: int
+    """The whole turns among it that are more than the shortest way, by their sign: of the angles and of the channel."""
 
     distance: float
     """From its first position to its last."""
 
     long_way: bool
-    """Whether Blender's own in-betweens turn by more than half a turn where the modes turn by less."""
+    """Whether Blender's own in-betweens turn by more than half a turn where the modes turn by less: of quaternions."""
+
+    is_sure: bool
+    """Whether the keys say which way round it turns, however near to half a turn: angles do."""
+
+    two_axes: bool
+    """Whether two Euler angles go by more than half a turn, of which the larger one decides."""
 
     scales_unevenly: bool
     """Whether it changes a scale that the modes leave to Blender, one that is not the same along all axes."""
@@ -81,18 +93,21 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         return None
     place = int(np.clip(np.searchsorted(keys, frame + SAME_FRAME, side="right") - 1, 0, len(keys) - 2))
     ends = keys[place : place + 2]
-    location, rotation, scale = np.split(_components(source, ends), (3, 7))
-    quaternions = quaternions_from_extrinsic_eulers(rotation[:3].T, source.order) if source.order else rotation.T
-    alike = float(quaternions[0] @ quaternions[1]) / float(np.prod(np.linalg.norm(quaternions, axis=1)) or 1.0)
-    swept = np.abs(np.diff(rotation))
+    rows = _components(source, ends)
+    location, rotation, scale = np.split(rows, (3, 7))
+    alike = float(rotation[:, 0] @ rotation[:, 1]) / float(np.prod(np.linalg.norm(rotation, axis=0)) or 1.0)
+    swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, place, rows)
     return SegmentFacts(
         first=float(ends[0]),
         last=float(ends[1]),
         key=_deciding_key(source, ends[0]),
         mode=MODE_NAMES[source.modes[place]],
-        turn=2.0 * float(np.arccos(np.clip(abs(alike), 0.0, 1.0))),
+        turn=float(turned.totals[0]),
+        turns=int(turned.spins.turns[0]),
         distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
-        long_way=bool(np.any(swept > HALF_TURN)) if source.order else -1.0 + NEAR < alike < -NEAR,
+        long_way=source.order is None and -1.0 + NEAR < alike < -NEAR,
+        is_sure=source.order is not None and bool(np.any(swept > NEAR_HALF_TURN)),
+        two_axes=source.order is not None and np.count_nonzero(swept > HALF_TURN) > 1,
         scales_unevenly=not source.uniform_scale and bool(np.any(np.abs(np.diff(scale)) > NEAR)),
     )
 

@@ -17,7 +17,17 @@ from __future__ import annotations
 from .bones import CONSTRAINT, BoneTransform, bone_name, let_override_be_read, prefix_of, shows_differences, split_path
 from .kinds import KINDS, is_part, kind_of, transform_of
 from .objects import GROUP, ORIGINALS, ObjectTransform, default_of
-from .transform import LINKED, MODE_PROPERTY, OWN_WORDS, WIDTHS, Channel, Refused, Transform, properties_for
+from .transform import (
+    LINKED,
+    MODE_PROPERTY,
+    OWN_WORDS,
+    SEGMENT_PROPERTIES,
+    WIDTHS,
+    Channel,
+    Refused,
+    Transform,
+    properties_for,
+)
 
 __all__ = [
     "CONSTRAINT",
@@ -27,6 +37,7 @@ __all__ = [
     "MODE_PROPERTY",
     "ORIGINALS",
     "OWN_WORDS",
+    "SEGMENT_PROPERTIES",
     "WIDTHS",
     "BoneTransform",
     "Channel",

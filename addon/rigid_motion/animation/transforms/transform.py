@@ -20,7 +20,10 @@ OWN_WORDS = "Rigid Motion"
 LINKED = n_("{name} is linked from another file: make it local first (Object > Relations > Make Local)")
 """Why a data-block cannot be edited, and the way out."""
 
-MODE_PROPERTY = "rigid_motion.mode"
+MODE_PROPERTY, TURNS_PROPERTY = "rigid_motion.mode", "rigid_motion.turns"
+
+SEGMENT_PROPERTIES = (MODE_PROPERTY, TURNS_PROPERTY)
+"""What keys say about the segments that they begin."""
 
 WIDTHS = {LOCATION: 3, "rotation_quaternion": 4, "rotation_euler": 3, SCALE: 3}
 
@@ -154,6 +157,10 @@ class Transform(ABC):
     @property
     def mode_channel(self) -> Channel:
         return self.prefix + MODE_PROPERTY, 0
+
+    @property
+    def turns_channel(self) -> Channel:
+        return self.prefix + TURNS_PROPERTY, 0
 
     def components(self) -> np.ndarray:
         """Its properties as they are now, as the ten components of a source."""

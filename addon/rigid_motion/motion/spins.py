@@ -1,0 +1,53 @@
+"""Spins: whole turns that a body makes more than its mode says, between two keys that it keeps.
+
+They are about an axis through the body's origin, which stands still in the body or in space, at the progress of the
+segment: a segment M(u) becomes M(u) exp(2 pi k u e) or, about an axis of space, exp(2 pi k u e) on the other side of
+its rotation. At both keys that is a turn by nothing, and the path of the origin stays what it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .poses import Poses
+from .quaternions import conjugate, multiply, rotate
+
+FULL_TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Spins:
+    """The spins of S segments."""
+
+    turns: np.ndarray
+    """Whole turns, by their sign in the sense of the axis or against it, shape (S,)."""
+
+    axes: np.ndarray
+    """Unit vectors, shape (3, S)."""
+
+    in_space: np.ndarray
+    """Whether an axis stands still in space, and not in the body, shape (S,)."""
+
+    def twists(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return the angular velocities (3, 2, S) that spins add at both keys in unit time, along the body's axes.
+
+        From the unit quaternions (S, 4) of the keys.
+        """
+        turn = (FULL_TURN * self.turns * self.axes).T
+        ends = [np.where(self.in_space[:, None], rotate(conjugate(key), turn), turn).T for key in (first, second)]
+        return np.stack(ends, axis=1)
+
+    def add_to(self, poses: Poses, counts: np.ndarray, progress: np.ndarray, some: slice = slice(None)) -> Poses:
+        """Return the poses (m,) of some of the segments, counts[i] of the i-th, turned as far as their progress (m,)."""
+        turns = self.turns[some]
+        if not turns.any():
+            return poses
+        half = np.pi * turns.repeat(counts) * progress
+        added = np.empty((len(half), 4))
+        added[:, 0] = np.cos(half)
+        added[:, 1:] = (np.sin(half) * self.axes[:, some].repeat(counts, axis=1)).T
+        in_space = self.in_space[some].repeat(counts)[:, None]
+        before, after = (np.where(in_space, *pair) for pair in ((added, poses.quaternions), (poses.quaternions, added)))
+        return Poses(poses.positions, multiply(before, after), poses.scales)
