@@ -25,7 +25,8 @@ from ..actions.slots import SlotTransform
 from ..compute.differences import SMOOTH, in_betweens
 from ..compute.sources import SAME_FRAME, Source
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
-from ..edits.mode_keys import set_mode_in, set_whole
+from ..edits.mode_keys import set_whole
+from ..live.segment_keys import set_mode_in
 from ..transforms import Refused, Transform, transform_of
 from ..writers.channel_values import channel_values
 from .copies import BAKED, Lookup

@@ -24,7 +24,7 @@ from ..actions.channels import replace_keys
 from ..actions.slots import places_of, slots_of, transforms_in
 from ..compute.sources import MODE_NAMES, distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
-from ..edits.mode_keys import set_mode_in
+from ..live.segment_keys import set_mode_in
 from ..queries.keyed import segment_modes
 from ..transforms import Refused, Transform, shows_differences, transform_of
 from .bake import go_back

@@ -24,8 +24,8 @@ from .sources import HALF_TURN, SCREW_AXIS, Source
 NO_TURN = 1e-4
 """Radians: what turns by less has no axis."""
 
-NO_WAY = 1e-12
-"""The square of how far channels go where they do not, but for rounding errors."""
+MOMENT = 1e-3
+"""A time too short to see, in frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def turning(
     """
     first, second = keys.quaternions[:, 0], keys.quaternions[:, 1]
     signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
-    turn = _turns(first, second)
+    turn = shortest_turns(first, second)
     spins = Spins(np.zeros(len(turns), dtype=int), np.zeros((3, len(turns))), np.zeros(len(turns), dtype=bool))
     if order is not None:
         _add_angles(spins, turn, signs, start[ROWS[ROTATION]][:3], end[ROWS[ROTATION]][:3], first, own, order)
@@ -97,19 +97,20 @@ def turning(
     return Turning(spins, by_angles, signs, turn, spins.twists(first, second))
 
 
-def turning_in(source: Source, segment: int, ends: np.ndarray) -> Turning:
-    """Return how one of the segments of a source turns, from the channels (10, 2) at both ends of it."""
-    start, end = ends[:, :1], ends[:, 1:]
-    own = source.original[:, None]
-    keys = body_poses(np.stack((start, end), axis=2), own[..., None], None, source)
+def turning_in(source: Source, segment: int, turns: int | None = None) -> Turning:
+    """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
+    keys, own = source.key_frames[segment : segment + 2], source.original[:, None]
+    # As seen from within the segment where cycles jump.
+    rows = source.values_at(keys if source.cyclic is None else keys + np.array((MOMENT, -MOMENT)))
+    start, end = rows[:, :1], rows[:, 1:]
+    poses = body_poses(rows[:, None], own[..., None], None, source)
     at = slice(segment, segment + 1)
-    turns, backwards = source.segment_turns[at], source.run_backwards[at]
-    return turning(
-        start, end, keys, own[ROWS[ROTATION]].T, source.order, turns, np.array([source.turns_axis]), backwards
-    )
+    channel = source.segment_turns[at] if turns is None else np.array([turns])
+    axes, backwards = np.array([source.turns_axis]), source.run_backwards[at]
+    return turning(start, end, poses, own[ROWS[ROTATION]].T, source.order, channel, axes, backwards)
 
 
-def _turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """The shortest turns (3, S) from quaternions (S, 4) to others."""
     nowhere = np.zeros((len(first), 3))
     return twists.between(nowhere, first, nowhere, second)[:3]

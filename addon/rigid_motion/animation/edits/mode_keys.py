@@ -7,7 +7,7 @@ Turns are in a channel likewise, and without it there are none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,18 +16,18 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.modes import no_such_mode
-from ..actions.channels import replace_keys
 from ..actions.mode_property import is_keyed, set_pending_mode
 from ..actions.reading import read
 from ..actions.records import record_mode, record_turns_axis
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
-from ..compute.sources import MODE_NUMBERS, SAME_FRAME
+from ..compute.sources import MODE_NUMBERS
 from ..live import follower
-from ..queries.keyed import active_place, frames_in, modes_in, turns_in
+from ..live.segment_keys import set_mode_in, set_turns_in
+from ..queries.keyed import active_place, frames_in, modes_in
 from ..queries.segments import frame_in_action, segment_at
-from ..transforms import Channel, Refused, Transform
+from ..transforms import Refused, Transform
 from .apply import Readings, Targets, apply_edit
 
 
@@ -165,73 +165,6 @@ def set_whole(place: SlotTransform, mode: str) -> None:
     record_mode(place, MODE_NUMBERS[mode])
 
 
-def set_mode_in(place: SlotTransform, mode: str, frames: Sequence[float]) -> None:
-    """Key the mode channel of a slot on these frames, and behind them where another mode goes on."""
-    _key_segments(place, place.users[0].mode_channel, MODE_NUMBERS[mode], frames, modes_in)
-
-
-def set_turns_in(place: SlotTransform, turns: int | Sequence[int], frames: Sequence[float]) -> None:
-    """Key the channel of turns likewise, with one number on all of these frames or one on each, rising.
-
-    Where there are none in any segment, the channel goes.
-    """
-    channel = place.users[0].turns_channel
-    _key_segments(place, channel, turns, frames, turns_in)
-    if not any(value for _, value, _ in _keys_in(place.curves[channel])):
-        place.channelbag.fcurves.remove(place.curves.pop(channel))
-
-
-def _key_segments(
-    place: SlotTransform,
-    channel: Channel,
-    values: int | Sequence[int],
-    frames: Sequence[float],
-    values_in: Callable[[SlotTransform, np.ndarray], Sequence[int]],
-) -> None:
-    """Key values on the frames of keys that begin segments, and behind them where another one goes on.
-
-    `values_in` gives those that segments have so far.
-    """
-    chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(place)
-    is_chosen = _is_among(chosen, keyed)
-    wanted = np.array(values_in(place, keyed))
-    wanted[is_chosen] = values
-    fcurve = place.curves.get(channel) or _new(place, channel)
-    # Muted it has no say. Now it has, and all other segments keep the mode that they had without.
-    old = [] if fcurve.mute else _keys_in(fcurve)
-    fcurve.mute = False
-    keys: list[tuple[float, float, bool]] = []
-    passed = 0
-    for frame, number, meant in zip(keyed.tolist(), wanted.tolist(), is_chosen.tolist(), strict=True):
-        while passed < len(old) and old[passed][0] < frame - SAME_FRAME:
-            keys.append(old[passed])
-            passed += 1
-        replaced = passed < len(old) and old[passed][0] <= frame + SAME_FRAME
-        if meant or replaced or not keys or round(keys[-1][1]) != number:
-            # Selected as the key of the pose is, so that both move together.
-            keys.append((frame, number, meant or (replaced and old[passed][2])))
-        passed += replaced
-    frames, numbers, selected = zip(*keys, *old[passed:], strict=True)
-    replace_keys(fcurve, np.array(frames), np.array(numbers), interpolation="CONSTANT", selected=np.array(selected))
-
-
-def _keys_in(fcurve: bpy.types.FCurve) -> list[tuple[float, float, bool]]:
-    """Frame, value and whether it is selected, of each key."""
-    points, selected = (
-        np.empty(2 * len(fcurve.keyframe_points), np.float32),
-        np.empty(len(fcurve.keyframe_points), bool),
-    )
-    fcurve.keyframe_points.foreach_get("co", points)
-    fcurve.keyframe_points.foreach_get("select_control_point", selected)
-    return list(zip(points[::2].tolist(), points[1::2].tolist(), selected.tolist(), strict=True))
-
-
-def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Which of the frames (n,) are one of the chosen, shape (n,)."""
-    chosen = np.sort(chosen)
-    return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
-
-
 def check(transform: Transform, readings: Readings) -> None:
     """Raise `Refused` where a transform, which is keyed so, cannot have any mode but Blender's own."""
     transform.rotation  # noqa: B018 - raises where it turns by axis and angle
@@ -240,9 +173,3 @@ def check(transform: Transform, readings: Readings) -> None:
         if isinstance(source, Refused):
             raise source
         refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
-
-
-def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
-    fcurve, channelbag, group = place.ensure_curve(channel), place.channelbag, place.users[0].group
-    fcurve.group = channelbag.groups.get(group) or channelbag.groups.new(group)
-    return fcurve

@@ -23,6 +23,7 @@ from ..writers.sampled import regroup
 from ..writers.table import release, remove_orphans, writer_of
 from .dense_keys import keep_motion
 from .inserted_keys import InsertedKeys
+from .segment_keys import share_out_turns
 
 
 def refresh_places(
@@ -77,6 +78,11 @@ def refresh_places(
     release(user for place in idle for user in place.users)
     read = read_again(keyed_anew)
     stale += [pair for pair in zip(read, keyed_in(read), strict=True) if _is_wanted(*pair, recorded_digest(pair[0]))]
+    if divided := [place for place, source in stale if share_out_turns(place, source)]:
+        read = read_again(divided)
+        anew = zip(read, keyed_in(read), strict=True)
+        stale = [pair for pair in stale if pair[0] not in divided]
+        stale += [pair for pair in anew if _is_wanted(*pair, recorded_digest(pair[0]))]
     idle += _fill_in(stale)
     editable = [place for place in places if place.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.

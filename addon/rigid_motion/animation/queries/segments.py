@@ -96,7 +96,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
     rows = _components(source, ends)
     location, rotation, scale = np.split(rows, (3, 7))
     alike = float(rotation[:, 0] @ rotation[:, 1]) / float(np.prod(np.linalg.norm(rotation, axis=0)) or 1.0)
-    swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, place, rows)
+    swept, turned = np.abs(np.diff(rotation[:3])), turning_in(source, place)
     return SegmentFacts(
         first=float(ends[0]),
         last=float(ends[1]),
