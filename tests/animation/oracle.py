@@ -17,7 +17,9 @@ from bpy_extras.anim_utils import action_get_channelbag_for_slot
 from mathutils import Euler, Quaternion
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
-from rigid_motion.motion.quaternions import multiply, normalise, rotate
+from rigid_motion.motion.quaternions import multiply, normalise
+from tests.animation.smooth_oracle import share_of, with_tangents
+from tests.animation.spin_oracle import Spin, spin_by_angles, with_channel
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
 """What has location, rotation and scale. Pose bones have no delta transforms of their own."""
@@ -164,6 +166,7 @@ def _components(
         else:
             ends = _key_poses(obj, np.array((first, last)), own, scaled)
             poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
+        poses = _spin(obj, first, last, own).add_to(poses, share)
         location[inside], quaternion[inside] = poses.positions @ _axes(obj), poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
@@ -185,6 +188,20 @@ def _key_poses(obj: Carrier, frames: np.ndarray, own: Own, scaled: bool) -> Pose
         multiply(np.array(own.quaternion), quaternions),
         scales[:, 0] if scaled else None,
     )
+
+
+def _spin(obj: Carrier, first: float, last: float, own: Own, *, channel: bool = True) -> Spin:
+    """The whole turns more from one key to the next, of the angles and of the channel."""
+    quaternions = _key_poses(obj, np.array((first, last)), own, False).quaternions
+    spin = Spin()
+    if obj.rotation_mode != "QUATERNION":
+        angles = _channels(obj, "rotation_euler", np.array((first, last)))
+        spin = spin_by_angles(angles, obj.rotation_mode, quaternions, own.quaternion)
+    fcurve = curve_of(obj, "rigid_motion.turns")
+    if not channel or fcurve is None or fcurve.mute or mode_at(obj, first) == "BLENDER":
+        return spin
+    before = [key.co[1] for key in fcurve.keyframe_points if key.co[0] < first + 0.005]
+    return with_channel(spin, round(before[-1]) if before else 0, quaternions)
 
 
 def _smooth(
@@ -209,43 +226,13 @@ def _smooth(
     counts = np.zeros(len(around) - 1, dtype=int)
     counts[before] = len(share)
     poses = _key_poses(obj, shown, own, scaled)
-    if tangents == (1.0, 1.0):
+    spins = [
+        _spin(obj, *pair, own) if pair == pair_shown else Spin()
+        for pair, pair_shown in zip(itertools.pairwise(around), itertools.pairwise(shown), strict=True)
+    ]
+    if tangents == (1.0, 1.0) and not any(spin.turns for spin in spins):
         return in_betweens(around, poses, counts, share, mode)
-    return _with_tangents(around, poses, before, share, tangents)
-
-
-def _with_tangents(times: np.ndarray, keys: Poses, segment: int, u: np.ndarray, tangents: tuple[float, float]) -> Poses:
-    """The segment between keys whose tangents are so many times as long as those of the mode."""
-    screws = twists.between(keys.positions[:-1], keys.quaternions[:-1], keys.positions[1:], keys.quaternions[1:])
-    growths = np.zeros(len(times) - 1) if keys.scales is None else np.diff(np.log(keys.scales))
-    ways, durations = np.vstack((screws, growths)).T, np.diff(times)
-    bends = []
-    for key, tangent in zip((segment, segment + 1), tangents, strict=True):
-        if 0 < key < len(durations):
-            part = _share(*durations[key - 1 : key + 1])
-            rests = not (ways[key - 1].any() and ways[key].any())
-            rate = part * ways[key - 1] / durations[key - 1] + (1.0 - part) * ways[key] / durations[key]
-            rate = 0.0 * rate if rests else rate
-        else:
-            rate = ways[segment] / durations[segment]
-        bends.append(tangent * durations[segment] * rate - ways[segment])
-    first = np.where(u < 0.0, u, np.where(u > 1.0, 0.0, u * (1.0 - u) ** 2))
-    second = np.where(u < 0.0, 0.0, np.where(u > 1.0, u - 1.0, -(u**2) * (1.0 - u)))
-    added = np.outer(bends[0], first) + np.outer(bends[1], second)
-    screw = interpolate((0.0, 1.0), keys[segment : segment + 2], u, "cga_slerp", extrapolate=True)
-    if keys.scales is not None:
-        rigid = Poses(keys.positions, keys.quaternions)[segment : segment + 2]
-        screw = Poses(*_parts(interpolate((0.0, 1.0), rigid, u, "dq_sclerp", extrapolate=True)), screw.scales)
-    turns, advances = twists.exponential(added[:6])
-    return Poses(
-        screw.positions + rotate(screw.quaternions, advances.T),
-        multiply(screw.quaternions, turns.T),
-        None if keys.scales is None else screw.scales * np.exp(added[6]),
-    )
-
-
-def _parts(poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-    return poses.positions, poses.quaternions
+    return with_tangents(around, poses, before, share, tangents, spins)
 
 
 def _passings(obj: Carrier, keys: np.ndarray, first: float, own: Own) -> list[tuple[float, float]]:
@@ -265,11 +252,18 @@ def _passing(obj: Carrier, keys: np.ndarray, own: Own, *, after: bool) -> tuple[
     times = np.diff(keys)
     begin, end = keys[after : after + 2]
     steps = keys[1] + times[int(after)] / 8.0 * (np.arange(4) if after else -np.arange(4))
-    screws = _twists(_key_poses(obj, keys, own, False), (0, 1), (1, 2)).T
-    native = np.polyfit(steps - keys[1], _twists(_key_poses(obj, steps, own, False), (0,) * 4, range(4)).T, 3)[2]
+    poses = _key_poses(obj, keys, own, False)
+    spins = [_spin(obj, *pair, own) for pair in itertools.pairwise(keys)]
+    spun = np.array([spin.twist(poses.quaternions[1])[:6] for spin in spins])
+    screws = _twists(poses, (0, 1), (1, 2)).T + spun
     progressed = progress(obj, begin, end, steps)
+    # Angles turn by the spin, too, and less than half a turn is left without it.
+    by_angles = _spin(obj, begin, end, own, channel=False)
+    left = by_angles._replace(turns=-by_angles.turns).add_to(_key_poses(obj, steps, own, False), progressed)
+    native = np.polyfit(steps - keys[1], _twists(left, (0,) * 4, range(4)).T, 3)[2]
+    native = native + np.polyfit(steps - keys[1], progressed, 3)[2] * spun[int(after)]
     slope = np.polyfit(steps - keys[1], progressed, 3)[2] * times[int(after)]
-    share = _share(*times)
+    share = share_of(*times)
     speeds = [part * screw / time for part, screw, time in zip((share, 1.0 - share), screws, times, strict=True)]
     mean = sum(speeds)
     squared = max(mean @ mean, 0.01 * sum(speed @ speed for speed in speeds))
@@ -285,13 +279,6 @@ def _passing(obj: Carrier, keys: np.ndarray, own: Own, *, after: bool) -> tuple[
 def _twists(poses: Poses, froms: Sequence[int], tos: Sequence[int]) -> np.ndarray:
     first, second = poses[list(froms)], poses[list(tos)]
     return twists.between(first.positions, first.quaternions, second.positions, second.quaternions)
-
-
-def _share(before: float, after: float) -> float:
-    """Of the twist before a key in that of the key."""
-    if max(before, after) >= 16.0 * min(before, after):
-        return float(before > after)
-    return min(max(after / (before + after), 1.0 - after / before), before / after)
 
 
 def _codes(obj: Carrier, frame: float) -> set[str]:

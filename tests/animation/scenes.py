@@ -29,6 +29,8 @@ def random_values(obj: bpy.types.Object, path: str, count: int, seed: int = 0, e
     values = random.normal(size=(count, WIDTHS[path]))
     if path == "scale":
         return np.exp(0.5 * (np.repeat(values[:, :1], 3, axis=1) if even else values))
+    if path == "rotation_euler":
+        return 1.5 * np.tanh(values)
     return 3.0 * values if path == "location" else values
 
 

@@ -25,7 +25,7 @@ from bpy.props import (
 from ..motion import KEYFRAME_MODES
 from .actions.refusals import MOST_TURNS
 from .baking.copies import BAKED, REDUCED
-from .compute.sources import SCREW_AXIS, TURN_AXES
+from .compute.sources import SCREW_AXIS
 from .edits import mode_keys
 from .live import follower
 from .transforms import OWN_WORDS, Refused, Transform, transform_of
@@ -44,8 +44,14 @@ MODE_ITEMS = [
 
 
 TURN_AXIS_ITEMS = [
-    (SCREW_AXIS, "Screw", "About the axis that a segment turns about anyway, or the local Z axis where it does not turn"),
-    *((axis, axis, f"Always about the local {axis} axis") for axis in TURN_AXES if axis != SCREW_AXIS),
+    (
+        SCREW_AXIS,
+        "Screw",
+        "About the axis that a segment turns about anyway, or the local Z axis where it does not turn",
+    ),
+    ("X", "X", "Always about the local X axis"),
+    ("Y", "Y", "Always about the local Y axis"),
+    ("Z", "Z", "Always about the local Z axis"),
 ]
 """What turns are about."""
 

@@ -78,9 +78,7 @@ def motor_lerp(segments: Segments) -> Curves:
     )
 
 
-def motor_spline(
-    segments: Segments, tangents: np.ndarray | None = None, spins: np.ndarray | None = None
-) -> Curves:
+def motor_spline(segments: Segments, tangents: np.ndarray | None = None, spins: np.ndarray | None = None) -> Curves:
     """A screw from key to key, bent so that its twist goes on through every key.
 
     A key has a mean of the twists of the segments next to it, see `_shares`, the outermost ones have that of their

@@ -40,7 +40,7 @@ class Spins:
         return np.stack(ends, axis=1)
 
     def add_to(self, poses: Poses, counts: np.ndarray, progress: np.ndarray, some: slice = slice(None)) -> Poses:
-        """Return the poses (m,) of some of the segments, counts[i] of the i-th, turned as far as their progress (m,)."""
+        """Return poses (m,) of some of the segments, counts[i] of the i-th, spun as far as their progress (m,)."""
         turns = self.turns[some]
         if not turns.any():
             return poses

@@ -65,6 +65,4 @@ def between(
 ) -> np.ndarray:
     """The twists (6, n) from poses to others in a unit of time: positions (n, 3), quaternions (n, 4)."""
     back = conjugate(first)
-    return logarithm(
-        multiply(back, second).T, rotate(back, second_positions - first_positions).T, shortest=shortest
-    )
+    return logarithm(multiply(back, second).T, rotate(back, second_positions - first_positions).T, shortest=shortest)

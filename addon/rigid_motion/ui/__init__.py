@@ -7,15 +7,16 @@ rows         its lines, aligned                         notes        what the pa
 shown        the transform seen on the screen           overlay      paths in the viewport
 look         how they look                              wording      labels and texts
 preferences  of the extension                           manual       where the documentation is
+turn_operator  whole turns between keys
 """
 
 from __future__ import annotations
 
 import bpy
 
-from . import keymap, manual, menus, operators, overlay, panels, preferences, shown
+from . import keymap, manual, menus, operators, overlay, panels, preferences, shown, turn_operator
 
-CLASSES = (*preferences.CLASSES, *operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
+CLASSES = (*preferences.CLASSES, *operators.CLASSES, *turn_operator.CLASSES, *menus.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:

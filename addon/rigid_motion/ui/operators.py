@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from .. import animation
 from ..animation import Refused
@@ -19,20 +19,18 @@ from ..animation.baking.copies import BAKED, REDUCED, entries_of
 from ..animation.baking.sizes import first_tolerance
 from ..animation.edits.repair import with_troubles
 from ..animation.live.follower import paused
-from ..animation.properties import MODE_ITEMS, MOST_TURNS, OWN_WORDS, SCREW_AXIS, TURN_AXIS_ITEMS
+from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.polls import with_in_betweens, with_modes, with_more_keys_than
 from ..animation.transforms import Transform
 from .on_targets import OnTargets
 from .preferences import DEFAULT_MODE, default_mode
 from .rows import labelled
 from .targets import (
-    CURRENT,
     SCOPES,
     SELECTED,
     WHOLE,
     each_target,
     grouped_by_frames,
-    is_key_editor,
     is_posing,
     scope_for,
     targets_of,
@@ -50,13 +48,6 @@ from .wording import (
 )
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
-
-TURN_SCOPES = {
-    WHOLE: "All segments have so many turns",
-    CURRENT: "The segment that the playhead is in. The others keep their turns",
-    SELECTED: "The segments that the selected keys begin. The others keep their turns",
-}
-"""What of a target gets turns."""
 
 LATER = {
     BAKED: n_("These keys were baked since: Un-Bake first"),
@@ -131,59 +122,6 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
         frames = sorted({frame for group in groups for frame in group})
         text = rpt_("{mode} from frames {frames}") if len(frames) > 1 else rpt_("{mode} from frame {frames}")
         return text.format(mode=label, frames=listed([f"{frame:g}" for frame in frames]))
-
-
-class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
-    bl_idname = "rigid_motion.set_turns"
-    bl_label = "Set Turns"
-    bl_description = "Have the selected objects make whole turns more from key to key"
-
-    turns: IntProperty(
-        name="Turns",
-        description="Whole turns more than there are without, in the same sense; against it where negative",
-        default=1,
-        min=-MOST_TURNS,
-        max=MOST_TURNS,
-        soft_min=-20,
-        soft_max=20,
-    )
-    axis: EnumProperty(
-        name="Axis",
-        description="What the turns are about, in all segments",
-        items=TURN_AXIS_ITEMS,
-        default=SCREW_AXIS,
-        translation_context=OWN_WORDS,
-    )
-    on: EnumProperty(
-        name="Segments",
-        description="Which segments get the turns",
-        items=[(scope, label, TURN_SCOPES[scope]) for scope, label, _ in SCOPES],
-        default=CURRENT,
-        translation_context=OWN_WORDS,
-        options={"SKIP_SAVE"},
-    )
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        if not self.properties.is_property_set("on"):
-            self.on = SELECTED if is_key_editor(context) else CURRENT
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        for name in ("turns", "axis", "on"):
-            layout.prop(self, name)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        targets = targets_of(context)
-
-        def set_turns(refused: list[Refused]) -> str:
-            for frames, group in grouped_by_frames(context, targets, self.on, refused).items():
-                animation.set_turns(group, self.turns, frames, axis=self.axis, refused=refused)
-            return rpt_("{turns} turns more").format(turns=self.turns)
-
-        return self.act(targets, set_turns)
 
 
 class RIGID_MOTION_OT_clear(OnTargets, bpy.types.Operator):
@@ -535,7 +473,6 @@ class RIGID_MOTION_OT_refresh(bpy.types.Operator):
 
 CLASSES = (
     RIGID_MOTION_OT_set_mode,
-    RIGID_MOTION_OT_set_turns,
     RIGID_MOTION_OT_clear,
     RIGID_MOTION_OT_bake,
     RIGID_MOTION_OT_unbake,

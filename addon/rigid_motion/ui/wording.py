@@ -66,14 +66,14 @@ def cautions(segment: SegmentFacts) -> list[str]:
         texts.append(
             iface_(
                 "Blender turns this segment by more than half a turn; the mode goes the short way. "
-                "To go the long way, set Turns"
+                "To go the long way, use Set Turns"
             )
         )
     if segment.two_axes:
         texts.append(
             iface_(
-                "Two angles go by more than half a turn here, and whole turns are made about the axis of the larger one "
-                "alone. For both, set a key in between"
+                "Two angles go by more than half a turn here; whole turns are made about the axis of the larger one. "
+                "For both, set a key in between"
             )
         )
     if segment.turn > NEAR_HALF_TURN and not (segment.turns or segment.is_sure):

@@ -35,7 +35,9 @@ def keyed(
     random = np.random.default_rng(seed)
     for frame in KEYS:
         obj.location = random.normal(size=3)
-        setattr(obj, rotation, random.normal(size=len(getattr(obj, rotation))))
+        values = random.normal(size=len(getattr(obj, rotation)))
+        # Angles stay within half a turn of one another.
+        setattr(obj, rotation, values if rotation_mode == "QUATERNION" else 1.5 * np.tanh(values))
         obj.keyframe_insert("location", frame=frame)
         obj.keyframe_insert(rotation, frame=frame)
     for fcurve in curves(obj):

@@ -1,4 +1,4 @@
-"""What an Action keeps about each transform in each of its slots: its mode, what its turns are about, and what its in-betweens were made from.
+"""What an Action keeps about each transform in each of its slots: its mode, and what its in-betweens were made from.
 
 It goes where the Action goes: to another object, into another file, into a strip. The mode of a transform is in its
 mode channel where there is one with keys, and in its record otherwise; nowhere else.

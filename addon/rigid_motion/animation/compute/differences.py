@@ -10,7 +10,6 @@ and that is kept where keys are not eased: handles shape single channels, and it
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,13 +21,14 @@ from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
 from ...motion.segments import prepare_within
-from ..curves import Keys, evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
+from .channel_rows import channels_at_ends, each, filled_height, height, sampled
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, spins_of_neighbours, with_neighbours
-from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
-from .turning import Turning, are_idle, idle_progress, needs_turning, turning, without_spins
+from .progress import are_idle, idle_progress, progress_weights
+from .sources import MODE_NAMES, MODE_NUMBERS, Source
+from .turning import Turning, needs_turning, turning_of, without_spins
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -82,13 +82,13 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
         One of `MODE_IDS` for all segments, instead of the modes that they have.
     """
     frames = np.asarray(frames, dtype=np.float64)
-    native, delta = np.empty((2, _height([source]), len(frames)))
-    delta = delta[: _filled_height([source])]
+    native, delta = np.empty((2, height([source]), len(frames)))
+    delta = delta[: filled_height([source])]
     if len(source.key_frames) > 1:
         _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
     else:
         # Without a segment there is nothing to fill in.
-        _sampled([(source, slice(len(frames)))], [frames], out=native)
+        sampled([(source, slice(len(frames)))], [frames], out=native)
         turn_into_quaternions(native, source.order)
         delta[:] = source.original[: len(delta), None]
 
@@ -120,10 +120,10 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
         spans = [range_of[id(source)] for source in portion]
         of_range = {span: np.arange(span[0], span[1] + 1.0) for span in set(spans)}
         frames = [of_range[span] for span in spans]
-        samples = _each(portion, map(len, frames))
+        samples = each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
-        rows, points = np.empty((2, _height(portion), samples[-1][1].stop))
-        delta = rows[: _filled_height(portion)]
+        rows, points = np.empty((2, height(portion), samples[-1][1].stop))
+        delta = rows[: filled_height(portion)]
         _move(portion, frames, rows, delta)
         order = portion[0].order
         if order is not None:
@@ -201,12 +201,6 @@ def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -
             yield portion
 
 
-def _each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source, slice]]:
-    """Each source with the place of what it has this many of."""
-    bounds = [0, *itertools.accumulate(counts)]
-    return [(source, slice(*place)) for source, place in zip(sources, itertools.pairwise(bounds), strict=True)]
-
-
 def _move(
     sources: Sequence[Source],
     frames: Sequence[np.ndarray],
@@ -217,17 +211,17 @@ def _move(
     """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
-    `native` is of `_height`, `delta` of `_filled_height`. They may be in the same place: then the deltas are there.
+    `native` is of `height`, `delta` of `filled_height`. They may be in the same place: then the deltas are there.
     """
     order = sources[0].order
-    samples = _each(sources, map(len, frames))
-    segments = _each(sources, (len(source.key_frames) - 1 for source in sources))
-    timing = _sampled(samples, frames, out=native)
-    start, end = bounds = _ends(segments)
+    samples = each(sources, map(len, frames))
+    segments = each(sources, (len(source.key_frames) - 1 for source in sources))
+    timing = sampled(samples, frames, out=native)
+    start, end = bounds = channels_at_ends(segments)
     if any(source.is_elastic for source in sources):
-        timing = _sampled(samples, frames, unit_elastic=True)
-        bounds = _ends(segments, unit_elastic=True)
-    weights, offsets = _weights(*bounds, order)
+        timing = sampled(samples, frames, unit_elastic=True)
+        bounds = channels_at_ends(segments, unit_elastic=True)
+    weights, offsets = progress_weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
     modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
     original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
@@ -347,7 +341,7 @@ class _Ends:
         own = np.stack([source.original for source in sources], axis=1)[:, owners]
         axes = location_axes(sources, owners)
         keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
-        turned = _turning(sources, start, end, keys, own) if any(map(needs_turning, sources)) else None
+        turned = turning_of(sources, start, end, keys, own) if any(map(needs_turning, sources)) else None
         ends = cls(owners, times, keys, axes, own, turning=turned)
         if not smooth.any():
             return ends
@@ -420,106 +414,12 @@ class _Ends:
         return prepare_within(curves, *self.around, is_aligned=turned is not None)
 
 
-def _turning(sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, own: np.ndarray) -> Turning:
-    """How S segments turn, from the channels (10, S) at both ends and what they make of the body, (S, 2)."""
-    turns, backwards = (
-        np.concatenate(parts)
-        for parts in (
-            [source.segment_turns for source in sources],
-            [source.run_backwards for source in sources],
-        )
-    )
-    axes = np.repeat([source.turns_axis for source in sources], [len(source.segment_turns) for source in sources])
-    return turning(start, end, keys, own[ROWS[ROTATION]].T, sources[0].order, turns, axes, backwards)
-
-
 def _measured(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.ndarray:
     """The channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
     sources = [source for source, _ in segments]
     moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
     frames = [moments[place].ravel() for _, place in segments]
-    return _sampled(_each(sources, map(len, frames)), frames).reshape(_height(sources), -1, len(MEASURED))
-
-
-def _sampled(
-    samples: list[tuple[Source, slice]],
-    frames: Sequence[np.ndarray],
-    *,
-    unit_elastic: bool = False,
-    out: np.ndarray | None = None,
-) -> np.ndarray:
-    """The channels' own values at the frames of each source, m in all, with a row for each of the `_height`."""
-    rows = np.empty((_height([source for source, _ in samples]), samples[-1][1].stop)) if out is None else out
-    curves, times, out, apart = [], [], [], []
-    for (source, place), at in zip(samples, frames, strict=True):
-        _rest(rows[:, place], source)
-        for own, keys in source.channels:
-            if at is source.key_frames and source.is_together:
-                rows[own, place] = keys.values
-                continue
-            curves.append(keys)
-            times.append(at)
-            if own[-1] - own[0] < len(own):
-                out.append(rows[own[0] : own[-1] + 1, place])
-            else:
-                out.append(np.empty((len(own), len(at))))
-                apart.append((own, place, out[-1]))
-    evaluate(curves, times, unit_elastic=unit_elastic, out=out)
-    for own, place, values in apart:
-        rows[own, place] = values
-    return rows
-
-
-def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """The channels' own values where each segment starts and where it ends, rows as `_sampled` has them."""
-    sources = [source for source, _ in segments]
-    keys = _each(sources, (len(source.key_frames) for source in sources))
-    rows = _sampled(keys, [source.key_frames for source in sources], unit_elastic=unit_elastic)
-    begins = np.delete(np.arange(rows.shape[1]), [place.stop - 1 for _, place in keys])
-    start, end = rows[:, begins], rows[:, begins + 1]
-    for source, place in segments:
-        for own, channels in source.channels:
-            if channels.cycles is None:
-                continue
-            # A cycle whose ends differ jumps: one round ends on its last value, the next starts on its first.
-            jumps = _jumps(channels, source.key_frames)
-            for row, values in zip(own, channels.values, strict=True):
-                start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = values[0], values[-1]
-    return start, end
-
-
-def _height(sources: Sequence[Source]) -> int:
-    """How many of the components are needed for what the sources key."""
-    return ROWS[SCALE].stop if any(SCALE in source.keyed for source in sources) else ROWS[ROTATION].stop
-
-
-def _filled_height(sources: Sequence[Source]) -> int:
-    """How many of them for what is filled in."""
-    return ROWS[SCALE].stop if sources[0].uniform_scale else ROWS[ROTATION].stop
-
-
-def _rest(rows: np.ndarray, source: Source) -> None:
-    """Fill in what a source does not key."""
-    for name, own in ROWS.items():
-        if name not in source.keyed and own.start < len(rows):
-            rows[own] = REST[own, None]
-    for row, value in source.rest.items():
-        rows[row] = value
-    if source.order is not None:
-        rows[6] = 0.0
-
-
-def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
-    """At which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
-    cycles = keys.cycles
-    first, last = keys.times[[0, -1]]
-    if cycles is None or first == last:
-        return np.zeros(times.shape, dtype=bool)
-    rounds = (times - first) / (last - first)
-    whole = np.rint(rounds)
-    after = (whole >= 1) & (cycles.after == "REPEAT") & ((whole <= cycles.after_count) | (cycles.after_count == 0))
-    before = (whole <= 0) & (cycles.before == "REPEAT") & ((whole > -cycles.before_count) | (cycles.before_count == 0))
-    return (np.abs(rounds - whole) * (last - first) < SAME_FRAME) & (after | before)
+    return sampled(each(sources, map(len, frames)), frames).reshape(height(sources), -1, len(MEASURED))
 
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -537,15 +437,3 @@ def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np
     last = np.flatnonzero(np.diff(owners, append=len(sources)))
     bounds[np.concatenate(((0,), last[:-1] + 1))], bounds[last] = begins, ends
     return np.delete(np.diff(bounds), last[:-1]), at[hits], owners[hits]
-
-
-def _weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """What a segment's progress is made of: weights (10, S) for the channels, and what to take off their sum, (S,)."""
-    chord = end - start
-    weights = chord.copy()
-    if order is None:
-        # A unit quaternion moves by half of the angle that the object turns.
-        weights[ROWS[ROTATION]] *= 4.0
-    total = np.einsum("rs,rs->s", weights, chord)
-    weights /= np.where(total > 0.0, total, np.inf)
-    return weights, np.einsum("rs,rs->s", weights, start)

@@ -8,15 +8,15 @@ space. What the channel of turns has comes on top.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...motion import Poses, twists
 from ...motion.eulers import quaternions_from_extrinsic_eulers
-from ...motion.quaternions import conjugate, multiply, rotate
+from ...motion.quaternions import conjugate, rotate
 from ...motion.spins import FULL_TURN, Spins
-from ..curves import Keys, evaluate
 from .bodies import body_poses
 from .components import ROTATION, ROWS
 from .sources import HALF_TURN, SCREW_AXIS, Source
@@ -97,6 +97,19 @@ def turning(
     return Turning(spins, by_angles, signs, turn, spins.twists(first, second))
 
 
+def turning_of(sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, own: np.ndarray) -> Turning:
+    """Return how S segments of alike sources turn, from their channels (10, S) and poses (S, 2) at both ends."""
+    turns, backwards = (
+        np.concatenate(parts)
+        for parts in (
+            [source.segment_turns for source in sources],
+            [source.run_backwards for source in sources],
+        )
+    )
+    axes = np.repeat([source.turns_axis for source in sources], [len(source.segment_turns) for source in sources])
+    return turning(start, end, keys, own[ROWS[ROTATION]].T, sources[0].order, turns, axes, backwards)
+
+
 def turning_in(source: Source, segment: int, turns: int | None = None) -> Turning:
     """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
     keys, own = source.key_frames[segment : segment + 2], source.original[:, None]
@@ -140,7 +153,9 @@ def _add_angles(
     )
     stands = np.linalg.norm(np.diff(in_space, axis=0)[0], axis=1) < np.linalg.norm(np.diff(in_body, axis=0)[0], axis=1)
     axes = np.where(stands[:, None], rotate(own[some], _mean(in_space)), _mean(in_body))
-    about = np.einsum("sk,sk->s", axes, np.where(stands[:, None], rotate(first[some], turn[:, some].T), turn[:, some].T))
+    about = np.einsum(
+        "sk,sk->s", axes, np.where(stands[:, None], rotate(first[some], turn[:, some].T), turn[:, some].T)
+    )
     # Half a turn has two shortest ways, and rounding errors would choose one of them.
     sense, size = np.sign(by), np.linalg.norm(turn[:, some], axis=0)
     is_half = np.abs(np.abs(by - FULL_TURN * np.rint(by / FULL_TURN)) - np.pi) <= np.pi - HALF_TURN
@@ -170,9 +185,7 @@ def _mean(ends: np.ndarray) -> np.ndarray:
     return np.where(length > NO_TURN, total / np.maximum(length, NO_TURN), ends[0])
 
 
-def _add_channel(
-    spins: Spins, turn: np.ndarray, turns: np.ndarray, axes: np.ndarray, backwards: np.ndarray
-) -> None:
+def _add_channel(spins: Spins, turn: np.ndarray, turns: np.ndarray, axes: np.ndarray, backwards: np.ndarray) -> None:
     """Add what the channel has, in place: about the axis of the angles' own turns where there are any."""
     some = np.flatnonzero(turns)
     if not len(some):
@@ -194,44 +207,3 @@ def without_spins(measured: Poses, spins: Spins, progress: np.ndarray) -> Poses:
     flat = Poses(measured.positions.reshape(-1, 3), measured.quaternions.reshape(-1, 4))
     unspun = replace(spins, turns=-spins.turns).add_to(flat, counts, progress.ravel())
     return replace(measured, quaternions=unspun.quaternions.reshape(measured.quaternions.shape))
-
-
-def are_idle(weights: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Whether segments turn although no channel changes in them, from the weights (., S) of their progress, (S,)."""
-    return (turns != 0) & ~weights.any(axis=0)
-
-
-def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Return how far segments have come on frames (m,) where no channel changes: by the interpolation of their keys.
-
-    `first` and `last` are the frames that each runs between, (m,). It is that of a value with the same keys, which
-    goes up by one from each to the next, and rests at a key where handles are.
-    """
-    keys = next((keys for rows, keys in source.channels if 3 <= rows[0] < 7), source.curves[0])
-    begin, at, end = evaluate([_counting(keys)] * 3, [first, frames, last])
-    way, duration = end - begin, np.where(last > first, last - first, np.inf)
-    counted = np.divide(at - begin, way, out=np.zeros_like(at), where=way != 0.0)
-    return np.where(way != 0.0, counted, (frames - first) / duration)[0]
-
-
-def _counting(keys: Keys) -> Keys:
-    """One curve with the frames and interpolations of these keys, and their numbers for values."""
-    one = keys.only([0])
-    numbers = np.arange(len(keys.times), dtype=np.float32)
-
-    def numbered(points: np.ndarray | None) -> np.ndarray | None:
-        if points is None:
-            return None
-        points = points.copy()
-        points[0, :, 1] = numbers
-        return points
-
-    cycles = keys.cycles
-    if cycles is not None:
-        before, after = (
-            "REPEAT_OFFSET" if mode == "REPEAT" else mode for mode in (cycles.before, cycles.after)
-        )
-        cycles = replace(cycles, before=before, after=after)
-    return replace(
-        one, points=numbered(one.points), left=numbered(one.left), right=numbered(one.right), cycles=cycles
-    )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import bpy
 import numpy as np
 
-from ...motion.quaternions import conjugate, multiply, rotate
+from ...motion.quaternions import conjugate, rotate
 from ...motion.spins import FULL_TURN
 from ..actions.channels import replace_keys
 from ..actions.records import recorded_digest
@@ -16,7 +16,7 @@ from ..actions.slots import SlotTransform
 from ..compute.differences import in_betweens
 from ..compute.source_cache import cached_source
 from ..compute.sources import MODE_NUMBERS, SAME_FRAME, Source
-from ..compute.turning import Turning, shortest_turns, turning_in
+from ..compute.turning import shortest_turns, turning_in
 from ..queries.keyed import frames_in, modes_in, turns_in
 from ..transforms import Channel
 

@@ -40,10 +40,14 @@ NOTES = {
     'The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left': (
         "Die Beschränkung „Rigid Motion“ hat einen Einfluss unter 1: ein Teil von Blenders Zwischenbildern bleibt"
     ),
-    "Blender turns this segment by more than half a turn; the mode goes the short way. "
-    "To go the long way, set a key in between": (
+    "Blender turns this segment by more than half a turn; the mode goes the short way. To go the long way, use Set Turns": (
         "Blender dreht in diesem Segment um mehr als eine halbe Umdrehung; der Modus nimmt den kurzen Weg. "
-        "Für den langen Weg ein Schlüsselbild dazwischen setzen"
+        "Für den langen Weg gibt es „Umdrehungen setzen“"
+    ),
+    "Two angles go by more than half a turn here; whole turns are made about the axis of the larger one. "
+    "For both, set a key in between": (
+        "Zwei Winkel ändern sich hier um mehr als eine halbe Umdrehung; ganze Umdrehungen gibt es um die Achse des "
+        "größeren. Für beide ein Schlüsselbild dazwischen setzen"
     ),
     "{angle} is nearly half a turn: a small change of a key can send it the other way round. "
     "To be sure, set a key in between": (
@@ -55,6 +59,7 @@ NOTES = {
     ),
     "Hidden by Viewport Overlays": "Durch die Überlagerungen des Ansichtsfensters ausgeblendet",
     # Rows
+    "{angle} ({turns} turns)": "{angle} ({turns} Umdrehungen)",
     "{error} at most": "höchstens {error}",
     "{frames} with keys": "{frames} mit Schlüsselbildern",
     "slide {distance}": "rutschen {distance}",

@@ -20,6 +20,14 @@ REFUSALS = {
         "{name} hat keine Aktion mit Schlüsselbildern, die einen Modus haben könnten: "
         "zuerst welche setzen oder einen Streifen öffnen (NLA-Editor, Tab)"
     ),
+    "{name}: Blender's own in-betweens make no turns more: choose a mode first": (
+        "{name}: Blenders eigene Zwischenbilder machen keine zusätzlichen Umdrehungen: zuerst einen Modus wählen"
+    ),
+    "{name}: key {number} of the channel Turns does not have a number of turns up to {most}: "
+    "delete it (Dope Sheet, X), or set the turns anew": (
+        "{name}: Schlüsselbild {number} des Kanals Umdrehungen hat keine Zahl bis {most}: "
+        "löschen (Dope Sheet, X) oder die Umdrehungen neu setzen"
+    ),
     "{name}: leave the strip that is being edited first (NLA Editor, Tab)": (
         "{name}: zuerst den Streifen verlassen, der bearbeitet wird (NLA-Editor, Tab)"
     ),

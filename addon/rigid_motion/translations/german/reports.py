@@ -15,6 +15,7 @@ REPORTS = {
     "Blender's own in-betweens": "Blenders eigene Zwischenbilder",
     "{mode} from frame {frames}": "{mode} ab Einzelbild {frames}",
     "{mode} from frames {frames}": "{mode} ab den Einzelbildern {frames}",
+    "{turns} turns more": "{turns} Umdrehungen zusätzlich",
     "baked from frame {first:g} to {last:g}": "gebacken von Einzelbild {first:g} bis {last:g}",
     "back to the keys from before baking": "zurück zu den Schlüsselbildern von vor dem Backen",
     "back to the keys from before they were reduced": "zurück zu den Schlüsselbildern von vor dem Reduzieren",

@@ -37,6 +37,39 @@ TOOLTIPS = {
     "Choose how the selected bones move from key to key": (
         "Wählen, wie sich die ausgewählten Knochen von Schlüsselbild zu Schlüsselbild bewegen"
     ),
+    # Turns
+    "Have the selected objects make whole turns more from key to key": (
+        "Die ausgewählten Objekte von Schlüsselbild zu Schlüsselbild um ganze Umdrehungen weiter drehen"
+    ),
+    "Have the selected bones make whole turns more from key to key": (
+        "Die ausgewählten Knochen von Schlüsselbild zu Schlüsselbild um ganze Umdrehungen weiter drehen"
+    ),
+    "Whole turns more than there are without, in the same sense; against it where negative": (
+        "Ganze Umdrehungen zusätzlich, im selben Drehsinn; gegen ihn, wenn negativ"
+    ),
+    "Whole turns that the body makes more between two keys, in the sense in which it turns anyway; against it where "
+    "negative. A key of this property decides from its frame on": (
+        "Ganze Umdrehungen zwischen zwei Schlüsselbildern zusätzlich, im Drehsinn, der ohnehin da ist; gegen ihn, wenn "
+        "negativ. Ein Schlüsselbild dieser Eigenschaft gilt ab seinem Einzelbild"
+    ),
+    "What the turns are about, in all segments": "Worum die Umdrehungen gehen, in allen Segmenten",
+    "What the body turns about by whole turns more, in all segments of its Action": (
+        "Worum die zusätzlichen ganzen Umdrehungen gehen, in allen Segmenten der Aktion"
+    ),
+    "About the axis that a segment turns about anyway, or the local Z axis where it does not turn": (
+        "Um die Achse, um die sich ein Segment ohnehin dreht, oder um die lokale Z-Achse, wo es sich nicht dreht"
+    ),
+    "Always about the local X axis": "Immer um die lokale X-Achse",
+    "Always about the local Y axis": "Immer um die lokale Y-Achse",
+    "Always about the local Z axis": "Immer um die lokale Z-Achse",
+    "Which segments get the turns": "Welche Segmente die Umdrehungen bekommen",
+    "All segments get so many turns": "Alle Segmente bekommen so viele Umdrehungen",
+    "The segment that the playhead is in. The others keep their turns": (
+        "Das Segment, in dem der Abspielkopf ist. Die anderen behalten ihre Umdrehungen"
+    ),
+    "The segments that the selected keys begin. The others keep their turns": (
+        "Die Segmente, die bei den ausgewählten Schlüsselbildern beginnen. Die anderen behalten ihre Umdrehungen"
+    ),
     "On: {segments}": "Für: {segments}",
     "What happens between the keys": "Was zwischen den Schlüsselbildern geschieht",
     "What happens between the keys. A key of this property decides from its frame on": (

@@ -1,0 +1,64 @@
+"""How far a motion has come in a segment: the share of the chord over all channels.
+
+A radian counts as much as a unit of length. Where no channel changes, and the body makes whole turns all the same, it
+is what the interpolation of the keys says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..curves import Keys, evaluate
+from .components import ROTATION, ROWS
+from .sources import Source
+
+
+def progress_weights(start: np.ndarray, end: np.ndarray, order: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """What a segment's progress is made of: weights (10, S) for the channels, and what to take off their sum, (S,)."""
+    chord = end - start
+    weights = chord.copy()
+    if order is None:
+        # A unit quaternion moves by half of the angle that the object turns.
+        weights[ROWS[ROTATION]] *= 4.0
+    total = np.einsum("rs,rs->s", weights, chord)
+    weights /= np.where(total > 0.0, total, np.inf)
+    return weights, np.einsum("rs,rs->s", weights, start)
+
+
+def are_idle(weights: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Whether segments turn although no channel changes in them, from the weights (., S) of their progress, (S,)."""
+    return (turns != 0) & ~weights.any(axis=0)
+
+
+def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return how far segments have come on frames (m,) where no channel changes: by the interpolation of their keys.
+
+    `first` and `last` are the frames that each runs between, (m,). It is that of a value with the same keys, which
+    goes up by one from each to the next, and rests at a key where handles are.
+    """
+    keys = next((keys for rows, keys in source.channels if 3 <= rows[0] < 7), source.curves[0])
+    begin, at, end = evaluate([_counting(keys)] * 3, [first, frames, last])
+    way, duration = end - begin, np.where(last > first, last - first, np.inf)
+    counted = np.divide(at - begin, way, out=np.zeros_like(at), where=way != 0.0)
+    return np.where(way != 0.0, counted, (frames - first) / duration)[0]
+
+
+def _counting(keys: Keys) -> Keys:
+    """One curve with the frames and interpolations of these keys, and their numbers for values."""
+    one = keys.only([0])
+    numbers = np.arange(len(keys.times), dtype=np.float32)
+
+    def numbered(points: np.ndarray | None) -> np.ndarray | None:
+        if points is None:
+            return None
+        points = points.copy()
+        points[0, :, 1] = numbers
+        return points
+
+    cycles = keys.cycles
+    if cycles is not None:
+        before, after = ("REPEAT_OFFSET" if mode == "REPEAT" else mode for mode in (cycles.before, cycles.after))
+        cycles = replace(cycles, before=before, after=after)
+    return replace(one, points=numbered(one.points), left=numbered(one.left), right=numbered(one.right), cycles=cycles)
