@@ -14,21 +14,17 @@ ANIMATORS = "animators.md"
 
 HOW_TO = f"{ANIMATORS}#how-to"
 MODES = f"{ANIMATORS}#which-mode-is-good-for-what"
-SPINS = f"{ANIMATORS}#whole-turns"
 RIGS = f"{ANIMATORS}#rigs"
 IN_THE_FILE = f"{ANIMATORS}#what-is-in-the-file"
 LIMITS = f"{ANIMATORS}#limits-plainly"
 
 PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
-    ("bpy.ops.rigid_motion.set_turns", SPINS),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
     ("bpy.ops.rigid_motion.mend", IN_THE_FILE),
     ("bpy.ops.rigid_motion.*", HOW_TO),
     ("bpy.types.objectmotion.mode", MODES),
-    ("bpy.types.objectmotion.turns", SPINS),
-    ("bpy.types.bonemotion.turns", SPINS),
-    ("bpy.types.slotrecord.turns_axis", SPINS),
+    ("bpy.types.slotrecord.*", HOW_TO),
     ("bpy.types.objectmotion.own_*", LIMITS),
     ("bpy.types.objectmotion.*", HOW_TO),
     ("bpy.types.bonemotion.mode", RIGS),

@@ -65,8 +65,8 @@ def cautions(segment: SegmentFacts) -> list[str]:
     if segment.long_way and not segment.turns:
         texts.append(
             iface_(
-                "Blender turns this segment by more than half a turn; the mode goes the short way. "
-                "To go the long way, use Set Turns"
+                "Blender turns this segment by more than half a turn; the mode takes the short way. "
+                "With Turns set to -1 it takes the long one"
             )
         )
     if segment.two_axes:

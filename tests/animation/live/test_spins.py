@@ -7,13 +7,14 @@ from math import pi, tau
 import bpy
 import numpy as np
 import pytest
-from mathutils import Euler
+from mathutils import Euler, Quaternion
 
+from rigid_motion import animation
 from rigid_motion.animation import set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.motion.eulers import ORDERS
-from tests.animation.oracle import rotation_path, shown_worlds
-from tests.animation.scenes import new_object
+from tests.animation.oracle import assert_shown, curve_of, rotation_path, shown_worlds
+from tests.animation.scenes import give_own_deltas, new_object
 
 FRAMES = (1.0, 13.0, 25.0, 37.0, 49.0, 61.0, 73.0)
 EACH = np.arange(1.0, 74.0)
@@ -70,8 +71,7 @@ def test_three_turns_between_two_keys_are_the_angle_over_time(live_file, mode, o
 @pytest.mark.parametrize("interpolation", ["BEZIER", "SINE", "BACK"])
 def test_a_spin_is_eased_as_its_angle(live_file, interpolation):
     obj = wheel((0.3, 0.3 + 5.0 * tau), "dq_sclerp", interpolation=interpolation, frames=(1.0, 73.0))
-    curve = obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves.find("rotation_euler", index=1)
-    angles = np.array([curve.evaluate(frame) for frame in EACH])
+    angles = np.array([curve_of(obj, "rotation_euler", 1).evaluate(frame) for frame in EACH])
     assert np.abs(turned(obj) - rotations(angles, 1)).max() < 1e-5
 
 
@@ -100,7 +100,7 @@ def test_turns_are_made_about_the_screws_axis_and_the_origin_stays_on_its_path(l
     axis = before[0, :3, :3] @ (1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0)
     for frame in range(49):
         share = min(frame / 24.0, 1.0)
-        spun = np.array(__import__("mathutils").Quaternion(axis, tau * turns * share).to_matrix())
+        spun = np.array(Quaternion(axis, tau * turns * share).to_matrix())
         assert np.abs(after[frame, :3, :3] - spun @ before[frame, :3, :3]).max() < 1e-5
 
 
@@ -145,3 +145,148 @@ def test_a_key_in_between_euler_keys_keeps_their_turns(live_file, frame):
     obj.keyframe_insert("rotation_euler")
     bpy.context.view_layer.update()
     assert np.abs(turned(obj, EACH[:25]) - before).max() < 1e-5
+
+
+@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_any_angles_turn_as_the_oracle_has_it(live_file, mode, order, interpolation):
+    obj, frames = new_object(rotation_mode=order), (1.0, 17.0, 25.0, 49.0)
+    own = give_own_deltas(obj, seed=5)
+    for path, size in (("location", 0.5), ("rotation_euler", 4.0)):
+        values = size * np.random.default_rng(ORDERS.index(order)).normal(size=(4, 3))
+        write_channel(obj, path, np.array(frames), values, interpolation=interpolation)
+    set_mode(obj, mode)
+    set_turns(obj, 2, [17.0])
+    assert_shown([obj], EACH[:49], {obj.name: own})
+
+
+@pytest.mark.parametrize("interpolation", ["LINEAR", "BEZIER"])
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_turns_of_quaternions_are_as_the_oracle_has_them(live_file, mode, interpolation):
+    obj = propeller(mode, frames=(1.0, 17.0, 25.0, 49.0), interpolation=interpolation)
+    set_turns(obj, 3, [1.0])
+    set_turns(obj, -1, [25.0])
+    assert_shown([obj], EACH[:49])
+
+
+def test_a_wheel_at_constant_speed_keeps_it_through_keys_of_turns(live_file):
+    """Smooth Screw: keys 40 degrees and two turns apart, at times in proportion."""
+    obj = new_object()
+    frames = np.array((1.0, 13.0, 37.0, 49.0))
+    halves = np.radians(20.0 + 360.0) * (frames - 1.0) / 12.0
+    quaternions = np.column_stack((np.cos(halves), np.zeros(4), np.sin(halves), np.zeros(4)))
+    write_channel(obj, "rotation_quaternion", frames, quaternions, interpolation="LINEAR")
+    set_mode(obj, "motor_spline")
+    set_turns(obj, 2, [1.0, 37.0])
+    set_turns(obj, 4, [13.0])
+    even = rotations(2.0 * np.radians(380.0) * np.arange(49) / 12.0, 1)
+    assert np.abs(turned(obj, EACH[:49]) - even).max() < 1e-5
+
+
+def test_what_is_eased_and_does_not_turn_spins_by_its_interpolation(live_file):
+    obj = propeller("dq_sclerp", frames=(1.0, 25.0), moves=False, angle=0.0)
+    for index in range(4):
+        curve_of(obj, "rotation_quaternion", index).keyframe_points[0].interpolation = "QUAD"
+    set_turns(obj, 1, [1.0], axis="X")
+    expected = rotations(tau * (np.arange(25) / 24.0) ** 2, 0)
+    expected = np.array(obj.rotation_quaternion.to_matrix()) @ expected
+    assert np.abs(turned(obj, EACH[:25]) - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+def test_a_bake_has_the_turns_and_undoing_it_brings_them_back(live_file, mode):
+    obj = propeller(mode)
+    set_turns(obj, 3, [1.0])
+    before = shown_worlds([obj], EACH[:49])[0]
+    animation.bake(obj)
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
+    animation.unbake(obj)
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+def test_fewer_keys_of_what_spins_keep_to_the_tolerance(live_file, order):
+    if order == "XYZ":
+        obj = wheel((0.0, 3.0 * tau), "dq_sclerp", frames=(1.0, 73.0))
+    else:
+        obj = propeller("dq_sclerp", frames=(1.0, 73.0))
+        set_turns(obj, 3, [1.0])
+    before = shown_worlds([obj], EACH)[0]
+    animation.bake(obj)
+    animation.reduce_keys_of(obj, "dq_sclerp", tolerance=0.002, radius=0.5)
+    assert len(animation.key_frames(obj)) < 45
+    after = shown_worlds([obj], EACH)[0]
+    for corner in 0.5 * np.vstack((np.zeros(3), np.eye(3), -np.eye(3))):
+        moved = after[:, :3, :3] @ corner + after[:, :3, 3] - before[:, :3, :3] @ corner - before[:, :3, 3]
+        assert np.linalg.norm(moved, axis=1).max() < 0.002 + 1e-5
+
+
+def test_turns_are_in_the_file_and_a_muted_channel_has_none(live_file, tmp_path):
+    obj = propeller("dq_sclerp")
+    without = turned(obj, EACH[:49])
+    set_turns(obj, 2, [1.0], axis="Y")
+    before = turned(obj, EACH[:49])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "turns.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "turns.blend"))
+    obj = bpy.data.objects["Tool"]
+    assert np.abs(turned(obj, EACH[:49]) - before).max() < 1e-6
+    curve_of(obj, "rigid_motion.turns").mute = True
+    bpy.context.view_layer.update()
+    assert np.abs(turned(obj, EACH[:49]) - without).max() < 1e-5
+    curve_of(obj, "rigid_motion.turns").mute = False
+    bpy.context.view_layer.update()
+    assert np.abs(turned(obj, EACH[:49]) - before).max() < 1e-6
+
+
+@pytest.mark.parametrize("after", ["REPEAT", "REPEAT_OFFSET", "MIRROR"])
+@pytest.mark.parametrize("axis", ["SCREW", "X"])
+def test_cycles_repeat_turns(live_file, axis, after):
+    obj = propeller("dq_sclerp", frames=(1.0, 9.0, 17.0))
+    set_turns(obj, 1, [1.0], axis=axis)
+    for index in range(4):
+        curve = curve_of(obj, "rotation_quaternion", index)
+        curve.modifiers.new("CYCLES").mode_after = after
+    for index in range(3):
+        curve_of(obj, "location", index).modifiers.new("CYCLES").mode_after = after
+    bpy.context.view_layer.update()
+    frames = np.arange(1.0, 17.0)
+    first = turned(obj, frames)
+    second = turned(obj, 34.0 - frames if after == "MIRROR" else frames[1:] + 16.0)
+    if after != "REPEAT_OFFSET":
+        first = first if after == "MIRROR" else first[1:]
+        assert np.abs(second - first).max() < 1e-4
+
+
+def test_a_strip_has_the_turns_of_its_action(live_file):
+    obj = propeller("dq_sclerp")
+    set_turns(obj, 2, [1.0])
+    before = turned(obj, EACH[:49])
+    data = obj.animation_data
+    action, slot = data.action, data.action_slot
+    strip = data.nla_tracks.new().strips.new("Strip", 11, action)
+    strip.action_slot = slot
+    data.action = None
+    bpy.context.view_layer.update()
+    assert np.abs(turned(obj, EACH[:49] + 10.0) - before).max() < 1e-5
+
+
+def test_the_property_is_that_of_the_segment_on_the_frame(live_file):
+    obj = propeller("dq_sclerp")
+    bpy.context.scene.frame_set(30)
+    obj.rigid_motion.turns = 2
+    keys = curve_of(obj, "rigid_motion.turns").keyframe_points
+    assert [tuple(key.co) for key in keys] == [(1.0, 0.0), (25.0, 2.0), (49.0, 0.0)]
+    bpy.context.scene.frame_set(10)
+    assert obj.rigid_motion.turns == 0
+    set_turns(obj, 0)
+    assert curve_of(obj, "rigid_motion.turns") is None
+    bpy.context.scene.frame_set(30)
+    assert obj.rigid_motion.turns == 0
+
+
+def test_what_has_no_mode_refuses_turns(live_file):
+    obj = propeller("BLENDER")
+    with pytest.raises(animation.Refused, match="choose a mode first"):
+        set_turns(obj, 2, [1.0])
+    assert curve_of(obj, "rigid_motion.turns") is None

@@ -40,9 +40,10 @@ NOTES = {
     'The constraint "Rigid Motion" has an influence below 1: a part of Blender\'s in-betweens is left': (
         "Die Beschränkung „Rigid Motion“ hat einen Einfluss unter 1: ein Teil von Blenders Zwischenbildern bleibt"
     ),
-    "Blender turns this segment by more than half a turn; the mode goes the short way. To go the long way, use Set Turns": (
+    "Blender turns this segment by more than half a turn; the mode takes the short way. "
+    "With Turns set to -1 it takes the long one": (
         "Blender dreht in diesem Segment um mehr als eine halbe Umdrehung; der Modus nimmt den kurzen Weg. "
-        "Für den langen Weg gibt es „Umdrehungen setzen“"
+        "Für den langen Weg die Umdrehungen auf -1 setzen"
     ),
     "Two angles go by more than half a turn here; whole turns are made about the axis of the larger one. "
     "For both, set a key in between": (
