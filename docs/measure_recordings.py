@@ -140,9 +140,9 @@ def _errors_of_clips(clips: Sequence[Clip], part: float) -> dict[str, float]:
     bent = curves._bent
 
     def with_part(segments, at_keys):
-        def changed(twists, before, after, rests):
-            found = at_keys(twists, before, after, rests)
-            added = np.where(rests[:, 1:], 0.0, found[..., 2:] - twists[..., 1:])
+        def changed(leaving, arriving, before, after, rests):
+            found = at_keys(leaving, arriving, before, after, rests)
+            added = np.where(rests[:, 1:], 0.0, found[..., 2:] - leaving[..., 1:])
             return np.concatenate((found[..., :2], found[..., 2:] + (2.0 * part - 1.0) * added), axis=-1)
 
         return bent(segments, changed)

@@ -64,8 +64,17 @@ def mode_channel(carrier: Carrier) -> bpy.types.FCurve | None:
     return fcurve if fcurve is not None and len(fcurve.keyframe_points) else None
 
 
+def without_turns(keys: dict) -> dict:
+    """A snapshot without the channel of turns."""
+    return {channel: kept for channel, kept in keys.items() if channel[0] != "rigid_motion.turns"}
+
+
 def assert_only_a_key_more(made: dict, after: dict, frame: float) -> None:
-    """Between these snapshots no key changed but on this frame; and handles, as Blender has them follow a key."""
+    """Between these snapshots no key changed but on this frame; and handles, as Blender has them follow a key.
+
+    Turns are shared out between the parts of a segment.
+    """
+    made, after = without_turns(made), without_turns(after)
     assert set(made) == set(after)
     for channel, (*rest, points) in after.items():
         *rest_made, points_made = made[channel]
@@ -250,7 +259,11 @@ class Editing(RuleBasedStateMachine):
                     value = random_values(obj, path, 1, seed)[0, index]
                     fcurve.keyframe_points.insert(frame, value)
 
-        self._edit(insert)
+        def settle(made: dict, after: dict) -> None:
+            for other in self.names:
+                assert without_turns(after[other]) == without_turns(made[other]), f"the keys of {other} were changed"
+
+        self._edit(insert, settle)
 
     @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans(), with_mode=st.booleans())
     def move_keys(self, who, which, to, one_channel, with_mode):
@@ -395,6 +408,20 @@ class Editing(RuleBasedStateMachine):
         obj = self._found(name)
         assert [mode_at(obj, frame) for frame in keys] == wanted == animation.modes_of(obj, keys)
         assert {channel: kept for channel, kept in snapshot(obj).items() if channel[0] in WIDTHS} == transforms
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, which=st.sets(st.integers(0, 5), min_size=1), turns=st.integers(-3, 3))
+    def set_the_turns_of_keys(self, who, which, turns):
+        name = self._named(who)
+        keys = key_frames(self._found(name))
+        if not len(keys):
+            return
+        chosen = sorted({float(keys[number % len(keys)]) for number in which})
+
+        def change() -> None:
+            animation.set_turns(self._found(name), turns, chosen, refused=[])
+
+        self._edit(change)
 
     @precondition(lambda self: self.on)
     @rule(who=shares, mode=st.sampled_from(MODE_IDS))

@@ -34,11 +34,14 @@ class Spin(NamedTuple):
 
 
 def shortest(first: Sequence[float], second: Sequence[float]) -> np.ndarray:
-    """The rotation from one quaternion to another as a vector along the axes of the body."""
-    turn = Quaternion(first).inverted() @ Quaternion(second)
-    if turn.w < 0.0:
-        turn.negate()
-    return np.array(turn.to_exponential_map())
+    """The rotation from one quaternion to another as a vector along the axes of the body.
+
+    At half a turn it is the one that `interpolate` takes, of which rounding errors decide.
+    """
+    aligned = -np.array(second) if np.dot(first, second) < 0.0 else np.array(second)
+    w, *xyz = multiply(np.array(first) * (1.0, -1.0, -1.0, -1.0), aligned)
+    length = np.linalg.norm(xyz)
+    return np.array(xyz) * (2.0 * np.arctan2(length, abs(w)) / max(length, 1e-12))
 
 
 def spin_by_angles(
@@ -47,7 +50,7 @@ def spin_by_angles(
     """The turns of Euler angles (2, 3) beyond the shortest rotation of quaternions (2, 4) with `own` on top."""
     change = angles[1] - angles[0]
     which = int(np.argmax(np.abs(change)))
-    if abs(change[which]) <= np.pi + 1e-4:
+    if abs(change[which]) <= np.pi - 1e-4:
         return Spin()
     in_space, in_body = [], []
     for set_of_angles, quaternion in zip(angles, quaternions, strict=True):

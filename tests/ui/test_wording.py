@@ -10,7 +10,7 @@ import pytest
 
 from rigid_motion.animation import Reduction
 from rigid_motion.animation.queries.segments import SegmentFacts
-from rigid_motion.ui.wording import cautions, degrees, length, listed, reduction_summary, wrapped
+from rigid_motion.ui.wording import cautions, degrees, length, listed, reduction_summary, turn, wrapped
 
 PLAIN = SegmentFacts(
     first=1.0,
@@ -18,8 +18,11 @@ PLAIN = SegmentFacts(
     key=1.0,
     mode="dq_sclerp",
     turn=radians(90.0),
+    turns=0,
     distance=2.0,
     long_way=False,
+    is_sure=False,
+    two_axes=False,
     scales_unevenly=False,
 )
 
@@ -32,7 +35,8 @@ def test_a_plain_segment_is_no_cause_for_caution():
     ("facts", "words"),
     [
         ({"turn": radians(178.0)}, "178.0° is nearly half a turn"),
-        ({"long_way": True}, "goes the short way"),
+        ({"long_way": True}, "takes the short way"),
+        ({"two_axes": True}, "about the axis of the larger one"),
         ({"scales_unevenly": True}, "scale is not the same along all axes"),
     ],
 )
@@ -40,6 +44,18 @@ def test_what_one_may_not_expect_is_said_but_not_of_blenders_own(facts, words):
     (caution,) = cautions(replace(PLAIN, **facts))
     assert words in caution
     assert cautions(replace(PLAIN, mode="BLENDER", **facts)) == []
+
+
+def test_angles_and_turns_leave_no_doubt_which_way_round():
+    assert cautions(replace(PLAIN, turn=radians(178.0), is_sure=True)) == []
+    assert cautions(replace(PLAIN, turn=radians(898.0), turns=2)) == []
+    assert cautions(replace(PLAIN, turns=-1, long_way=True)) == []
+
+
+def test_a_spin_is_told_in_degrees_and_turns():
+    assert turn(PLAIN) == "90.0°"
+    assert turn(replace(PLAIN, turn=radians(1080.0), turns=3)) == "1080.0° (3 turns)"
+    assert turn(replace(PLAIN, turn=radians(810.0), turns=2)) == "810.0° (2.25 turns)"
 
 
 def test_angles_are_given_in_degrees():

@@ -8,9 +8,11 @@ from bpy.props import EnumProperty, IntProperty
 
 from .. import animation
 from ..animation import Refused
+from ..animation.actions.records import recorded
 from ..animation.properties import MOST_TURNS, OWN_WORDS, SCREW_AXIS, TURN_AXIS_ITEMS
+from ..animation.queries.keyed import active_place
 from .on_targets import OnTargets
-from .targets import CURRENT, SELECTED, WHOLE, grouped_by_frames, is_key_editor, targets_of
+from .targets import CURRENT, SELECTED, WHOLE, active_target, grouped_by_frames, is_key_editor, targets_of
 
 TURN_SCOPES = [
     (WHOLE, "All Segments", "All segments get so many turns"),
@@ -53,6 +55,9 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if not self.properties.is_property_set("on"):
             self.on = SELECTED if is_key_editor(context) else CURRENT
+        active = active_target(context)
+        if active is not None and (place := active_place(active)) is not None:
+            self.turns, self.axis = active.motion.turns or 1, recorded(place).turns_axis
         return context.window_manager.invoke_props_dialog(self, confirm_text="Set Turns")
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -64,10 +69,11 @@ class RIGID_MOTION_OT_set_turns(OnTargets, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = targets_of(context)
+        axis = self.axis if self.properties.is_property_set("axis") else None
 
         def set_turns(refused: list[Refused]) -> str:
             for frames, group in grouped_by_frames(context, targets, self.on, refused).items():
-                animation.set_turns(group, self.turns, frames, axis=self.axis, refused=refused)
+                animation.set_turns(group, self.turns, frames, axis=axis, refused=refused)
             return rpt_("{turns} turns more").format(turns=self.turns)
 
         return self.act(targets, set_turns)

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import refresh, set_enabled, set_mode, write_channel
+from rigid_motion.animation import refresh, set_enabled, set_mode, set_turns, write_channel
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.animation.queries.segments import frame_in_action, is_up_to_date, segment_at
 from tests.animation.scenes import new_object
@@ -60,11 +60,28 @@ def test_a_segment_has_the_mode_of_the_key_it_begins_with(live_file):
     assert [at(obj, frame).mode for frame in (5, 20)] == ["BLENDER", "dq_sclerp"]
 
 
-def test_euler_keys_more_than_half_a_turn_apart_go_the_long_way_in_blender(live_file):
+def test_euler_keys_turn_as_far_as_their_angles_say(live_file):
     obj = turned((0, 350, 380), "XYZ")
-    assert at(obj, 5).long_way
-    assert np.degrees(at(obj, 5).turn) == pytest.approx(10.0, abs=1e-3)
-    assert not at(obj, 20).long_way
+    assert not at(obj, 5).long_way
+    assert [at(obj, frame).turns for frame in (5, 20)] == [1, 0]
+    assert np.degrees(at(obj, 5).turn) == pytest.approx(350.0, abs=1e-3)
+    assert [at(obj, frame).is_sure for frame in (5, 20)] == [True, False]
+
+
+def test_two_euler_angles_over_half_a_turn_are_told(live_file):
+    obj = turned((0, 350, 380), "XYZ")
+    assert not at(obj, 5).two_axes
+    write_channel(obj, "rotation_euler", FRAMES, np.radians([(0, 0, 0), (200, 0, 350), (250, 0, 380)]))
+    assert at(obj, 5).two_axes
+    assert not at(obj, 20).two_axes
+
+
+def test_turns_of_the_channel_are_told(live_file):
+    obj = turned((0, 90, 120))
+    set_mode(obj, "dq_sclerp")
+    set_turns(obj, -2, [1.0])
+    assert [at(obj, frame).turns for frame in (5, 20)] == [-2, 0]
+    assert np.degrees(at(obj, 5).turn) == pytest.approx(630.0, abs=1e-3)
 
 
 def test_quaternions_of_opposite_signs_go_the_long_way_in_blender(live_file):

@@ -3,7 +3,10 @@
 components    the rows of arrays: location, rotation, scale
 sources       what is keyed, as arrays with a digest
 source_cache  the sources of earlier edits, and what has changed since
+channel_rows  the channels' own values, of many sources at once
+progress      how far a motion has come in a segment
 bodies        channels as poses of a body
+turning       whole turns, of Euler angles or of the channel
 key_speeds    how fast a smooth motion with handles passes its keys
 neighbours    the keys beside a segment, for modes that look at them
 differences   from sources to differences

@@ -6,6 +6,7 @@ raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
 inserted_keys    a key inserted in between keeps the pose on the screen
 dense_keys       keys inserted all along keep the motion
+segment_keys     keys of modes and turns, which inserted keys share out
 separated_slots  what Separate Slots does to rigs
 edit_mode        rigs in Edit Mode
 refreshing       what becomes of in-betweens after an edit

@@ -106,6 +106,8 @@ def share_out_turns(place: SlotTransform, source: Source) -> bool:
     old = cached_source(recorded_digest(place))
     if old is None or old.turns is None or source.turns is None or old.order != source.order or source.cyclic:
         return False
+    if source.key_count <= old.key_count:
+        return False
     shared: dict[float, int] = {}
     for segment in np.flatnonzero(old.segment_turns):
         first, last = old.key_frames[segment : segment + 2]
