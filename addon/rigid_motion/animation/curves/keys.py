@@ -6,7 +6,7 @@ Frames and values are Blender's, in its single precision.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -107,6 +107,23 @@ class Keys:
         )
         settings = None if self.easing_settings is None else self.easing_settings[:, channels]
         return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles, self.is_sound)
+
+    def at(self, chosen: np.ndarray) -> Keys:
+        """The chosen ones of the keys, by a mask of shape (n,)."""
+        points, interpolation, left, right, easing = (
+            None if array is None else array[:, chosen]
+            for array in (self.points, self.interpolation, self.left, self.right, self.easing)
+        )
+        settings = None if self.easing_settings is None else self.easing_settings[:, :, chosen]
+        return replace(
+            self,
+            points=points,
+            interpolation=interpolation,
+            left=left,
+            right=right,
+            easing=easing,
+            easing_settings=settings,
+        )
 
     @property
     def raw(self) -> bytes:

@@ -97,6 +97,10 @@ class InsertedKeys:
             is_stored = operator.startswith(transform.stored_by)
             self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_stored)
 
+    def notice_values(self, transform: Transform, frame: float) -> None:
+        """Keys of a transform that are set on the frame that is shown are meant as they are."""
+        self._posed[_identity(transform)] = _Posed(frame, transform.components(), False)
+
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
         """Forget how these were posed, or all: their Actions have moved them again."""
         if transforms is None:
@@ -159,7 +163,7 @@ class InsertedKeys:
                 self._inserted.popitem(last=False)
         for channel, value in _visible_values(user, place, old, shown, frame).items():
             if (fcurve := place.curves.get(channel)) is not None:
-                _set_key(fcurve, frame, value)
+                set_key(fcurve, frame, value)
         return True
 
 
@@ -200,7 +204,7 @@ def _visible_values(
     return {channel: seen[row] for row, channel in user.channels.items()}
 
 
-def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
+def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
     """Give a key this value, handles along with it; insert one that the channel lacks."""
     keys = fcurve.keyframe_points
     for key in keys:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...motion import Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs, conjugate, multiply
 from ..compute.components import LOCATION, ROTATION, ROWS
@@ -44,6 +45,25 @@ def channel_values(transform: Transform, source: Source, motion: InBetweens) -> 
                 if prop in channels:
                     channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
     return {transform.prefix + prop: values for prop, values in channels.items()}
+
+
+def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray:
+    """The components that show one pose (1,) with the own delta transforms, shape (10,).
+
+    The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
+    """
+    own, found = source.original, near.copy()
+    axes = np.eye(3) if source.location_axes is None else source.location_axes
+    found[:3] = (pose.positions @ axes)[0] - own[:3]
+    quaternion = multiply(conjugate(own[3:7]), pose.quaternions)
+    if source.order is None:
+        found[3:7] = quaternion[0] * (-1.0 if quaternion[0] @ near[3:7] < 0.0 else 1.0)
+    else:
+        angles = extrinsic_eulers_from_quaternions(quaternion, source.order)
+        found[3:6] = _beginning_near(near[3:6], angles, source.order)[0]
+    if pose.scales is not None and own[7:].mean() != 0.0:
+        found[7:] = pose.scales / own[7:].mean()
+    return found
 
 
 def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:

@@ -1,6 +1,10 @@
 """Why something cannot be done, and the way out."""
 
 REFUSALS = {
+    "{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys": (
+        "{name} braucht ein Schlüsselbild vor und eines nach Einzelbild {frame:g}: auf ein Einzelbild zwischen zwei "
+        "Schlüsselbildern gehen"
+    ),
     # What is asked for
     "Select keys of location, rotation or scale first": (
         "Zuerst Schlüsselbilder von Position, Rotation oder Skalierung auswählen"
