@@ -6,7 +6,8 @@ menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
 look         how they look                              wording      labels and texts
-breakdown    operators that set a pose by a slider      slider       the slider
+bake         the one that bakes, with its dialog        slider       a factor, dragged with the mouse
+breakdown    those that key poses by a slider
 preferences  of the extension                           manual       where the documentation is
 """
 
