@@ -235,6 +235,15 @@ def test_steps_and_ranges(tmp_path, options, wanted):
     assert frames_of_keys(bpy.data.objects["Tool"]) == wanted
 
 
+@pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
+def test_poses_are_held_where_that_is_asked_for(tmp_path, options, wanted):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path, "--step", "2", *options) == 0
+    open_again(baked_name(path))
+    curves = curves_of(bpy.data.objects["Tool"])
+    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {wanted}
+
+
 def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):
     assert run(shot, "--output", tmp_path, "--objects", "Camera, [TW]*") == 0
     with extension():

@@ -38,6 +38,15 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         step=25,
         precision=2,
     )
+    interpolation: EnumProperty(
+        name="Interpolation",
+        description="What is between baked keys",
+        items=[
+            ("LINEAR", "Linear", "Straight lines"),
+            ("CONSTANT", "Constant", "Each pose holds until the next key: with a step of 2 the motion is on twos"),
+        ],
+        translation_context=OWN_WORDS,
+    )
     frames: EnumProperty(
         name="Frames",
         description="What to bake, widened to whole segments, and those of smooth modes beside them",
@@ -65,6 +74,7 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.prop(self, "step")
+        layout.row().prop(self, "interpolation", expand=True)
         layout.row().prop(self, "frames", expand=True)
         if self.frames == "CUSTOM":
             column = layout.column(align=True)
@@ -83,7 +93,9 @@ class RIGID_MOTION_OT_bake(OnTargets, bpy.types.Operator):
         targets = targets_of(context)
 
         def bake(refused: list[Refused]) -> str:
-            begin, end = animation.bake(targets, step=self.step, first=first, last=last, refused=refused)
+            begin, end = animation.bake(
+                targets, step=self.step, first=first, last=last, interpolation=self.interpolation, refused=refused
+            )
             return rpt_("baked from frame {first:g} to {last:g}").format(first=begin, last=end)
 
         return self.act(targets, bake)

@@ -101,8 +101,13 @@ class EditingObjects(Editing):
         self._edit(change)
 
     @precondition(lambda self: self.on)
-    @rule(who=shares, step=st.sampled_from((1.0, 0.5, 3.0)), ends=st.none() | st.tuples(frames_in, frames_in))
-    def bake(self, who, step, ends):
+    @rule(
+        who=shares,
+        step=st.sampled_from((1.0, 0.5, 3.0)),
+        ends=st.none() | st.tuples(frames_in, frames_in),
+        interpolation=st.sampled_from(("LINEAR", "CONSTANT")),
+    )
+    def bake(self, who, step, ends, interpolation):
         obj = self._object(who)
         if len(self._sharing(obj.name)) > 1:
             return
@@ -116,7 +121,8 @@ class EditingObjects(Editing):
 
         def change() -> None:
             with suppress(animation.Refused):
-                baked.extend(animation.bake(bpy.data.objects[name], step=step, first=first, last=last))
+                found = bpy.data.objects[name]
+                baked.extend(animation.bake(found, step=step, first=first, last=last, interpolation=interpolation))
 
         self._edit(change)
         obj = bpy.data.objects[name]

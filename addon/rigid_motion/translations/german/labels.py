@@ -107,7 +107,10 @@ OF_OWN_CONTEXT = {
     "Blender's Path": "Blenders Pfad",
     "Mode's Path": "Pfad des Modus",
     "Ticks": "Zeitmarken",
-    # One of three buttons in a row
+    # One of two or three buttons in a row
+    "Interpolation": "Interpolation",
+    "Linear": "Linear",
+    "Constant": "Konstant",
     "Action": "Aktion",
     "Scene": "Szene",
     "Custom": "Eigene",

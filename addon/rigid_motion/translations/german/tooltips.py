@@ -123,6 +123,11 @@ TOOLTIPS = {
     "From one frame to another": "Von einem Einzelbild zu einem anderen",
     "First frame to bake": "Erstes Einzelbild, das gebacken wird",
     "Last frame to bake": "Letztes Einzelbild, das gebacken wird",
+    "What is between baked keys": "Was zwischen gebackenen Schlüsselbildern ist",
+    "Straight lines": "Gerade Linien",
+    "Each pose holds until the next key: with a step of 2 the motion is on twos": (
+        "Jede Pose bleibt bis zum nächsten Schlüsselbild: bei einem Schritt von 2 läuft die Bewegung auf Zweiern"
+    ),
     "Give baked objects the Actions back that they had before, with their own keys and modes": (
         "Gebackenen Objekten die Aktionen zurückgeben, die sie vorher hatten, "
         "mit ihren eigenen Schlüsselbildern und Modi"
