@@ -6,8 +6,6 @@ digits set it in per cent.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import blf
 import bpy
 import gpu
@@ -32,7 +30,7 @@ DIGITS = {
 }
 """What keys type into a number."""
 
-LINE, TICK, HANDLE, TEXT = (0.8, 0.8, 0.8, 0.5), (0.8, 0.8, 0.8, 0.9), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
+LINE, HANDLE, TEXT = (0.8, 0.8, 0.8, 0.7), (0.28, 0.45, 0.7, 1.0), (0.95, 0.95, 0.95, 1.0)
 """Colours, red, green, blue, alpha."""
 
 
@@ -55,7 +53,9 @@ class Slider:
         self.typed = ""
         """The number that was typed, in per cent; the mouse has no say until it is deleted."""
         self._dragged, self._x, self._scale, self._snaps = factor, x, scale, False
-        self._handler: tuple[type[bpy.types.Space], object] | None = None
+        self._label = ""
+        self._region: bpy.types.Region | None = None
+        self._handler: tuple[type[bpy.types.Space], object, str] | None = None
 
     @property
     def factor(self) -> float:
@@ -91,50 +91,60 @@ class Slider:
         return True
 
     def show(self, context: bpy.types.Context, label: str) -> None:
-        """Draw it into the header of the area until it is hidden; the keys are in the status bar."""
+        """Draw it into a header of the area until it is hidden; the keys are in the status bar."""
+        self._label = label
         context.area.header_text_set(" ")
-        space = type(context.space_data)
-        draw: Callable[[], None] = lambda: self._draw(label)  # noqa: E731 - Blender calls it without arguments
-        self._handler = space, space.draw_handler_add(draw, (), "HEADER", "POST_PIXEL")
+        # Blender takes the texts of a header out where it shows another: the tool header, if there is one.
+        regions = {region.type: region for region in context.area.regions if region.height > 1}
+        kind = "TOOL_HEADER" if "TOOL_HEADER" in regions else "HEADER"
+        self._region, space = regions.get(kind), type(context.space_data)
+        self._handler = space, space.draw_handler_add(self._draw, (), kind, "POST_PIXEL"), kind
         self.tell(context)
 
     def tell(self, context: bpy.types.Context) -> None:
         """Bring the status bar and the header up to date."""
         overshoot = iface_("On") if self.overshoots else iface_("Off")
-        context.workspace.status_text_set(
-            iface_(
-                "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
-                "Shift: Precision | 0-9: Per Cent"
-            ).format(overshoot=overshoot)
-        )
+        keys = iface_(
+            "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
+            "Shift: Precision | 0-9: Per Cent"
+        ).format(overshoot=overshoot)
+        context.workspace.status_text_set(f"{self._label} {self._number} | {keys}")
         context.area.tag_redraw()
 
     def hide(self, context: bpy.types.Context) -> None:
         """Give header and status bar back."""
         if self._handler is not None:
-            space, handle = self._handler
-            space.draw_handler_remove(handle, "HEADER")
+            space, handle, kind = self._handler
+            space.draw_handler_remove(handle, kind)
             self._handler = None
         context.workspace.status_text_set(None)
         context.area.header_text_set(None)
 
-    def _draw(self, label: str) -> None:
+    @property
+    def _number(self) -> str:
+        return f"{self.typed} %" if self.typed else f"{100.0 * self.factor:.0f} %"
+
+    def _draw(self) -> None:
         region, scale = bpy.context.region, self._scale
-        middle, half, y = 0.5 * region.width, 0.5 * WAY * scale, 0.5 * region.height
-        gpu.state.blend_set("ALPHA")
-        left = middle - half
+        if region != self._region:
+            return
         low, high = (-0.25, 1.25) if self.overshoots else (0.0, 1.0)
-        _draw_box(left + low * 2.0 * half, y - scale, left + high * 2.0 * half, y + scale, LINE)
+        way, y = WAY * scale, 0.5 * region.height
+        left = 0.5 * (region.width - way)
+        gpu.state.blend_set("ALPHA")
+        _draw_box(left + low * way, y - scale, left + high * way, y + scale, LINE)
         for tick in range(11):
-            x, size = left + tick * 0.2 * half, (6.0 if tick % 5 == 0 else 3.0) * scale
-            _draw_box(x - 0.5 * scale, y - size, x + 0.5 * scale, y + size, TICK)
-        at = left + min(max(self.factor, low), high) * 2.0 * half
+            x, size = left + 0.1 * tick * way, (6.0 if tick % 5 == 0 else 3.0) * scale
+            _draw_box(x - 0.5 * scale, y - size, x + 0.5 * scale, y + size, LINE)
+        at = left + min(max(self.factor, low), high) * way
         _draw_box(at - 2.0 * scale, y - 9.0 * scale, at + 2.0 * scale, y + 9.0 * scale, HANDLE)
         blf.size(0, 11.0 * scale)
         blf.color(0, *TEXT)
-        number = f"{self.typed} %" if self.typed else f"{100.0 * self.factor:.0f} %"
-        width = blf.dimensions(0, label)[0]
-        for text, x in ((label, left - 0.6 * half - width), (number, left + 2.6 * half)):
+        beside = 0.25 * way + 12.0 * scale
+        for text, x in (
+            (self._label, left - beside - blf.dimensions(0, self._label)[0]),
+            (self._number, left + way + beside),
+        ):
             blf.position(0, x, y - 4.0 * scale, 0)
             blf.draw(0, text)
         gpu.state.blend_set("NONE")
