@@ -84,7 +84,7 @@ def fill_shot() -> None:
     refused["Crane"].driver_add("location", 0).driver.expression = "frame"
     curves_of(refused["Future"])["rigid_motion.mode", 0].keyframe_points[1].co.y = 42.0
     curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
-    curves_of(refused["Noisy"])["location", 0].modifiers.new("NOISE")
+    curves_of(refused["Noisy"])["location", 0].modifiers.new("NOISE").blend_type = "MULTIPLY"
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ from ..compute.sources import Source
 from ..curves import Keys
 from ..transforms import Refused, Transform
 from .key_reading import read_keys
+from .modifiers import is_modified
 from .records import recorded_digest, recorded_mode
-from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
+from .refusals import refuse_channel, refuse_different_steps, refuse_numbers, refuse_what_is_taken
 from .slots import SlotTransform
 
 
@@ -123,6 +124,9 @@ class _Keyed:
     modes: list[bpy.types.FCurve]
     """The mode channel, if there is one with keys."""
 
+    modified: frozenset[int]
+    """The rows of channels that modifiers add something to."""
+
 
 def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
@@ -132,6 +136,9 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.
         fcurve = place.curves.get(channel)
         if fcurve is not None and _has_say(user, fcurve):
             keyed[row] = fcurve
+    has_modifiers = [row for row, fcurve in keyed.items() if fcurve.modifiers]
+    if has_modifiers:
+        refuse_different_steps(user.name, keyed.values())
     names = frozenset(map(PART_OF.__getitem__, keyed))
     rest = {
         row: getattr(user.carrier, path.removeprefix(user.prefix))[index]
@@ -140,7 +147,8 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.
     }
     mode = place.curves.get(user.mode_channel)
     modes = [mode] if mode is not None and _has_say(user, mode) else []
-    return _Keyed(user, names, keyed, rest, modes)
+    modified = frozenset(row for row in has_modifiers if is_modified(keyed[row]))
+    return _Keyed(user, names, keyed, rest, modes, modified)
 
 
 def _source(
@@ -159,6 +167,7 @@ def _source(
         mode=modes[0][1] if modes else recorded_mode(place),
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
+        modified=keyed.modified,
     )
 
 

@@ -21,6 +21,7 @@ from ..actions.channels import (
     set_key_fields,
     write_channel,
 )
+from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
 from ..compute.differences import SMOOTH, in_betweens
 from ..compute.sources import SAME_FRAME, Source
@@ -191,6 +192,9 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
         return source.keyed_range
     if source.goes_on:
         return tuple(map(float, source.seen_range))
+    if source.steps or source.modified:
+        # Without its modifiers no part can be left as it is.
+        return tuple(map(float, source.frame_range)) if source.steps else source.keyed_range
     if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
         raise Refused(
             rpt_("{name} has its keys from frame {first:g} to {last:g}: none of them is in that range").format(
@@ -222,11 +226,11 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
 def _bake_place(
     transform: Transform, place: SlotTransform, source: Source, frames: np.ndarray, interpolation: str
 ) -> None:
-    motion = in_betweens(source, frames)
+    motion, added = in_betweens(source, frames), added_values(place, transform, source, frames)
     copy = move_by_copy(transform, place, BAKED)
     fcurves = copy.channelbag.fcurves
     cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
-    for path, values in channel_values(transform, source, motion).items():
+    for path, values in channel_values(transform, source, motion, added).items():
         for index, column in enumerate(values.T):
             fcurve = copy.curves.get((path, index))
             if fcurve is not None and fcurve.mute:

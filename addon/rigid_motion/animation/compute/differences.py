@@ -25,6 +25,7 @@ from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
+from .holds import at_moments
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, with_neighbours
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
@@ -88,7 +89,7 @@ def in_betweens(
     native, delta = np.empty((2, _height([source]), len(frames)))
     delta = delta[: _filled_height([source])]
     if len(source.key_frames) > 1:
-        _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode], progress)
+        at_moments(_move, [source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode], progress)
     else:
         # Without a segment there is nothing to fill in.
         _sampled([(source, slice(len(frames)))], [frames], out=native)
@@ -127,7 +128,7 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, _height(portion), samples[-1][1].stop))
         delta = rows[: _filled_height(portion)]
-        _move(portion, frames, rows, delta)
+        at_moments(_move, portion, frames, rows, delta)
         order = portion[0].order
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ...motion import KEYFRAME_MODES
-from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
+from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, Stepped, cycled, cyclic_times, evaluate, held
 from .components import PART_OF, REST, ROTATION, ROWS, SCALE
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
@@ -74,6 +74,9 @@ class Source:
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
 
+    modified: frozenset[int] = frozenset()
+    """The rows of channels that modifiers add something to, which stays on top of the modes."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -90,6 +93,8 @@ class Source:
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
         span = self.seen if self.goes_on and not self.repeats else None
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
+        if self.has_modified_scale:
+            summary.update(b"modified scale")
         return summary.hexdigest()
 
     @property
@@ -106,6 +111,20 @@ class Source:
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
         return len(self.channels) == 1 and self.cyclic is None
+
+    @cached_property
+    def steps(self) -> tuple[Stepped, ...]:
+        """The Stepped modifiers that all channels have in common; those with a single key need not have them."""
+        return next((keys.steps for keys in self.curves if keys.steps), ())
+
+    def held(self, frames: np.ndarray) -> np.ndarray:
+        """The frames (m,) whose poses are shown on these ones (m,)."""
+        return held(self.steps, frames)
+
+    @property
+    def has_modified_scale(self) -> bool:
+        """Whether modifiers add something to the scale, which the modes leave to Blender then."""
+        return any(PART_OF[row] == SCALE for row in self.modified)
 
     @cached_property
     def keyed_frames(self) -> np.ndarray:
@@ -150,7 +169,7 @@ class Source:
         turn about one and the same axis; and where no mode looks at keys that only some of the rounds have.
         """
         cyclic = self.cyclic
-        if cyclic is None:
+        if cyclic is None or self.steps:
             return False
         cycles, ends = cyclic.cycles, self.keyed_range
         if any(keys.cycles != cycles or tuple(keys.times[[0, -1]]) != ends for keys in self.curves):
@@ -217,6 +236,11 @@ class Source:
         if self.cyclic is None and self.is_live:
             live = np.flatnonzero(self.modes)
             first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
+        if self.steps:
+            # A hold shows an in-between until after the last key, and Blender's ones before the offset show it early.
+            longest = sum(one.step for one in self.steps)
+            last += longest
+            first -= longest if any(first < one.offset for one in self.steps) else 0.0
         return math.floor(first), math.ceil(last)
 
     @cached_property
@@ -237,7 +261,7 @@ class Source:
     @cached_property
     def uniform_scale(self) -> bool:
         """Whether the scale is animated, and at every key the same along all axes and positive. Else Blender scales."""
-        if SCALE not in self.keyed:
+        if SCALE not in self.keyed or self.has_modified_scale:
             return False
         x, y, z = self.values_at(self.key_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)

@@ -17,6 +17,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion import Poses, interpolate
 from ..actions.channels import KeyFields, key_fields, set_key_fields
+from ..actions.modifiers import added_values
 from ..actions.refusals import refuse_linked
 from ..actions.slots import SlotTransform
 from ..compute.bodies import body_poses
@@ -192,7 +193,8 @@ class Breakdowns:
             )
         refuse_linked(transform, place)
         frame = frame_in_action(transform.animated, self._frame)
-        source = _without(next(source for one, source in readable(transform, readings) if one is place), frame)
+        whole = next(source for one, source in readable(transform, readings) if one is place)
+        source, added = _without(whole, frame), added_values(place, transform, whole, np.array([frame]))[:, 0]
         keys = source.key_frames if source.channels else np.empty(0)
         after = int(np.searchsorted(keys, frame))
         if not 0 < after < len(keys):
@@ -209,19 +211,19 @@ class Breakdowns:
             source,
             frame,
             (float(keys[after - 1]), float(keys[after])),
-            transform.components() if seen is None else seen,
+            (transform.components() if seen is None else seen) - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
             {channel: key_fields(place.curves[channel]) for channel in keyed},
         )
 
 
 def _without(source: Source, frame: float) -> Source:
-    """What is keyed but for this frame. A channel with no other key holds its value."""
+    """What is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
     channels, rest = [], dict(source.rest)
     for rows, keys in source.channels:
         others = np.abs(keys.times - frame) >= SAME_FRAME
         if others.any():
-            channels.append((rows, keys if others.all() else keys.at(others)))
+            channels.append((rows, replace(keys.at(others), steps=())))
         else:
             rest |= dict(zip(rows, keys.values[:, 0].tolist(), strict=True))
     return replace(source, channels=tuple(channels), rest=rest)

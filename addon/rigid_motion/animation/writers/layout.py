@@ -139,7 +139,7 @@ class Layout:
 def _ends(source: Source) -> tuple[float, float]:
     """Where the outermost samples of a source lie."""
     first, last = source.frame_range
-    if source.goes_on and not source.repeats:
+    if (source.goes_on and not source.repeats) or source.steps:
         return float(first), float(last)
     begin, end = source.keyed_range
     return max(first, begin), min(last, end)

@@ -79,6 +79,23 @@ REFUSALS = {
         "{name}: {channel} hat einen Modifikator vom Typ {modifier} mit begrenztem Bereich oder Einfluss, dem starre "
         "Zwischenbilder nicht folgen können: stumm schalten, entfernen oder den Kanal backen (Graph Editor, Kanal)"
     ),
+    "{name}: {channel} has a modifier of type {modifier} that does not just add to it, which rigid in-betweens cannot "
+    "follow: have it add (Blend Type or Additive), mute or remove it, or bake the channel (Graph Editor, Channel)": (
+        "{name}: {channel} hat einen Modifikator vom Typ {modifier}, der nicht bloß etwas addiert, dem starre "
+        "Zwischenbilder nicht folgen können: addieren lassen (Mischtyp oder Additiv), stumm schalten, entfernen oder "
+        "den Kanal backen (Graph Editor, Kanal)"
+    ),
+    "{name}: {channel} and {other} have different Stepped modifiers, and rigid in-betweens hold all channels together: "
+    "copy one to the other (Graph Editor, sidebar, Modifiers), or mute them": (
+        "{name}: {channel} und {other} haben verschiedene gestufte Modifikatoren, und starre Zwischenbilder halten "
+        "alle Kanäle zusammen: einen auf den anderen kopieren (Graph Editor, Seitenleiste, Modifikatoren) oder stumm "
+        "schalten"
+    ),
+    "{name} has Stepped modifiers, or such as add to its channels: mute them while its keys are reduced, or bake them "
+    "into the keys first": (
+        "{name} hat gestufte Modifikatoren oder solche, die etwas zu Kanälen addieren: beim Reduzieren stumm schalten "
+        "oder zuerst in die Schlüsselbilder backen"
+    ),
     "{name}: {channel} is sampled and has no keys: turn its samples into keys "
     "(Graph Editor, Channel > Samples to Keys)": (
         "{name}: {channel} ist abgetastet und hat keine Schlüsselbilder: die Abtastwerte zu Schlüsselbildern machen "
