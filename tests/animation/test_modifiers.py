@@ -6,8 +6,7 @@ without modifiers, `tests.animation.oracle` says, with all of them muted.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -19,6 +18,7 @@ from rigid_motion.animation.curves import Stepped, held
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import key_bone, new_rig
+from tests.animation.modified import led_to, without_modifiers
 from tests.animation.oracle import Carrier, curves_of, expected_bases, key_frames, rotation_path, shown_worlds, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 
@@ -53,34 +53,8 @@ def modify(fcurves: Sequence[bpy.types.FCurve], kind: str, **settings: object) -
     return added
 
 
-def led_to(settings: dict[str, object], frames: np.ndarray) -> np.ndarray:
-    """The frames that Blender shows with such a modifier."""
-    action = bpy.data.actions.new("Frames")
-    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
-    fcurve = strip.channelbag(action.slots.new("OBJECT", "Frames"), ensure=True).fcurves.new("location")
-    for frame in (-1000.0, 1000.0):
-        fcurve.keyframe_points.insert(frame, frame).interpolation = "LINEAR"
-    modify([fcurve], "STEPPED", **settings)
-    found = np.array([fcurve.evaluate(frame) for frame in frames])
-    bpy.data.actions.remove(action)
-    return np.round(found, 3)
-
-
-@contextmanager
-def without_modifiers(carrier: Carrier) -> Iterator[None]:
-    """Modifiers but for Cycles are muted meanwhile; nothing is evaluated."""
-    found = [one for fcurve in channels(carrier) for one in fcurve.modifiers if one.type != "CYCLES" and not one.mute]
-    for one in found:
-        one.mute = True
-    try:
-        yield
-    finally:
-        for one in found:
-            one.mute = False
-
-
 def expected(carrier: Carrier, frames: np.ndarray, own=None) -> np.ndarray:
-    with without_modifiers(carrier):
+    with without_modifiers(channels(carrier)):
         return expected_bases(carrier, frames, own)
 
 
@@ -93,7 +67,7 @@ def test_the_frames_that_are_held_are_blenders(empty_file, settings):
     frames = np.arange(-30.0, 60.0, 0.25)
     ends = {name: settings[f"frame_{name}"] for name in ("start", "end") if settings.get(f"use_frame_{name}")}
     modifier = Stepped(settings["frame_step"], settings.get("frame_offset", 0.0), **ends)
-    np.testing.assert_allclose(held([modifier], frames), led_to(settings, frames), atol=1e-3)
+    np.testing.assert_allclose(held([modifier], frames), led_to([settings], frames), atol=1e-3)
 
 
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
@@ -103,7 +77,7 @@ def test_the_poses_of_every_mode_are_held(live_file, mode):
     key(obj, seed=2, scale="even")
     set_mode(obj, mode)
     modify(channels(obj), "STEPPED", **STEPS["threes, from zero"])
-    wanted = expected(obj, led_to(STEPS["threes, from zero"], PLAYED), own)
+    wanted = expected(obj, led_to([STEPS["threes, from zero"]], PLAYED), own)
     assert problem_of(obj) == ""
     assert_same(shown_worlds([obj], PLAYED)[0], wanted)
 
@@ -115,7 +89,7 @@ def test_holds_of_all_kinds(live_file, settings, frames, order):
     obj = key(new_object(rotation_mode=order), frames, seed=4)
     modify(channels(obj), "STEPPED", **settings)
     set_mode(obj, "dq_sclerp")
-    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to(settings, PLAYED)))
+    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to([settings], PLAYED)))
 
 
 @pytest.mark.parametrize("settings", STEPS.values(), ids=STEPS)
@@ -126,7 +100,7 @@ def test_bones_hold_their_poses(live_file, settings):
         if number:
             set_mode(bone, "motor_spline")
             modify(channels(bone), "STEPPED", **settings)
-    at = led_to(settings, PLAYED)
+    at = led_to([settings], PLAYED)
     bases = {bone.name: expected(bone, at if number else PLAYED) for number, bone in enumerate(rig.pose.bones)}
     assert_same_poses(rig, PLAYED, *shown_poses([rig], PLAYED), expected_poses(rig, PLAYED, bases))
 
@@ -139,7 +113,7 @@ def test_another_step_is_followed_and_so_is_muting(live_file):
         for one in added:
             one.frame_step = step
         bpy.context.view_layer.update()
-        assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to({"frame_step": step}, PLAYED)))
+        assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to([{"frame_step": step}], PLAYED)))
     for one in added:
         one.mute = True
     bpy.context.view_layer.update()
@@ -149,7 +123,7 @@ def test_another_step_is_followed_and_so_is_muting(live_file):
         one.mute = False
     moved.co_ui.y += 2.0
     bpy.context.view_layer.update()
-    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to({"frame_step": 3.0}, PLAYED)))
+    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to([{"frame_step": 3.0}], PLAYED)))
 
 
 def test_one_behind_another_and_a_channel_with_a_single_key(live_file):
@@ -160,7 +134,7 @@ def test_one_behind_another_and_a_channel_with_a_single_key(live_file):
     modify(moving, "STEPPED", frame_step=2.0)
     modify(moving, "STEPPED", frame_step=5.0, frame_offset=1.0)
     set_mode(obj, "cga_lerp")
-    at = led_to({"frame_step": 2.0}, led_to({"frame_step": 5.0, "frame_offset": 1.0}, PLAYED))
+    at = led_to([{"frame_step": 2.0}], led_to([{"frame_step": 5.0, "frame_offset": 1.0}], PLAYED))
     assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, at))
 
 
@@ -173,7 +147,7 @@ def test_cycles_are_held_too(live_file):
     bpy.context.scene.frame_end = 60
     bpy.context.view_layer.update()
     frames = np.arange(1.0, 60.0)
-    at = led_to({"frame_step": 3.0}, frames)
+    at = led_to([{"frame_step": 3.0}], frames)
     # A frame on a seam is the end of a round, as Blender has it.
     at = 21.0 - (21.0 - at) % 20.0
     assert_same(shown_worlds([obj], frames)[0], expected(obj, at))
@@ -202,7 +176,7 @@ def difference(carrier: Carrier, path: str, frames: np.ndarray) -> np.ndarray:
         return np.array([[fcurve.evaluate(frame) for fcurve in curves] for frame in frames])
 
     shown = values()
-    with without_modifiers(carrier):
+    with without_modifiers(channels(carrier)):
         return shown - values()
 
 
@@ -239,7 +213,7 @@ def test_what_is_added_to_a_rotation_turns_the_mode_by_what_it_turns_blenders(li
         ]
 
     noisy = turned()
-    with without_modifiers(obj):
+    with without_modifiers(channels(obj)):
         for number, (with_noise, without) in enumerate(zip(noisy, turned(), strict=True)):
             wanted[number, :3, :3] = wanted[number, :3, :3] @ np.array(without.inverted() @ with_noise)
     assert_same(shown_worlds([obj], PLAYED)[0], wanted)
@@ -381,7 +355,7 @@ def test_the_mode_channel_may_be_stepped_along_with_the_others(live_file):
     modify([*channels(obj), curves_of(obj)["rigid_motion.mode", 0]], "STEPPED", frame_step=6.0)
     assert problem_of(obj) == ""
     muted = curves_of(obj)["rigid_motion.mode", 0].modifiers[0]
-    at = led_to({"frame_step": 6.0}, PLAYED)
+    at = led_to([{"frame_step": 6.0}], PLAYED)
     shown = shown_worlds([obj], PLAYED)[0]
     muted.mute = True
     assert_same(shown, expected(obj, at))

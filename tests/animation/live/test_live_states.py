@@ -12,7 +12,7 @@ from hypothesis.stateful import initialize, invariant, precondition, rule
 from mathutils import Euler, Matrix
 
 from rigid_motion import animation
-from tests.animation.editing import LAST, ORDERS, Editing, frames_in, goes_on, seeds, shares
+from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
     Own,
@@ -31,13 +31,14 @@ from tests.animation.oracle import (
     unit,
 )
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
+from tests.animation.tool_steps import WithTools
 from tests.thoroughness import THOROUGH
 
 
-class EditingObjects(Editing):
+class EditingObjects(WithTools):
     """An animator at work on a few objects, by their names."""
 
-    KEPT = (*Editing.KEPT, "turned")
+    KEPT = (*WithTools.KEPT, "turned")
 
     def __init__(self) -> None:
         super().__init__()

@@ -192,15 +192,15 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
         return source.keyed_range
     if source.goes_on:
         return tuple(map(float, source.seen_range))
-    if source.steps or source.modified:
-        # Without its modifiers no part can be left as it is.
-        return tuple(map(float, source.frame_range)) if source.steps else source.keyed_range
     if (first is not None and first > keys[-1]) or (last is not None and last < keys[0]):
         raise Refused(
             rpt_("{name} has its keys from frame {first:g} to {last:g}: none of them is in that range").format(
                 name=transform.name, first=keys[0], last=keys[-1]
             )
         )
+    if source.steps or source.modified:
+        # Without its modifiers no part can be left as it is.
+        return tuple(map(float, source.frame_range)) if source.steps else source.keyed_range
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))

@@ -117,8 +117,8 @@ def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
 def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:
     """The mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
     moment = frame + 0.5 * SAME_FRAME
-    if any(modifier.type == "STEPPED" for modifier in fcurve.modifiers):
-        # The modes are those of the keys, whichever frames are held.
+    if any(modifier.type != "CYCLES" for modifier in fcurve.modifiers):
+        # The modes are those of the keys, whichever frames are held, and whatever is added.
         keys = [key.co for key in fcurve.keyframe_points]
         value = next((key.y for key in reversed(keys) if key.x <= moment), keys[0].y)
     else:
