@@ -237,3 +237,26 @@ def test_what_cannot_be_keyed_is_refused_and_the_others_are_keyed(live_file):
     assert NOW in key_frames(good).tolist()
     assert NOW not in key_frames(bad).tolist()
     assert sorted(str(one).split(" ")[0] for one in refused) == ["Bad", "Idle"]
+
+
+def test_a_breakdown_below_noise_and_holds_is_that_of_the_keys(live_file):
+    poses = []
+    for with_modifiers in (False, True):
+        obj = key(new_object(), seed=6)
+        set_mode(obj, "dq_sclerp")
+        if with_modifiers:
+            for (path, _), fcurve in curves_of(obj).items():
+                if path in ("location", "rotation_quaternion"):
+                    fcurve.modifiers.new("STEPPED").frame_step = 5.0
+            curves_of(obj)["location", 0].modifiers.new("NOISE").strength = 3.0
+            bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(int(NOW))
+        breakdown(obj, 0.4)
+        poses.append(
+            [
+                next(one.co[1] for one in fcurve.keyframe_points if one.co[0] == NOW)
+                for (path, _), fcurve in curves_of(obj).items()
+                if path in ("location", "rotation_quaternion")
+            ]
+        )
+    np.testing.assert_allclose(*poses, atol=1e-6)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -116,6 +116,13 @@ class Source:
     def steps(self) -> tuple[Stepped, ...]:
         """The Stepped modifiers that all channels have in common; those with a single key need not have them."""
         return next((keys.steps for keys in self.curves if keys.steps), ())
+
+    @property
+    def unheld(self) -> Source:
+        """The same without Stepped modifiers."""
+        if not self.steps:
+            return self
+        return replace(self, channels=tuple((rows, replace(keys, steps=())) for rows, keys in self.channels))
 
     def held(self, frames: np.ndarray) -> np.ndarray:
         """The frames (m,) whose poses are shown on these ones (m,)."""

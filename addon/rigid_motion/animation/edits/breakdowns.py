@@ -223,10 +223,10 @@ def _without(source: Source, frame: float) -> Source:
     for rows, keys in source.channels:
         others = np.abs(keys.times - frame) >= SAME_FRAME
         if others.any():
-            channels.append((rows, replace(keys.at(others), steps=())))
+            channels.append((rows, keys if others.all() else keys.at(others)))
         else:
             rest |= dict(zip(rows, keys.values[:, 0].tolist(), strict=True))
-    return replace(source, channels=tuple(channels), rest=rest)
+    return replace(source, channels=tuple(channels), rest=rest).unheld
 
 
 def _is_on(key: bpy.types.Keyframe, frame: float) -> bool:
