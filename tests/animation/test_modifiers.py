@@ -19,7 +19,16 @@ from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
 from tests.animation.bones.rigs import key_bone, new_rig
 from tests.animation.modified import led_to, without_modifiers
-from tests.animation.oracle import Carrier, curves_of, expected_bases, key_frames, rotation_path, shown_worlds, snapshot
+from tests.animation.oracle import (
+    Carrier,
+    curves_of,
+    expected_bases,
+    expected_off_whole_frames,
+    key_frames,
+    rotation_path,
+    shown_worlds,
+    snapshot,
+)
 from tests.animation.scenes import give_own_deltas, key, new_object
 
 PLAYED = np.arange(-9.0, 52.0)
@@ -28,11 +37,12 @@ STEPS: dict[str, dict[str, object]] = {
     "twos": {"frame_step": 2.0, "frame_offset": 1.0},
     "threes, from zero": {"frame_step": 3.0},
     "long, behind the offset": {"frame_step": 7.0, "frame_offset": 20.0},
-    "no whole number": {"frame_step": 2.5, "frame_offset": 0.5},
     "from a frame on": {"frame_step": 4.0, "use_frame_start": True, "frame_start": 9.0},
     "up to a frame": {"frame_step": 4.0, "frame_offset": 1.0, "use_frame_end": True, "frame_end": 26.0},
 }
-"""Settings of a Stepped modifier."""
+"""Settings of a Stepped modifier that leads to whole frames."""
+
+BROKEN = {"frame_step": 2.5, "frame_offset": 0.5}
 
 
 def channels(carrier: Carrier) -> list[bpy.types.FCurve]:
@@ -62,7 +72,12 @@ def assert_same(shown: np.ndarray, wanted: np.ndarray) -> None:
     np.testing.assert_allclose(shown, wanted, rtol=0, atol=2e-5 * max(1.0, np.abs(wanted).max()))
 
 
-@pytest.mark.parametrize("settings", STEPS.values(), ids=STEPS)
+def played(settings: dict[str, object]) -> np.ndarray:
+    """Quarter frames where all of them are held: what is held is exact between frames, too."""
+    return PLAYED if "use_frame_start" in settings or "use_frame_end" in settings else np.arange(-9.0, 52.0, 0.25)
+
+
+@pytest.mark.parametrize("settings", [*STEPS.values(), BROKEN], ids=[*STEPS, "broken"])
 def test_the_frames_that_are_held_are_blenders(empty_file, settings):
     frames = np.arange(-30.0, 60.0, 0.25)
     ends = {name: settings[f"frame_{name}"] for name in ("start", "end") if settings.get(f"use_frame_{name}")}
@@ -89,7 +104,18 @@ def test_holds_of_all_kinds(live_file, settings, frames, order):
     obj = key(new_object(rotation_mode=order), frames, seed=4)
     modify(channels(obj), "STEPPED", **settings)
     set_mode(obj, "dq_sclerp")
-    assert_same(shown_worlds([obj], PLAYED)[0], expected(obj, led_to([settings], PLAYED)))
+    frames = played(settings)
+    assert_same(shown_worlds([obj], frames)[0], expected(obj, led_to([settings], frames)))
+
+
+def test_a_hold_between_whole_frames_is_as_exact_as_these_are(live_file):
+    obj = key(new_object(), seed=4)
+    modify(channels(obj), "STEPPED", **BROKEN)
+    set_mode(obj, "dq_sclerp")
+    frames = np.arange(1.0, 40.0)
+    shown = shown_worlds([obj], frames)[0]
+    with without_modifiers(channels(obj)):
+        assert_same(shown, expected_off_whole_frames(obj, led_to([BROKEN], frames)))
 
 
 @pytest.mark.parametrize("settings", STEPS.values(), ids=STEPS)
@@ -100,9 +126,10 @@ def test_bones_hold_their_poses(live_file, settings):
         if number:
             set_mode(bone, "motor_spline")
             modify(channels(bone), "STEPPED", **settings)
-    at = led_to([settings], PLAYED)
-    bases = {bone.name: expected(bone, at if number else PLAYED) for number, bone in enumerate(rig.pose.bones)}
-    assert_same_poses(rig, PLAYED, *shown_poses([rig], PLAYED), expected_poses(rig, PLAYED, bases))
+    frames = played(settings)
+    at = led_to([settings], frames)
+    bases = {bone.name: expected(bone, at if number else frames) for number, bone in enumerate(rig.pose.bones)}
+    assert_same_poses(rig, frames, *shown_poses([rig], frames), expected_poses(rig, frames, bases))
 
 
 def test_another_step_is_followed_and_so_is_muting(live_file):
@@ -256,16 +283,16 @@ def test_a_bake_has_what_was_seen_and_comes_undone(live_file, carrier, kind):
         modify([curves_of(found)["location", 0], rotation], "NOISE", strength=0.5, scale=6.0)
     frames = np.arange(1.0, 47.0) if kind == "stepped" else np.arange(1.0, 41.0)
 
-    def played() -> np.ndarray:
+    def seen() -> np.ndarray:
         return shown_poses([rig], frames)[0]["Upper"] if carrier == "bone" else shown_worlds([found], frames)[0]
 
-    before, keyed = played(), snapshot(found)
+    before, keyed = seen(), snapshot(found)
     bake(found, first=12.0, last=15.0)
     assert not any(fcurve.modifiers for fcurve in channels(found))
-    assert_same(played(), before)
+    assert_same(seen(), before)
     unbake(found)
     assert snapshot(found) == keyed
-    assert_same(played(), before)
+    assert_same(seen(), before)
 
 
 @pytest.mark.parametrize("kind", ["object", "bone"])

@@ -55,7 +55,7 @@ class WithTools(Editing):
             assert np.abs(now - then).max() < 2e-5 * max(1.0, np.abs(then).max()), f"{name}: {now}\nis not\n{then}"
 
     @precondition(lambda self: self.on)
-    @rule(who=shares, step=st.sampled_from((None, 2.0, 3.0, 2.5)), offset=st.sampled_from((0.0, 1.0, 30.0)), seed=seeds)
+    @rule(who=shares, step=st.sampled_from((None, 2.0, 3.0, 7.0)), offset=st.sampled_from((0.0, 1.0, 30.0)), seed=seeds)
     def look_at_it_held_or_shaken_and_take_that_off(self, who, step, offset, seed):
         name = self._named(who)
 

@@ -6,7 +6,6 @@ source_cache  the sources of earlier edits, and what has changed since
 bodies        channels as poses of a body
 key_speeds    how fast a smooth motion with handles passes its keys
 neighbours    the keys beside a segment, for modes that look at them
-holds         moments that are held from before
 differences   from sources to differences
 
 Each module imports only those above it.

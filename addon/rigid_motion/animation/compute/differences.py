@@ -25,7 +25,6 @@ from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-from .holds import at_moments
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, with_neighbours
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
@@ -86,15 +85,17 @@ def in_betweens(
         How far the body has come in its segment on these frames, 0 to 1 and beyond, instead of what the channels say.
     """
     frames = np.asarray(frames, dtype=np.float64)
-    native, delta = np.empty((2, _height([source]), len(frames)))
+    moments, places = np.unique(source.held(frames), return_inverse=True) if source.steps else (frames, slice(None))
+    native, delta = np.empty((2, _height([source]), len(moments)))
     delta = delta[: _filled_height([source])]
     if len(source.key_frames) > 1:
-        at_moments(_move, [source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode], progress)
+        _move([source], [moments], native, delta, None if mode is None else MODE_NUMBERS[mode], progress)
     else:
         # Without a segment there is nothing to fill in.
-        _sampled([(source, slice(len(frames)))], [frames], out=native)
+        _sampled([(source, slice(len(moments)))], [moments], out=native)
         turn_into_quaternions(native, source.order)
         delta[:] = source.original[: len(delta), None]
+    native, delta = native[:, places], delta[:, places]
 
     def moved_by(deltas: np.ndarray) -> Poses:
         positions = (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T
@@ -111,7 +112,8 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
     """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
-    location is added, scale multiplied. Components that are the source's original ones throughout are left out.
+    location is added, scale multiplied. Components that are the source's original ones throughout are left out. Holds
+    are left to the F-curves that the differences go into.
 
     `ranges` are the first and last frames that are wanted of each, in place of those of the source. Then no component
     is left out that may differ elsewhere.
@@ -128,7 +130,7 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, _height(portion), samples[-1][1].stop))
         delta = rows[: _filled_height(portion)]
-        at_moments(_move, portion, frames, rows, delta)
+        _move(portion, frames, rows, delta)
         order = portion[0].order
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):

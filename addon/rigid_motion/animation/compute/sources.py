@@ -176,7 +176,7 @@ class Source:
         turn about one and the same axis; and where no mode looks at keys that only some of the rounds have.
         """
         cyclic = self.cyclic
-        if cyclic is None or self.steps:
+        if cyclic is None:
             return False
         cycles, ends = cyclic.cycles, self.keyed_range
         if any(keys.cycles != cycles or tuple(keys.times[[0, -1]]) != ends for keys in self.curves):
@@ -243,11 +243,6 @@ class Source:
         if self.cyclic is None and self.is_live:
             live = np.flatnonzero(self.modes)
             first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
-        if self.steps:
-            # A hold shows an in-between until after the last key, and Blender's ones before the offset show it early.
-            longest = sum(one.step for one in self.steps)
-            last += longest
-            first -= longest if any(first < one.offset for one in self.steps) else 0.0
         return math.floor(first), math.ceil(last)
 
     @cached_property
@@ -256,7 +251,9 @@ class Source:
         as far as it is looked at."""
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
-            first, last = min(first, self.seen[0]), max(last, self.seen[1])
+            # What is held there may be from before, or before an offset from behind.
+            longest = sum(one.step for one in self.steps)
+            first, last = min(first, self.seen[0] - longest), max(last, self.seen[1] + longest)
         return math.floor(first), math.ceil(last)
 
     @property
