@@ -277,7 +277,7 @@ def test_a_bake_has_what_was_seen_and_comes_undone(live_file, carrier, kind):
         found = key(new_object(rotation_mode="XYZ" if carrier == "Euler object" else "QUATERNION"), seed=3)
     set_mode(found, "dq_sclerp")
     if kind != "noise":
-        modify(channels(found), "STEPPED", frame_step=3.0, frame_offset=1.0)
+        modify(channels(found), "STEPPED", frame_step=3.0)
     if kind != "stepped":
         rotation = curves_of(found)[rotation_path(found), 2]
         modify([curves_of(found)["location", 0], rotation], "NOISE", strength=0.5, scale=6.0)

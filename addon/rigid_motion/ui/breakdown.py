@@ -59,6 +59,8 @@ class _Breakdown(OnTargets):
         return self.act(targets, key)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if context.area is None:
+            return self.execute(context)
         self._targets, self._refused = targets_of(context), []
         self._breakdowns = animation.Breakdowns(self._targets, self.kind, refused=self._refused)
         if not self._breakdowns:

@@ -200,7 +200,7 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
         )
     if source.steps or source.modified:
         # Without its modifiers no part can be left as it is.
-        return tuple(map(float, source.frame_range)) if source.steps else source.keyed_range
+        return source.held_range
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))

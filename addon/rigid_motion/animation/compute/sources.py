@@ -245,6 +245,16 @@ class Source:
             first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
         return math.floor(first), math.ceil(last)
 
+    @property
+    def held_range(self) -> tuple[float, float]:
+        """The first and the last frame on which there may be anything between keys: holds show it behind these, too."""
+        (first, last), longest = self.keyed_range, self._longest_hold
+        return (first - longest if any(first < one.offset for one in self.steps) else first), last + longest
+
+    @property
+    def _longest_hold(self) -> float:
+        return sum(one.step for one in self.steps)
+
     @cached_property
     def seen_range(self) -> tuple[int, int]:
         """The first and last whole frame that there is something to be seen on: where it goes on outside of its keys,
@@ -252,7 +262,7 @@ class Source:
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
             # What is held there may be from before, or before an offset from behind.
-            longest = sum(one.step for one in self.steps)
+            longest = self._longest_hold
             first, last = min(first, self.seen[0] - longest), max(last, self.seen[1] + longest)
         return math.floor(first), math.ceil(last)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -92,10 +93,15 @@ class _Between:
     def mode(self) -> str:
         return MODE_NAMES[self.source.mode_at(self.ends[0] + SAME_FRAME)]
 
+    @cached_property
+    def _values_at_ends(self) -> np.ndarray:
+        """The components at both keys, shape (2, 10)."""
+        return self.source.values_at(np.array(self.ends)).T
+
     def pose(self, kind: str, factor: float) -> np.ndarray:
         """The components to be keyed, shape (10,)."""
         if kind == BREAKDOWN:
-            first, last = self.source.values_at(np.array(self.ends)).T
+            first, last = self._values_at_ends
             straight = first + factor * (last - first)
             if self.mode == "BLENDER" and self.source.order is not None:
                 return straight
