@@ -78,6 +78,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "--step", type=_step, metavar="N", help="frames from key to key; 0.25 for keys between the frames (1)"
     )
     keys.add_argument(
+        "--hold",
+        action="store_true",
+        default=None,
+        help="hold each pose until the next key: with --step 2 the motion is on twos (straight lines)",
+    )
+    keys.add_argument(
         "--first",
         type=_frame,
         metavar="FRAME",
@@ -87,12 +93,15 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add_file_options(parser)
     options = parser.parse_args(arguments)
     if options.unbake:
-        for option in ("step", "first", "last"):
+        for option in ("step", "hold", "first", "last"):
             if getattr(options, option) is not None:
                 parser.error(f"--{option} is for baking, and says nothing to --unbake: leave it out")
     if None not in (options.first, options.last) and options.first > options.last:
         parser.error(f"--last {options.last:g} is before --first {options.first:g}")
-    options.action = unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last)
+    interpolation = "CONSTANT" if options.hold else "LINEAR"
+    options.action = (
+        unbaking() if options.unbake else baking(options.step or 1.0, options.first, options.last, interpolation)
+    )
     try:
         refuse_odd_places(options)
         options.jobs = jobs_of(

@@ -18,6 +18,7 @@ from mathutils import Euler, Quaternion
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, normalise
+from tests.animation.modified import acting, held_frames, without_modifiers
 from tests.animation.smooth_oracle import share_of, with_tangents
 from tests.animation.spin_oracle import Spin, spin_by_angles, with_channel
 
@@ -112,9 +113,16 @@ def expected_bases(
 ) -> np.ndarray:
     """What moves the object in its parent's space. `FCurve.evaluate` is asked on each frame, extrapolation included.
 
-    Segments run between `keys`, by default the object's own: cycles have more.
+    Segments run between `keys`, by default the object's own: cycles have more. Stepped modifiers hold the poses, and
+    what others do to the location is added; those of other channels are left out.
     """
-    return matrices(*_components(obj, frames, own, keys))
+    fcurves = [fcurve for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS]
+    if not acting(fcurves):
+        return matrices(*_components(obj, frames, own, keys))
+    moved, held = _channels(obj, "location", frames), held_frames(fcurves, frames)
+    with without_modifiers(fcurves):
+        location, quaternion, scale = _components(obj, held, own, keys)
+        return matrices(location + moved - _channels(obj, "location", held), quaternion, scale)
 
 
 def expected_off_whole_frames(obj: Carrier, frames: Sequence[float], own: Own | None = None) -> np.ndarray:

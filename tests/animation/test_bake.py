@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, write_channel
+from rigid_motion.animation import bake, bake_poses, read_poses, set_mode, unbake, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from rigid_motion.motion.eulers import ORDERS
 from rigid_motion.motion.quaternions import angle_between, multiply, rotate
-from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds
+from tests.animation.oracle import assert_shown, curves_of, expected_worlds, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, key, new_object
 
 
@@ -181,6 +181,39 @@ def test_each_axis_of_a_scale_that_is_left_to_blender_is_baked_by_itself(live_fi
     assert_shown([obj], frames)
     bake(obj)
     assert np.abs(shown_worlds([obj], frames)[0] - wanted).max() < 1e-5 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+@pytest.mark.parametrize("step", [2.0, 3.0])
+def test_a_bake_on_twos_or_threes_holds_the_poses_of_the_mode(live_file, order, step):
+    obj = key(new_object(rotation_mode=order), seed=3, scale="even")
+    set_mode(obj, "cga_slerp")
+    keyed = snapshot(obj)
+    grid = np.union1d(np.arange(FRAMES[0], FRAMES[-1] + 0.5, step), FRAMES)
+    frames = np.arange(-3.0, 45.0, 0.25)
+    held = grid[np.clip(np.searchsorted(grid, frames, side="right") - 1, 0, None)]
+    wanted = expected_worlds(obj, held)
+    bake(obj, step=step, interpolation="CONSTANT")
+    np.testing.assert_allclose(shown_worlds([obj], frames)[0], wanted, rtol=0, atol=1e-5 * np.abs(wanted).max())
+    for fcurve in curves_of(obj).values():
+        assert {point.interpolation for point in fcurve.keyframe_points} <= {"CONSTANT"}
+    unbake(obj)
+    assert snapshot(obj) == keyed
+
+
+def test_a_bake_of_a_part_holds_there_and_moves_on_behind_it(live_file):
+    obj = key(new_object(), seed=3)
+    set_mode(obj, "dq_sclerp")
+    frames = np.arange(1.0, 41.0)
+    held = np.where((frames >= 11.0) & (frames < 24.0), 11.0 + 2.0 * np.floor((frames - 11.0) / 2.0), frames)
+    wanted = expected_worlds(obj, held)
+    bake(obj, step=2.0, first=12.0, last=20.0, interpolation="CONSTANT")
+    np.testing.assert_allclose(shown_worlds([obj], frames)[0], wanted, rtol=0, atol=1e-5 * np.abs(wanted).max())
+
+
+def test_only_lines_and_holds_are_baked(live_file):
+    with pytest.raises(ValueError, match="interpolation: LINEAR or CONSTANT, not 'BEZIER'"):
+        bake(key(new_object()), interpolation="BEZIER")
 
 
 def test_delta_scales_that_cancel_out_leave_the_scale_to_blender(live_file):

@@ -634,7 +634,10 @@ def solved():
         (with_(driven), r"Tool: Location Z is driven"),
         (with_(tweak), r"Tool: leave the strip that is being edited first"),
         (with_(lambda obj: setattr(obj, "rotation_mode", "AXIS_ANGLE")), r"Tool turns by axis and angle"),
-        (with_(lambda obj: curves_of(obj)["location", 1].modifiers.new("NOISE")), r"Tool: Location Y has a modifier"),
+        (
+            with_(lambda obj: curves_of(obj)["location", 1].modifiers.new("NOISE")),
+            r"Tool has Stepped modifiers, or such",
+        ),
         (with_(lambda obj: curves_of(obj)["location", 1].convert_to_samples(1, 50)), r"Samples to Keys"),
         (lambda: key(new_object(), [1.0]), "Tool has 1 key of location, rotation or scale: there is nothing to reduce"),
         (

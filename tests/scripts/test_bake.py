@@ -84,7 +84,7 @@ def fill_shot() -> None:
     refused["Crane"].driver_add("location", 0).driver.expression = "frame"
     curves_of(refused["Future"])["rigid_motion.mode", 0].keyframe_points[1].co.y = 42.0
     curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
-    curves_of(refused["Noisy"])["location", 0].modifiers.new("NOISE")
+    curves_of(refused["Noisy"])["location", 0].modifiers.new("NOISE").blend_type = "MULTIPLY"
 
 
 @pytest.fixture(scope="module")
@@ -233,6 +233,15 @@ def test_steps_and_ranges(tmp_path, options, wanted):
     assert run(path, *options) == 0
     open_again(baked_name(path))
     assert frames_of_keys(bpy.data.objects["Tool"]) == wanted
+
+
+@pytest.mark.parametrize(("options", "wanted"), [((), "LINEAR"), (("--hold",), "CONSTANT")])
+def test_poses_are_held_where_that_is_asked_for(tmp_path, options, wanted):
+    path = one_object_file(tmp_path / "shot.blend")
+    assert run(path, "--step", "2", *options) == 0
+    open_again(baked_name(path))
+    curves = curves_of(bpy.data.objects["Tool"])
+    assert {key.interpolation for curve in curves.values() for key in curve.keyframe_points[:-1]} == {wanted}
 
 
 def test_objects_can_be_chosen_by_names_and_patterns(shot, tmp_path, capsys):

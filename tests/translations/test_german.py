@@ -60,6 +60,7 @@ UNSEEN = {
     "a mode for keyframes can look one key behind and ahead of a segment: see with_neighbours",
     ": rotation by axis and angle cannot be baked; set its rotation mode to Quaternion first",
     " frames do not fit poses of shape ",
+    "interpolation: LINEAR or CONSTANT, not ",
     "list[FewerKeys] | Refused",
 }
 """Literals with words that no user reads in the interface."""

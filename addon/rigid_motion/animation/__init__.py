@@ -31,6 +31,7 @@ from .baking.reducing import (
 )
 from .baking.sizes import radius_of
 from .compute.sources import MODE_IDS
+from .edits.breakdowns import Breakdowns, breakdown
 from .edits.mode_keys import set_mode, set_turns
 from .edits.repair import constraint_trouble, restore_constraints
 from .live import edit_mode, follower
@@ -41,12 +42,14 @@ from .transforms import Refused
 
 __all__ = [
     "MODE_IDS",
+    "Breakdowns",
     "NeedsItsKeys",
     "Reduction",
     "Refused",
     "WholeRig",
     "bake",
     "bake_poses",
+    "breakdown",
     "channelbag_of",
     "constraint_trouble",
     "discard_dense_keys",

@@ -6,6 +6,8 @@ menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
 look         how they look                              wording      labels and texts
+bake         the one that bakes, with its dialog        slider       a factor, dragged with the mouse
+breakdown    those that key poses by a slider
 preferences  of the extension                           manual       where the documentation is
 turn_operator  whole turns between keys
 """
@@ -14,9 +16,16 @@ from __future__ import annotations
 
 import bpy
 
-from . import keymap, manual, menus, operators, overlay, panels, preferences, shown, turn_operator
+from . import breakdown, keymap, manual, menus, operators, overlay, panels, preferences, shown, turn_operator
 
-CLASSES = (*preferences.CLASSES, *operators.CLASSES, *turn_operator.CLASSES, *menus.CLASSES, *panels.CLASSES)
+CLASSES = (
+    *preferences.CLASSES,
+    *operators.CLASSES,
+    *turn_operator.CLASSES,
+    *breakdown.CLASSES,
+    *menus.CLASSES,
+    *panels.CLASSES,
+)
 
 
 def register() -> None:

@@ -31,8 +31,16 @@ def _draw_modes(
         properties.mode, properties.on = mode, scope
 
 
+def _draw_breakdowns(layout: bpy.types.UILayout) -> None:
+    layout.separator()
+    layout.operator("rigid_motion.push")
+    layout.operator("rigid_motion.relax")
+    layout.operator("rigid_motion.breakdown")
+
+
 def _draw_rest(layout: bpy.types.UILayout, pie: str, *, posing: bool) -> None:
     layout.operator("rigid_motion.set_turns", text="Set Turns...")
+    _draw_breakdowns(layout)
     layout.separator()
     layout.operator("rigid_motion.bake", text="Bake to Keys...")
     layout.operator("rigid_motion.unbake")
@@ -171,6 +179,10 @@ def _draw_keys(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     self.layout.menu(RIGID_MOTION_MT_keys.__name__)
 
 
+def _draw_in_betweens(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    _draw_breakdowns(self.layout)
+
+
 ENTRIES = {
     "DOPESHEET_MT_key": _draw_keys,
     "DOPESHEET_MT_context_menu": _draw_keys,
@@ -179,6 +191,7 @@ ENTRIES = {
     "VIEW3D_MT_object_animation": _draw_in_view,
     "VIEW3D_MT_object_context_menu": _draw_in_view,
     "VIEW3D_MT_pose_context_menu": _draw_in_view,
+    "VIEW3D_MT_pose_slide": _draw_in_betweens,
 }
 """Blender's menus, and what is appended to each. That of Object > Animation is the one of Pose > Animation too."""
 

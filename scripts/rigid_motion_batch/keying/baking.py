@@ -21,14 +21,18 @@ FEW = 4
 """As many bones are named; of more it is said how many they are."""
 
 
-def baking(step: float, first: float | None, last: float | None) -> Action:
-    """Keys on every `step` frames, from `first` to `last`."""
+def baking(step: float, first: float | None, last: float | None, interpolation: str) -> Action:
+    """Keys of this interpolation on every `step` frames, from `first` to `last`."""
 
     def bake(targets: Sequence[Transform]) -> Result:
         problems = {target: problem for target in targets if (problem := animation.problem_of(target))}
         fit = [target for target in targets if target not in problems]
         modes, refusals = modes_of(fit), []
-        begin, end = animation.bake(fit, step=step, first=first, last=last, refused=refusals) if fit else (0.0, 0.0)
+        begin, end = (
+            animation.bake(fit, step=step, first=first, last=last, interpolation=interpolation, refused=refusals)
+            if fit
+            else (0.0, 0.0)
+        )
         return _result(targets, modes, problems | _by_target(refusals, fit), f", frames {begin:g} to {end:g}")
 
     return Action("Baking", "baked", "-baked", with_rigid_segments, bake)

@@ -79,10 +79,13 @@ def far_off(obj: bpy.types.Object) -> None:
 
 HINDRANCES = {
     "axis and angle": (turned_by_axis_and_angle, "turns by axis and angle.*set its rotation mode to Quaternion"),
-    "noise": (modifier("NOISE"), "Location Y has a modifier of type Noise.*mute or remove it, or bake"),
+    "noise": (
+        modifier("NOISE", blend_type="MULTIPLY"),
+        "Location Y has a modifier of type Noise that does not just add.*mute or remove it, or bake",
+    ),
     "generator": (modifier("GENERATOR"), "Location Y has a modifier of type Generator.*mute or remove"),
     "limits": (modifier("LIMITS", "rotation_quaternion"), "Rotation Quaternion X has a modifier of type Limits"),
-    "stepped": (modifier("STEPPED"), "Location Y has a modifier of type Stepped"),
+    "stepped alone": (modifier("STEPPED"), "Location X and Location Y have different Stepped modifiers"),
     "envelope": (modifier("ENVELOPE"), "Location Y has a modifier of type Envelope"),
     "built-in function": (modifier("FNGENERATOR"), "Location Y has a modifier of type Built-In Function"),
     "cycles in a range": (modifier("CYCLES", use_restricted_range=True), "type Cycles with a restricted range"),

@@ -51,7 +51,10 @@ def not_a_number(bone: bpy.types.PoseBone) -> None:
 
 HINDRANCES: dict[str, tuple[Hinder, str]] = {
     "axis and angle": (turned_by_axis_and_angle, "turns by axis and angle.*set its rotation mode to Quaternion"),
-    "noise": (modifier("NOISE"), "Location Y has a modifier of type Noise.*mute or remove it, or bake"),
+    "noise": (
+        modifier("NOISE", blend_type="MULTIPLY"),
+        "Location Y has a modifier of type Noise that does not just add.*mute or remove it, or bake",
+    ),
     "cycles in part": (modifier("CYCLES", use_influence=True, influence=0.5), "restricted range or influence"),
     "driven location": (driver("location", 2), "Location Z is driven: remove the driver, or bake it"),
     "driven rotation": (driver("rotation_quaternion", 0), "Rotation Quaternion W is driven"),

@@ -12,7 +12,7 @@ from hypothesis.stateful import initialize, invariant, precondition, rule
 from mathutils import Euler, Matrix
 
 from rigid_motion import animation
-from tests.animation.editing import LAST, ORDERS, Editing, frames_in, goes_on, seeds, shares
+from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
     Own,
@@ -31,13 +31,14 @@ from tests.animation.oracle import (
     unit,
 )
 from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, random_values
+from tests.animation.tool_steps import WithTools
 from tests.thoroughness import THOROUGH
 
 
-class EditingObjects(Editing):
+class EditingObjects(WithTools):
     """An animator at work on a few objects, by their names."""
 
-    KEPT = (*Editing.KEPT, "turned")
+    KEPT = (*WithTools.KEPT, "turned")
 
     def __init__(self) -> None:
         super().__init__()
@@ -101,8 +102,13 @@ class EditingObjects(Editing):
         self._edit(change)
 
     @precondition(lambda self: self.on)
-    @rule(who=shares, step=st.sampled_from((1.0, 0.5, 3.0)), ends=st.none() | st.tuples(frames_in, frames_in))
-    def bake(self, who, step, ends):
+    @rule(
+        who=shares,
+        step=st.sampled_from((1.0, 0.5, 3.0)),
+        ends=st.none() | st.tuples(frames_in, frames_in),
+        interpolation=st.sampled_from(("LINEAR", "CONSTANT")),
+    )
+    def bake(self, who, step, ends, interpolation):
         obj = self._object(who)
         if len(self._sharing(obj.name)) > 1:
             return
@@ -116,7 +122,8 @@ class EditingObjects(Editing):
 
         def change() -> None:
             with suppress(animation.Refused):
-                baked.extend(animation.bake(bpy.data.objects[name], step=step, first=first, last=last))
+                found = bpy.data.objects[name]
+                baked.extend(animation.bake(found, step=step, first=first, last=last, interpolation=interpolation))
 
         self._edit(change)
         obj = bpy.data.objects[name]

@@ -10,10 +10,11 @@ import bpy
 import numpy as np
 
 from ..curves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
+from ..curves.steps import Stepped
 
 
 def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
-    """The keys of F-curves, and the first Cycles modifier of each that is not muted; none of their other modifiers.
+    """The keys of F-curves, the first Cycles modifier and the Stepped ones of each; none of their other modifiers.
 
     Parameters
     ----------
@@ -29,12 +30,13 @@ def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[
     for owner, curves in enumerate(fcurves):
         for place, fcurve in enumerate(curves):
             keys = fcurve.keyframe_points
-            cycles = _read_cycles(fcurve.modifiers) if fcurve.modifiers else None
-            batches.setdefault((len(keys), fcurve.extrapolation, cycles), []).append((owner, place, keys))
+            modifiers = fcurve.modifiers
+            cycles, steps = (_read_cycles(modifiers), read_steps(modifiers)) if modifiers else (None, ())
+            batches.setdefault((len(keys), fcurve.extrapolation, cycles, steps), []).append((owner, place, keys))
     result: list[list[tuple[list[int], Keys]]] = [[] for _ in fcurves]
-    for (_, extrapolation, cycles), batch in batches.items():
+    for (_, extrapolation, cycles, steps), batch in batches.items():
         owners, places, channels = zip(*batch, strict=True)
-        for rows, keys in _read_batch(owners, channels, extrapolation == "LINEAR", cycles):
+        for rows, keys in _read_batch(owners, channels, extrapolation == "LINEAR", cycles, steps):
             result[owners[rows[0]]].append(([places[row] for row in rows], keys))
     for keys_of_owner in result:
         keys_of_owner.sort(key=lambda pair: pair[0])
@@ -42,7 +44,7 @@ def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[
 
 
 def _read_batch(
-    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None
+    owners: Sequence[int], channels: Sequence, linear: bool, cycles: Cycles | None, steps: tuple[Stepped, ...]
 ) -> Iterator[tuple[list[int], Keys]]:
     """The keys of channels, from their `keyframe_points` with equally many each: the rows of those keyed together."""
     points = _read_property("co", channels, np.float32, 2)
@@ -74,7 +76,7 @@ def _read_batch(
     for number, (rows, at) in enumerate(zip(groups, slices, strict=True)):
         handles = (left[at], right[at]) if curved[number] else (None, None)
         easings = (easing[at], np.stack([values[at] for values in settings])) if eased[number] else (None, None)
-        yield rows, Keys(points[at], interpolation[at], *handles, *easings, linear, cycles, bool(sound[number]))
+        yield rows, Keys(points[at], interpolation[at], *handles, *easings, linear, cycles, steps, bool(sound[number]))
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
@@ -108,3 +110,17 @@ def _read_cycles(modifiers: Iterable[bpy.types.FModifier]) -> Cycles | None:
         if modifier.type == "CYCLES" and not modifier.mute:
             return Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
     return None
+
+
+def read_steps(modifiers: Iterable[bpy.types.FModifier]) -> tuple[Stepped, ...]:
+    """The Stepped modifiers of an F-curve that are not muted, first to last."""
+    return tuple(
+        Stepped(
+            modifier.frame_step,
+            modifier.frame_offset,
+            modifier.frame_start if modifier.use_frame_start else -np.inf,
+            modifier.frame_end if modifier.use_frame_end else np.inf,
+        )
+        for modifier in modifiers
+        if modifier.type == "STEPPED" and not modifier.mute
+    )

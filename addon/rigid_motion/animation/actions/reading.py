@@ -12,8 +12,9 @@ from ..compute.sources import Source
 from ..curves import Keys
 from ..transforms import Refused, Transform
 from .key_reading import read_keys
+from .modifiers import is_modified
 from .records import recorded, recorded_digest, recorded_mode
-from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
+from .refusals import refuse_channel, refuse_different_steps, refuse_numbers, refuse_what_is_taken
 from .slots import SlotTransform
 
 
@@ -129,6 +130,9 @@ class _Keyed:
     turns: list[bpy.types.FCurve]
     """The channel of turns likewise."""
 
+    modified: frozenset[int]
+    """The rows of channels that modifiers add something to."""
+
 
 def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
@@ -138,6 +142,9 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.
         fcurve = place.curves.get(channel)
         if fcurve is not None and _has_say(user, fcurve):
             keyed[row] = fcurve
+    has_modifiers = [row for row, fcurve in keyed.items() if fcurve.modifiers]
+    if has_modifiers:
+        refuse_different_steps(user.name, keyed.values())
     names = frozenset(map(PART_OF.__getitem__, keyed))
     rest = {
         row: getattr(user.carrier, path.removeprefix(user.prefix))[index]
@@ -148,7 +155,8 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.
         [fcurve] if (fcurve := place.curves.get(channel)) is not None and _has_say(user, fcurve) else []
         for channel in (user.mode_channel, user.turns_channel)
     )
-    return _Keyed(user, names, keyed, rest, modes, turns)
+    modified = frozenset(row for row in has_modifiers if is_modified(keyed[row]))
+    return _Keyed(user, names, keyed, rest, modes, turns, modified)
 
 
 def _source(
@@ -173,6 +181,7 @@ def _source(
         turns_axis=recorded(place).turns_axis,
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
+        modified=keyed.modified,
     )
 
 

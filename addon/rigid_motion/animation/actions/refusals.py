@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import bpy
 import numpy as np
@@ -14,6 +14,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ..compute.sources import MODE_NAMES, UNKNOWN, Source
 from ..curves import LARGEST, Keys, TooManyRounds
 from ..transforms import GROUP, LINKED, Refused, Transform
+from .key_reading import read_steps
+from .modifiers import FOLLOWED, is_added, is_whole, may_add
 from .records import recorded_digest, recorded_rows
 from .slots import SlotTransform, is_filled_in
 
@@ -46,7 +48,15 @@ MODIFIED = n_(
     "{name}: {channel} has a modifier of type {modifier}, which rigid in-betweens cannot follow: "
     "mute or remove it, or bake the channel (Graph Editor, Channel)"
 )
-MODIFIED_CYCLES = n_(
+REPLACED = n_(
+    "{name}: {channel} has a modifier of type {modifier} that does not just add to it, which rigid in-betweens cannot "
+    "follow: have it add (Blend Type or Additive), mute or remove it, or bake the channel (Graph Editor, Channel)"
+)
+DIFFERENT_STEPS = n_(
+    "{name}: {channel} and {other} have different Stepped modifiers, and rigid in-betweens hold all channels together: "
+    "copy one to the other (Graph Editor, sidebar, Modifiers), or mute them"
+)
+MODIFIED_IN_PART = n_(
     "{name}: {channel} has a modifier of type {modifier} with a restricted range or influence, which rigid "
     "in-betweens cannot follow: mute or remove it, or bake the channel (Graph Editor, Channel)"
 )
@@ -120,10 +130,13 @@ def refuse_linked(user: Transform, place: SlotTransform | None = None) -> None:
 def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
     """Raise `Refused` where a channel has modifiers, or values without keys, that rigid in-betweens cannot follow."""
     for modifier in fcurve.modifiers:
-        plain = modifier.type == "CYCLES" and not modifier.use_restricted_range and not modifier.use_influence
-        if not plain and not modifier.mute:
+        if modifier.mute or (modifier.type in FOLLOWED and is_whole(modifier)):
+            continue
+        if not (is_added(modifier) and fcurve.keyframe_points):
             kinds = modifier.bl_rna.properties["type"]
-            text = MODIFIED_CYCLES if modifier.type == "CYCLES" else MODIFIED
+            text = MODIFIED_IN_PART if modifier.type in FOLLOWED else MODIFIED
+            if may_add(modifier) and fcurve.keyframe_points:
+                text = REPLACED
             raise Refused(
                 rpt_(text).format(
                     name=name,
@@ -137,6 +150,26 @@ def refuse_channel(name: str, fcurve: bpy.types.FCurve) -> None:
                 "{name}: {channel} is sampled and has no keys: turn its samples into keys "
                 "(Graph Editor, Channel > Samples to Keys)"
             ).format(name=name, channel=_label(fcurve))
+        )
+
+
+def refuse_different_steps(name: str, fcurves: Iterable[bpy.types.FCurve]) -> None:
+    """Raise `Refused` where channels with several keys do not hold the same frames."""
+    moving = [(fcurve, read_steps(fcurve.modifiers)) for fcurve in fcurves if len(fcurve.keyframe_points) > 1]
+    for fcurve, steps in moving:
+        if steps != moving[0][1]:
+            text = rpt_(DIFFERENT_STEPS)
+            raise Refused(text.format(name=name, channel=_label(moving[0][0]), other=_label(fcurve)))
+
+
+def refuse_modified(name: str, source: Source) -> None:
+    """Raise `Refused` where modifiers change what keys say, so that other keys would not say the same."""
+    if source.steps or source.modified:
+        raise Refused(
+            rpt_(
+                "{name} has Stepped modifiers, or such as add to its channels: mute them while its keys are reduced, "
+                "or bake them into the keys first"
+            ).format(name=name)
         )
 
 

@@ -21,6 +21,7 @@ from ..actions.channels import (
     set_key_fields,
     write_channel,
 )
+from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
 from ..compute.differences import SMOOTH, in_betweens
 from ..compute.sources import SAME_FRAME, Source
@@ -86,13 +87,14 @@ def bake(
     step: float = 1.0,
     first: float | None = None,
     last: float | None = None,
+    interpolation: str = "LINEAR",
     refused: list[Refused] | None = None,
 ) -> tuple[float, float]:
     """Put in-betweens on the channels that they are between, as real keys.
 
-    The animator's keys stay where they are; the others are of type GENERATED, and straight lines run between all of
-    them. Every target gets a copy of its Action for it, one for all bones of a rig. The original stays in the file, for
-    `unbake`.
+    The animator's keys stay where they are; the others are of type GENERATED, and straight lines or holds run between
+    all of them. Every target gets a copy of its Action for it, one for all bones of a rig. The original stays in the
+    file, for `unbake`.
 
     Parameters
     ----------
@@ -102,6 +104,8 @@ def bake(
     first, last : float, optional
         The frames to bake, widened to whole segments, and over those of smooth modes beside them, which go by keys that
         would be others. From the first key to the last, otherwise.
+    interpolation : str
+        LINEAR, or CONSTANT to hold each pose until the next key: with a step of 2 the motion is on twos.
     refused : list, optional
         Takes the refusals, and all other targets are baked.
 
@@ -116,6 +120,8 @@ def bake(
         Where there is nothing to bake of a target, or no way, and there is no list to take that. Nothing is changed
         then.
     """
+    if interpolation not in ("LINEAR", "CONSTANT"):
+        raise ValueError(f"interpolation: LINEAR or CONSTANT, not {interpolation!r}")
     if not step > 0.0:
         raise Refused(rpt_("the step between baked keys has to be above zero, not {step}").format(step=step))
 
@@ -134,7 +140,7 @@ def bake(
 
     def act(transform: Transform, planned: list[tuple[SlotTransform, Source, np.ndarray]]) -> tuple[float, float]:
         for place, source, frames in planned:
-            _bake_place(transform, place, source, frames)
+            _bake_place(transform, place, source, frames, interpolation)
         return (
             min(float(frames[0]) for *_, frames in planned),
             max(float(frames[-1]) for *_, frames in planned),
@@ -193,6 +199,9 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
                 name=transform.name, first=keys[0], last=keys[-1]
             )
         )
+    if source.steps or source.modified:
+        # Without its modifiers no part can be left as it is.
+        return source.held_range
     begin = 0 if first is None else np.searchsorted(keys, first + SAME_FRAME) - 1
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))
@@ -215,19 +224,21 @@ def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray
     )
 
 
-def _bake_place(transform: Transform, place: SlotTransform, source: Source, frames: np.ndarray) -> None:
-    motion = in_betweens(source, frames)
+def _bake_place(
+    transform: Transform, place: SlotTransform, source: Source, frames: np.ndarray, interpolation: str
+) -> None:
+    motion, added = in_betweens(source, frames), added_values(place, transform, source, frames)
     copy = move_by_copy(transform, place, BAKED)
     fcurves = copy.channelbag.fcurves
     cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
-    for path, values in channel_values(transform, source, motion).items():
+    for path, values in channel_values(transform, source, motion, added).items():
         for index, column in enumerate(values.T):
             fcurve = copy.curves.get((path, index))
             if fcurve is not None and fcurve.mute:
                 # Its keys have had no say, and what there was in their place is baked.
                 fcurves.remove(copy.curves.pop((path, index)))
             fcurve = copy.ensure_curve((path, index))
-            _bake_channel(fcurve, frames, column)
+            _bake_channel(fcurve, frames, column, interpolation)
             if cycles is not None:
                 add_cycles(fcurve, cycles)
     begin, end = source.keyed_range
@@ -237,8 +248,8 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
         set_mode_in(copy, "BLENDER", frames[:-1])
 
 
-def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray) -> None:
-    """Put keys on these frames, straight lines between them, and leave what is before and behind as it is."""
+def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, interpolation: str) -> None:
+    """Put keys on these frames, all of this interpolation, and leave what is before and behind as it is."""
     old = key_fields(fcurve)
     at = old["co"][:, 0]
     before, behind = at < frames[0] - SAME_FRAME, at > frames[-1] + SAME_FRAME
@@ -249,7 +260,7 @@ def _bake_channel(fcurve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarr
     new["type"][:] = code_of("type", "GENERATED")
     for name, numbers in new.items():
         numbers[places] = old[name][own]
-    new["interpolation"][:] = code_of("interpolation", "LINEAR")
+    new["interpolation"][:] = code_of("interpolation", interpolation)
     points = np.stack((frames, values), axis=1).astype(np.float32)
     at_end = own[places == len(frames) - 1]
     if behind.any() and len(at_end):

@@ -19,6 +19,7 @@ from ...motion import Poses, Skeleton, reduce_skeleton_keys, shell_error
 from ...motion.contacts import slide, standing
 from ...motion.poses import placed
 from ...motion.quaternions import align_signs
+from ..actions.refusals import refuse_modified
 from ..actions.slots import Slot, SlotTransform
 from ..compute.sources import SAME_FRAME, Source, distinct
 from ..edits.apply import Readings, readable
@@ -82,6 +83,8 @@ def fewer_keys_of_rigs(
         if transform.animated.pose is not None:
             try:
                 keyed = readable(transform, reading)
+                for _, source in keyed:
+                    refuse_modified(transform.name, source)
             except Refused:
                 continue  # Its own plan says so.
             for place, source in keyed:

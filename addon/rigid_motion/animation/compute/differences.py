@@ -71,7 +71,9 @@ Samples = dict[int, np.ndarray]
 Frame and value of every sample by turns, in single precision, each of shape (2 m,)."""
 
 
-def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> InBetweens:
+def in_betweens(
+    source: Source, frames: np.ndarray, mode: str | None = None, progress: np.ndarray | None = None
+) -> InBetweens:
     """The motion of a source at any rising frames, sub-frames included.
 
     Parameters
@@ -80,17 +82,21 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     frames : array, shape (m,)
     mode : str, optional
         One of `MODE_IDS` for all segments, instead of the modes that they have.
+    progress : array, shape (m,), optional
+        How far the body has come in its segment on these frames, 0 to 1 and beyond, instead of what the channels say.
     """
     frames = np.asarray(frames, dtype=np.float64)
-    native, delta = np.empty((2, height([source]), len(frames)))
+    moments, places = np.unique(source.held(frames), return_inverse=True) if source.steps else (frames, slice(None))
+    native, delta = np.empty((2, height([source]), len(moments)))
     delta = delta[: filled_height([source])]
     if len(source.key_frames) > 1:
-        _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
+        _move([source], [moments], native, delta, None if mode is None else MODE_NUMBERS[mode], progress)
     else:
         # Without a segment there is nothing to fill in.
-        sampled([(source, slice(len(frames)))], [frames], out=native)
+        sampled([(source, slice(len(moments)))], [moments], out=native)
         turn_into_quaternions(native, source.order)
         delta[:] = source.original[: len(delta), None]
+    native, delta = native[:, places], delta[:, places]
 
     def moved_by(deltas: np.ndarray) -> Poses:
         positions = (native[ROWS[LOCATION]] + deltas[ROWS[LOCATION]]).T
@@ -107,7 +113,8 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
     """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
-    location is added, scale multiplied. Components that are the source's original ones throughout are left out.
+    location is added, scale multiplied. Components that are the source's original ones throughout are left out. Holds
+    are left to the F-curves that the differences go into.
 
     `ranges` are the first and last frames that are wanted of each, in place of those of the source. Then no component
     is left out that may differ elsewhere.
@@ -207,11 +214,13 @@ def _move(
     native: np.ndarray,
     delta: np.ndarray,
     mode: int | None = None,
+    given: np.ndarray | None = None,
 ) -> None:
     """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
     `native` is of `height`, `delta` of `filled_height`. They may be in the same place: then the deltas are there.
+    `given` is the progress on all frames, in place of that of the channels.
     """
     order = sources[0].order
     samples = each(sources, map(len, frames))
@@ -256,6 +265,8 @@ def _move(
             first, last = (rows.repeat(counts[some]) for rows in ends.times[some].T)
             elapsed = (every_frame[place] - first) / np.where(last > first, last - first, np.inf)
             progress = corrected(progress, elapsed, lacks[:, some].repeat(counts[some], axis=1))
+        if given is not None:
+            progress = given[place]
         _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = original[:, owners]

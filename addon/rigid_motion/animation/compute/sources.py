@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ...motion import KEYFRAME_MODES
-from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
+from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, Stepped, cycled, cyclic_times, evaluate, held
 from .components import PART_OF, REST, ROTATION, ROWS, SCALE
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
@@ -89,6 +89,9 @@ class Source:
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
 
+    modified: frozenset[int] = frozenset()
+    """The rows of channels that modifiers add something to, which stays on top of the modes."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -109,6 +112,8 @@ class Source:
             summary.update(b"spins")
         span = self.seen if self.goes_on and not self.repeats else None
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
+        if self.has_modified_scale:
+            summary.update(b"modified scale")
         return summary.hexdigest()
 
     @property
@@ -125,6 +130,27 @@ class Source:
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
         return len(self.channels) == 1 and self.cyclic is None
+
+    @cached_property
+    def steps(self) -> tuple[Stepped, ...]:
+        """The Stepped modifiers that all channels have in common; those with a single key need not have them."""
+        return next((keys.steps for keys in self.curves if keys.steps), ())
+
+    @property
+    def unheld(self) -> Source:
+        """The same without Stepped modifiers."""
+        if not self.steps:
+            return self
+        return replace(self, channels=tuple((rows, replace(keys, steps=())) for rows, keys in self.channels))
+
+    def held(self, frames: np.ndarray) -> np.ndarray:
+        """The frames (m,) whose poses are shown on these ones (m,)."""
+        return held(self.steps, frames)
+
+    @property
+    def has_modified_scale(self) -> bool:
+        """Whether modifiers add something to the scale, which the modes leave to Blender then."""
+        return any(PART_OF[row] == SCALE for row in self.modified)
 
     @cached_property
     def keyed_frames(self) -> np.ndarray:
@@ -266,13 +292,25 @@ class Source:
             first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
         return math.floor(first), math.ceil(last)
 
+    @property
+    def held_range(self) -> tuple[float, float]:
+        """The first and the last frame on which there may be anything between keys: holds show it behind these, too."""
+        (first, last), longest = self.keyed_range, self._longest_hold
+        return (first - longest if any(first < one.offset for one in self.steps) else first), last + longest
+
+    @property
+    def _longest_hold(self) -> float:
+        return sum(one.step for one in self.steps)
+
     @cached_property
     def seen_range(self) -> tuple[int, int]:
         """The first and last whole frame that there is something to be seen on: where it goes on outside of its keys,
         as far as it is looked at."""
         first, last = self.keyed_range
         if self.seen is not None and self.goes_on:
-            first, last = min(first, self.seen[0]), max(last, self.seen[1])
+            # What is held there may be from before, or before an offset from behind.
+            longest = self._longest_hold
+            first, last = min(first, self.seen[0] - longest), max(last, self.seen[1] + longest)
         return math.floor(first), math.ceil(last)
 
     @property
@@ -284,7 +322,7 @@ class Source:
     @cached_property
     def uniform_scale(self) -> bool:
         """Whether the scale is animated, and at every key the same along all axes and positive. Else Blender scales."""
-        if SCALE not in self.keyed:
+        if SCALE not in self.keyed or self.has_modified_scale:
             return False
         x, y, z = self.values_at(self.key_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)

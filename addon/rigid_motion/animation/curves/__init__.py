@@ -1,5 +1,6 @@
 """F-curves in NumPy alone: what `FCurve.evaluate` returns, for many curves and many frames at once.
 
+steps       frames held by Stepped modifiers
 keys        F-curves as arrays
 easings     Robert Penner's equations, as Blender has them
 solvers     Bezier segments as cubics, and their roots
@@ -25,6 +26,7 @@ For 100 objects of 7 channels with 10 Bezier keys each, on 1000 frames (Blender 
 from .cycles import TooManyRounds, cycled, cyclic_times
 from .evaluation import evaluate
 from .keys import BEZIER, CODE, CONSTANT, EASINGS, ELASTIC, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
+from .steps import Stepped, held
 
 __all__ = [
     "BEZIER",
@@ -37,8 +39,10 @@ __all__ = [
     "LINEAR",
     "Cycles",
     "Keys",
+    "Stepped",
     "TooManyRounds",
     "cycled",
     "cyclic_times",
     "evaluate",
+    "held",
 ]

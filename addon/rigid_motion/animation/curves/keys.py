@@ -6,10 +6,12 @@ Frames and values are Blender's, in its single precision.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+
+from .steps import Stepped
 
 CONSTANT, LINEAR, BEZIER, BACK, BOUNCE, CIRC, CUBIC, ELASTIC, EXPO, QUAD, QUART, QUINT, SINE = range(13)
 
@@ -86,6 +88,9 @@ class Keys:
 
     cycles: Cycles | None = None
 
+    steps: tuple[Stepped, ...] = ()
+    """Stepped modifiers, first to last. The values of curves are worked out without: see `held`."""
+
     is_sound: bool = True
     """Whether all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
 
@@ -101,17 +106,22 @@ class Keys:
 
     def only(self, channels: Sequence[int]) -> Keys:
         """The keys of these channels alone."""
-        points, interpolation, left, right, easing = (
-            None if array is None else array[channels]
-            for array in (self.points, self.interpolation, self.left, self.right, self.easing)
-        )
-        settings = None if self.easing_settings is None else self.easing_settings[:, channels]
-        return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles, self.is_sound)
+        return self._part((channels,))
+
+    def at(self, chosen: np.ndarray) -> Keys:
+        """The chosen ones of the keys, by a mask of shape (n,)."""
+        return self._part((slice(None), chosen))
+
+    def _part(self, part: tuple) -> Keys:
+        arrays = {name: getattr(self, name) for name in ("points", "interpolation", "left", "right", "easing")}
+        parts = {name: array[part] for name, array in arrays.items() if array is not None}
+        settings = None if self.easing_settings is None else self.easing_settings[(slice(None), *part)]
+        return replace(self, **parts, easing_settings=settings)
 
     @property
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""
         arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
         present = [array for array in arrays if array is not None]
-        header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles};"
+        header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles}{self.steps or ''};"
         return b"".join((header.encode(), *(array.tobytes() for array in present)))

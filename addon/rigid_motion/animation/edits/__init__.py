@@ -1,8 +1,9 @@
 """What can be done to motions by hand or by script: the verbs behind operators, for many targets at once.
 
-apply      targets, refusals and one refresh for every verb
-mode_keys  choosing modes
-repair     constraints of bones, put back
+apply       targets, refusals and one refresh for every verb
+mode_keys   choosing modes
+repair      constraints of bones, put back
+breakdowns  poses in between, keyed where the playhead is
 
 Each module imports only those above it.
 """

@@ -12,6 +12,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
 from ..compute.differences import in_betweens
 from ..compute.source_cache import cached_source
@@ -44,7 +45,7 @@ def keep_motion(place: SlotTransform, before: str, source: Source) -> bool:
     inserted = inserted[old.modes_at(inserted) != 0]
     if len(inserted) < 2:
         return False
-    off = _off_curves(source, old, inserted)
+    off = _off_curves(source, old, inserted, place)
     if np.count_nonzero(~off.any(axis=0)) < max(2, 0.5 * len(inserted)):
         return False
     frames = np.union1d(inserted, old.keyed_frames)
@@ -69,13 +70,14 @@ def _bounds(keyed: np.ndarray, inserted: np.ndarray) -> np.ndarray:
     return keyed[np.diff(is_dense.astype(int), prepend=0, append=0) != 0]
 
 
-def _off_curves(new: Source, old: Source, frames: np.ndarray) -> np.ndarray:
+def _off_curves(new: Source, old: Source, frames: np.ndarray, place: SlotTransform) -> np.ndarray:
     """How far the keys on these frames (m,) are off the curves that were there before, 0 where none is, (10, m)."""
     off = np.zeros((10, len(frames)))
     for rows, keys in new.channels:
         places = np.clip(np.searchsorted(frames, keys.times - SAME_FRAME), 0, len(frames) - 1)
         here = np.abs(frames[places] - keys.times) < SAME_FRAME
-        had = old.values_at(keys.times[here])[rows]
+        shown = old.held(keys.times[here])
+        had = (old.values_at(shown) + added_values(place, place.users[0], new, keys.times[here]))[rows]
         by = keys.values[:, here] - had
         by[np.abs(by) <= TOLERANCE * np.maximum(1.0, np.abs(had))] = 0.0
         off[np.ix_(rows, places[here])] = by

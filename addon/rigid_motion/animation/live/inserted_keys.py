@@ -28,12 +28,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
 from ..queries.visible_pose import visible_components
-from ..transforms import Channel, Transform
+from ..transforms import Transform
 from ..writers.table import writer_of
 
 MOST_INSERTED = 256
@@ -97,6 +98,10 @@ class InsertedKeys:
             is_stored = operator.startswith(transform.stored_by)
             self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_stored)
 
+    def notice_values(self, transform: Transform, frame: float) -> None:
+        """Keys of a transform that are set on the frame that is shown are meant as they are."""
+        self._posed[_identity(transform)] = _Posed(frame, transform.components(), False)
+
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
         """Forget how these were posed, or all: their Actions have moved them again."""
         if transforms is None:
@@ -149,17 +154,19 @@ class InsertedKeys:
         if not _is_inserted(old, source, frame):
             return False
         change = old.digest, source.digest
-        shown = self._inserted.get(change) if again else None
+        shown, frames = self._inserted.get(change) if again else None, np.array([frame])
+        added = added_values(place, user, source, frames)[:, 0]
         if shown is None:
-            shown = old.values_at(np.array([frame]))[:, 0] if posed is None else posed.components
+            shown = old.values_at(old.held(frames))[:, 0] + added if posed is None else posed.components
             if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
                 return False
             self._inserted[change] = shown
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
-        for channel, value in _visible_values(user, place, old, shown, frame).items():
+        visible = _visible_components(user, place, old, shown, frame) - added
+        for row, channel in user.channels.items():
             if (fcurve := place.curves.get(channel)) is not None:
-                _set_key(fcurve, frame, value)
+                set_key(fcurve, frame, visible[row])
         return True
 
 
@@ -190,17 +197,16 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
     return True
 
 
-def _visible_values(
+def _visible_components(
     user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
-) -> dict[Channel, float]:
-    """The values of the channels that, with the original difference alone, look as the screen does."""
+) -> np.ndarray:
+    """The components (10,) that, with the original difference alone, look as the screen does."""
     filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
-    seen = visible_components(shown, old.original, difference, old.order, parts)
-    return {channel: seen[row] for row, channel in user.channels.items()}
+    return visible_components(shown, old.original, difference, old.order, parts)
 
 
-def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
+def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
     """Give a key this value, handles along with it; insert one that the channel lacks."""
     keys = fcurve.keyframe_points
     for key in keys:

@@ -129,5 +129,11 @@ def turns_in(place: SlotTransform, frames: np.ndarray) -> np.ndarray:
 
 def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:
     """The mode of the segment that begins on this frame, `UNKNOWN` where that is not a number."""
-    value = fcurve.evaluate(frame + 0.5 * SAME_FRAME)
+    moment = frame + 0.5 * SAME_FRAME
+    if any(modifier.type != "CYCLES" for modifier in fcurve.modifiers):
+        # The modes are those of the keys, whichever frames are held, and whatever is added.
+        keys = [key.co for key in fcurve.keyframe_points]
+        value = next((key.y for key in reversed(keys) if key.x <= moment), keys[0].y)
+    else:
+        value = fcurve.evaluate(moment)
     return round(value) if math.isfinite(value) else UNKNOWN

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...motion import Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.quaternions import align_signs, conjugate, multiply
+from ..compute.bodies import turn_into_quaternions
 from ..compute.components import LOCATION, ROTATION, ROWS
 from ..compute.differences import InBetweens
 from ..compute.sources import SAME_FRAME, Source
 from ..transforms import Transform
 
 
-def channel_values(transform: Transform, source: Source, motion: InBetweens) -> dict[str, np.ndarray]:
-    """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms."""
-    own, poses, channels = source.original, motion.wanted, {}
-    first = source.values_at(motion.frames[:1])[:, 0]
+def channel_values(
+    transform: Transform, source: Source, motion: InBetweens, added: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """The values (m, channels) of the keyed properties that show the wanted poses, with the own delta transforms.
+
+    `added` is what modifiers add to the channels, shape (10, m), where that is to be in the values as well.
+    """
+    own, channels = source.original, {}
+    poses = motion.wanted if added is None else _with_added(source, motion, added)
+    shown = source.held(motion.frames)
+    first = source.values_at(shown[:1])[:, 0]
     if LOCATION in source.keyed:
         axes = source.location_axes
         channels["location"] = (poses.positions if axes is None else poses.positions @ axes) - own[:3]
@@ -29,9 +38,9 @@ def channel_values(transform: Transform, source: Source, motion: InBetweens) -> 
             channels[transform.rotation] = _beginning_near(first[3:6], angles, source.order)
     if poses.scales is not None and own[7:].mean() != 0.0:
         # Where Blender's own in-betweens stay, each axis may go its own way from key to key.
-        segments = np.searchsorted(source.key_frames, motion.frames, side="right") - 1
+        segments = np.searchsorted(source.key_frames, shown, side="right") - 1
         is_even = source.modes[np.clip(segments, 0, len(source.modes) - 1)] > 0
-        native = source.values_at(motion.frames)[7:].T
+        native = source.values_at(shown)[7:].T
         channels["scale"] = np.where(is_even[:, None], poses.scales[:, None] / own[7:].mean(), native)
     # What is left alone before and behind goes on from the animator's values, whatever sign or turn they are in.
     keys, ends = source.keyed_frames, source.values_at(motion.frames[[0, -1]]).T
@@ -44,6 +53,36 @@ def channel_values(transform: Transform, source: Source, motion: InBetweens) -> 
                 if prop in channels:
                     channels[prop][place] = ends[place, ROWS[name]][: channels[prop].shape[1]]
     return {transform.prefix + prop: values for prop, values in channels.items()}
+
+
+def _with_added(source: Source, motion: InBetweens, added: np.ndarray) -> Poses:
+    """The wanted poses with what modifiers add: in location along its axes, in rotation what it turns Blender's by."""
+    now, then = source.values_at(source.held(motion.frames)), motion.wanted
+    rows = now + added
+    moved = added[:3].T if source.location_axes is None else added[:3].T @ source.location_axes.T
+    for channels in (now, rows):
+        turn_into_quaternions(channels, source.order)
+    turned = multiply(conjugate(now[ROWS[ROTATION]].T), rows[ROWS[ROTATION]].T)
+    return Poses(then.positions + moved, multiply(then.quaternions, turned), then.scales)
+
+
+def components_near(source: Source, pose: Poses, near: np.ndarray) -> np.ndarray:
+    """The components that show one pose (1,) with the own delta transforms, shape (10,).
+
+    The rotation is in the sign and the turn that `near` (10,) has, and so is the scale that the modes leave to Blender.
+    """
+    own, found = source.original, near.copy()
+    axes = np.eye(3) if source.location_axes is None else source.location_axes
+    found[:3] = (pose.positions @ axes)[0] - own[:3]
+    quaternion = multiply(conjugate(own[3:7]), pose.quaternions)
+    if source.order is None:
+        found[3:7] = quaternion[0] * (-1.0 if quaternion[0] @ near[3:7] < 0.0 else 1.0)
+    else:
+        angles = extrinsic_eulers_from_quaternions(quaternion, source.order)
+        found[3:6] = _beginning_near(near[3:6], angles, source.order)[0]
+    if pose.scales is not None and own[7:].mean() != 0.0:
+        found[7:] = pose.scales / own[7:].mean()
+    return found
 
 
 def _beginning_near(first: np.ndarray, angles: np.ndarray, order: str) -> np.ndarray:

@@ -6,6 +6,7 @@ there go round in a ring behind frame 0 instead.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +14,7 @@ import bpy
 import numpy as np
 
 from ..compute.sources import Source
-from ..curves import Cycles
+from ..curves import Cycles, Stepped
 
 ENDLESS = 2.0**20
 """A step, in frames, that ends behind whatever Blender can show."""
@@ -42,21 +43,24 @@ class Layout:
     """How many frames later than they are seen the samples lie, where they are looked up by a time of their own."""
 
     is_apart: bool = False
-    """Whether they are: it is that which repeats, then."""
+    """Whether they are: it is that which repeats and holds, then."""
+
+    steps: tuple[Stepped, ...] = ()
+    """The frames that the channels hold, and the differences with them."""
 
     @classmethod
     def of(cls, source: Source) -> Layout:
         """In an F-curve that is read as the frames pass."""
         first, last = source.frame_range
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source), cycles, first < 0 and cycles is None)
+        return cls(first, last, _ends(source), cycles, first < 0 and cycles is None, steps=source.steps)
 
     @classmethod
     def apart(cls, source: Source) -> Layout:
         """In an F-curve that is looked up by a time of its own, which goes round where the channels do."""
         first, last = source.frame_range
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source), cycles, shift=max(0, -first), is_apart=True)
+        return cls(first, last, _ends(source), cycles, shift=max(0, -first), is_apart=True, steps=source.steps)
 
     @cached_property
     def count(self) -> int:
@@ -110,16 +114,28 @@ class Layout:
             return
         for modifier in list(fcurve.modifiers):
             fcurve.modifiers.remove(modifier)
-        for kind, settings in self._modifiers:
-            modifier = fcurve.modifiers.new(kind)
-            for name, value in settings.items():
-                setattr(modifier, name, value)
+        add_modifiers(fcurve, self._modifiers)
 
     @cached_property
     def _modifiers(self) -> list[tuple[str, dict[str, object]]]:
         """Types and settings. Blender asks the last one first."""
-        if self.is_apart:
-            return []
+        return [] if self.is_apart else [*self._repeating, *self.stepping]
+
+    @property
+    def stepping(self) -> list[tuple[str, dict[str, object]]]:
+        """Types and settings of those that hold frames."""
+        found = []
+        for one in self.steps:
+            settings: dict[str, object] = {"frame_step": one.step, "frame_offset": one.offset}
+            for name, end in (("start", one.start), ("end", one.end)):
+                settings[f"use_frame_{name}"] = math.isfinite(end)
+                if math.isfinite(end):
+                    settings[f"frame_{name}"] = end
+            found.append(("STEPPED", settings))
+        return found
+
+    @property
+    def _repeating(self) -> list[tuple[str, dict[str, object]]]:
         if self.cycles is not None:
             # The difference repeats as it is also where the channels go on from where they have come.
             before, after = (mode.removesuffix("_OFFSET") for mode in (self.cycles.before, self.cycles.after))
@@ -134,6 +150,14 @@ class Layout:
             ("STEPPED", {"frame_step": ENDLESS, "frame_offset": first, "use_frame_end": True, "frame_end": first}),
             ("STEPPED", {"frame_step": ENDLESS, "frame_offset": last, "use_frame_start": True, "frame_start": last}),
         ]
+
+
+def add_modifiers(fcurve: bpy.types.FCurve, modifiers: list[tuple[str, dict[str, object]]]) -> None:
+    """Give an F-curve modifiers of these types and settings, behind those that it has."""
+    for kind, settings in modifiers:
+        modifier = fcurve.modifiers.new(kind)
+        for name, value in settings.items():
+            setattr(modifier, name, value)
 
 
 def _ends(source: Source) -> tuple[float, float]:

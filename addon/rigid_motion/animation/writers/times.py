@@ -17,11 +17,12 @@ import bpy
 import numpy as np
 
 from ..actions.channels import add_cycles, replace_keys
+from ..actions.key_reading import read_steps
 from ..actions.records import recorded
 from ..actions.slots import Slot, SlotTransform, strips_of
-from ..curves import Cycles
+from ..curves import Cycles, Stepped
 from ..transforms import CONSTRAINT, WIDTHS, Channel, bone_name
-from .layout import Layout
+from .layout import Layout, add_modifiers
 from .sampled import hide_fcurve, remove_if_empty
 
 MOST_FRAMES = 1_048_574
@@ -128,46 +129,53 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
         remove_time(place)
     path = time_path(place)
     if layout.cycles is None:
-        write_line(place, path, _line(layout))
+        add_modifiers(write_line(place, path, _line(layout)), layout.stepping)
         return
     fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
     frames, times = np.array(_seams(layout)).T
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
+    add_modifiers(fcurve, layout.stepping)
     hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
 
 
-def write_line(place: SlotTransform, path: str, line: Line) -> None:
+def write_line(place: SlotTransform, path: str, line: Line) -> bpy.types.FCurve:
     """An F-curve that is a line, without keys."""
     fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
     generator = fcurve.modifiers.new("GENERATOR")
     generator.poly_order = 1
     generator.coefficients = line
     hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
+    return fcurve
 
 
 def says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
     """Whether an evaluation time goes through the samples as they lie."""
     if layout.cycles is None:
-        return is_line(fcurve, _line(layout))
-    modifiers = list(fcurve.modifiers)
-    if fcurve.mute or [modifier.type for modifier in modifiers] != ["CYCLES"]:
+        return is_line(fcurve, _line(layout), layout.steps)
+    kinds = [modifier.type for modifier in fcurve.modifiers]
+    if fcurve.mute or kinds[:1] != ["CYCLES"] or not _holds(fcurve, layout.steps):
         return False
-    (modifier,) = modifiers
+    modifier = fcurve.modifiers[0]
     cycles = Cycles(modifier.mode_before, modifier.mode_after, modifier.cycles_before, modifier.cycles_after)
     return cycles == _without_offset(layout.cycles) and np.array_equal(
         [key.co for key in fcurve.keyframe_points], np.float32(_seams(layout))
     )
 
 
-def is_line(fcurve: bpy.types.FCurve, line: Line) -> bool:
-    return _line_of(fcurve) == tuple(np.float32(line).tolist())
+def is_line(fcurve: bpy.types.FCurve, line: Line, steps: tuple[Stepped, ...] = ()) -> bool:
+    return _line_of(fcurve) == tuple(np.float32(line).tolist()) and _holds(fcurve, steps)
+
+
+def _holds(fcurve: bpy.types.FCurve, steps: tuple[Stepped, ...]) -> bool:
+    """Whether the modifiers of an F-curve are one, and behind it those that hold these frames."""
+    return len(fcurve.modifiers) == 1 + len(steps) and read_steps(fcurve.modifiers) == steps
 
 
 def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
     """The line that an F-curve is, None where it is none, or has been changed."""
     modifiers = list(fcurve.modifiers)
-    plain = len(modifiers) == 1 and not (fcurve.mute or len(fcurve.keyframe_points) or len(fcurve.sampled_points))
+    plain = len(modifiers) > 0 and not (fcurve.mute or len(fcurve.keyframe_points) or len(fcurve.sampled_points))
     if not plain or modifiers[0].type != "GENERATOR" or modifiers[0].mute or modifiers[0].poly_order != 1:
         return None
     return tuple(modifiers[0].coefficients)

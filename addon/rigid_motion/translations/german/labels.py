@@ -53,6 +53,14 @@ LABELS = {
     "Best per Segment": "Bester je Segment",
     "Key Poses": "Schlüsselposen",
     "Hold Feet": "Füße halten",
+    "Factor": "Faktor",
+    "On": "An",
+    "Off": "Aus",
+    "LMB, Enter: Confirm | Esc, RMB: Cancel | E: Overshoot ({overshoot}) | Ctrl: Steps of 10 % | "
+    "Shift: Precision | 0-9: Per Cent": (
+        "LMT, Enter: Bestätigen | Esc, RMT: Abbrechen | E: Überschwingen ({overshoot}) | Strg: 10-%-Schritte | "
+        "Umschalt: Genau | 0-9: Prozent"
+    ),
     # Channels
     "Location": "Position",
     "Rotation": "Rotation",
@@ -87,6 +95,9 @@ OF_OPERATORS = {
     "Reduce Keys to Poses": "Schlüsselbilder auf Posen reduzieren",
     "Restore Keys": "Schlüsselbilder wiederherstellen",
     "Discard Dense Keys": "Dichte Schlüsselbilder verwerfen",
+    "Breakdown along Mode": "Zwischenpose auf dem Modus",
+    "Push from In-Between of Mode": "Vom Zwischenbild des Modus wegschieben",
+    "Relax to In-Between of Mode": "Zum Zwischenbild des Modus entspannen",
     "Restore Constraint": "Beschränkung wiederherstellen",
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
     "Pie Menu": "Kreismenü",
@@ -105,7 +116,10 @@ OF_OWN_CONTEXT = {
     "Blender's Path": "Blenders Pfad",
     "Mode's Path": "Pfad des Modus",
     "Ticks": "Zeitmarken",
-    # One of three buttons in a row
+    # One of two or three buttons in a row
+    "Interpolation": "Interpolation",
+    "Linear": "Linear",
+    "Constant": "Konstant",
     "Action": "Aktion",
     "Scene": "Szene",
     "Custom": "Eigene",
@@ -129,6 +143,10 @@ OF_OWN_CONTEXT = {
     "Feet": "Füße",
     "Mode": "Modus",
     "Step": "Schritt",
+    # Beside the slider
+    "Breakdown": "Zwischenpose",
+    "Push": "Wegschieben",
+    "Relax": "Entspannen",
     # Buttons side by side
     "Reduce Keys": "Reduzieren",
     "Restore Keys": "Zurückholen",

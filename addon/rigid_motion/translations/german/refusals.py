@@ -1,6 +1,10 @@
 """Why something cannot be done, and the way out."""
 
 REFUSALS = {
+    "{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys": (
+        "{name} braucht ein Schlüsselbild vor und eines nach Einzelbild {frame:g}: auf ein Einzelbild zwischen zwei "
+        "Schlüsselbildern gehen"
+    ),
     # What is asked for
     "Select keys of location, rotation or scale first": (
         "Zuerst Schlüsselbilder von Position, Rotation oder Skalierung auswählen"
@@ -82,6 +86,23 @@ REFUSALS = {
     "in-betweens cannot follow: mute or remove it, or bake the channel (Graph Editor, Channel)": (
         "{name}: {channel} hat einen Modifikator vom Typ {modifier} mit begrenztem Bereich oder Einfluss, dem starre "
         "Zwischenbilder nicht folgen können: stumm schalten, entfernen oder den Kanal backen (Graph Editor, Kanal)"
+    ),
+    "{name}: {channel} has a modifier of type {modifier} that does not just add to it, which rigid in-betweens cannot "
+    "follow: have it add (Blend Type or Additive), mute or remove it, or bake the channel (Graph Editor, Channel)": (
+        "{name}: {channel} hat einen Modifikator vom Typ {modifier}, der nicht bloß etwas addiert, dem starre "
+        "Zwischenbilder nicht folgen können: addieren lassen (Mischtyp oder Additiv), stumm schalten, entfernen oder "
+        "den Kanal backen (Graph Editor, Kanal)"
+    ),
+    "{name}: {channel} and {other} have different Stepped modifiers, and rigid in-betweens hold all channels together: "
+    "copy one to the other (Graph Editor, sidebar, Modifiers), or mute them": (
+        "{name}: {channel} und {other} haben verschiedene gestufte Modifikatoren, und starre Zwischenbilder halten "
+        "alle Kanäle zusammen: einen auf den anderen kopieren (Graph Editor, Seitenleiste, Modifikatoren) oder stumm "
+        "schalten"
+    ),
+    "{name} has Stepped modifiers, or such as add to its channels: mute them while its keys are reduced, or bake them "
+    "into the keys first": (
+        "{name} hat gestufte Modifikatoren oder solche, die etwas zu Kanälen addieren: beim Reduzieren stumm schalten "
+        "oder zuerst in die Schlüsselbilder backen"
     ),
     "{name}: {channel} is sampled and has no keys: turn its samples into keys "
     "(Graph Editor, Channel > Samples to Keys)": (

@@ -17,6 +17,7 @@ REPORTS = {
     "{mode} from frames {frames}": "{mode} ab den Einzelbildern {frames}",
     "{turns} turns more": "{turns} Umdrehungen zusätzlich",
     "baked from frame {first:g} to {last:g}": "gebacken von Einzelbild {first:g} bis {last:g}",
+    "{action} by {factor:.0f} %": "{action} um {factor:.0f} %",
     "back to the keys from before baking": "zurück zu den Schlüsselbildern von vor dem Backen",
     "back to the keys from before they were reduced": "zurück zu den Schlüsselbildern von vor dem Reduzieren",
     "the keys from before they were reduced are removed from the file": (

@@ -30,6 +30,21 @@ TOOLTIPS = {
     "Screws that flow into one another: no corner at a key, neither in the path nor in the turning": (
         "Schrauben, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung"
     ),
+    # Poses in between
+    "Key a pose on the current frame that is between the key before and the key after it, on the path of the mode": (
+        "Auf dem aktuellen Einzelbild eine Pose zwischen dem Schlüsselbild davor und dem danach setzen, auf dem Pfad "
+        "des Modus"
+    ),
+    "Key a more pronounced pose on the current frame: further away from the in-between of the mode": (
+        "Auf dem aktuellen Einzelbild eine betontere Pose setzen: weiter weg vom Zwischenbild des Modus"
+    ),
+    "Key a pose on the current frame that is more like its neighbours: nearer to the mode's in-between": (
+        "Auf dem aktuellen Einzelbild eine Pose setzen, die ihren Nachbarn ähnlicher ist: näher am Zwischenbild des "
+        "Modus"
+    ),
+    "How far to go: 0 is the beginning, 1 the end, and beyond that the motion goes on": (
+        "Wie weit: 0 ist der Anfang, 1 das Ende, und darüber hinaus geht die Bewegung weiter"
+    ),
     # Choosing modes
     "Choose how the selected objects move from key to key": (
         "Wählen, wie sich die ausgewählten Objekte von Schlüsselbild zu Schlüsselbild bewegen"
@@ -141,6 +156,11 @@ TOOLTIPS = {
     "From one frame to another": "Von einem Einzelbild zu einem anderen",
     "First frame to bake": "Erstes Einzelbild, das gebacken wird",
     "Last frame to bake": "Letztes Einzelbild, das gebacken wird",
+    "What is between baked keys": "Was zwischen gebackenen Schlüsselbildern ist",
+    "Straight lines": "Gerade Linien",
+    "Each pose holds until the next key: with a step of 2 the motion is on twos": (
+        "Jede Pose bleibt bis zum nächsten Schlüsselbild: bei einem Schritt von 2 läuft die Bewegung auf Zweiern"
+    ),
     "Give baked objects the Actions back that they had before, with their own keys and modes": (
         "Gebackenen Objekten die Aktionen zurückgeben, die sie vorher hatten, "
         "mit ihren eigenen Schlüsselbildern und Modi"
@@ -283,6 +303,19 @@ TOOLTIPS = {
     "There are no rigid in-betweens to bake: choose a mode for keys of these objects and bones first": (
         "Es gibt keine starren Zwischenbilder zu backen: "
         "zuerst einen Modus für Schlüsselbilder dieser Objekte und Knochen wählen"
+    ),
+    "These objects have Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens": (
+        "Diese Objekte haben Blenders eigene Zwischenbilder: zuerst einen Modus wählen, oder Blenders "
+        "Pose > In-Betweens"
+    ),
+    "These bones have Blender's own in-betweens: choose a mode first, or take Blender's Pose > In-Betweens": (
+        "Diese Knochen haben Blenders eigene Zwischenbilder: zuerst einen Modus wählen, oder Blenders "
+        "Pose > In-Betweens"
+    ),
+    "These objects and bones have Blender's own in-betweens: choose a mode first, or take Blender's "
+    "Pose > In-Betweens": (
+        "Diese Objekte und Knochen haben Blenders eigene Zwischenbilder: zuerst einen Modus wählen, oder Blenders "
+        "Pose > In-Betweens"
     ),
     "None of these objects is baked": "Keines dieser Objekte ist gebacken",
     "None of these bones is baked": "Keiner dieser Knochen ist gebacken",

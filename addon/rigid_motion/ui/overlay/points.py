@@ -140,6 +140,7 @@ def trace(
     """
     if len(source.key_frames) < 2:
         return None
+    source = source.unheld
     first, last = source.seen_range
     keys = source.keyed_frames
     ticks = tick_frames(first, last, tick_step)

@@ -1,0 +1,239 @@
+"""Poses between the key before and the key after a frame, along the path of the mode, and keyed there.
+
+As Blender's Breakdowner, Push and Relax, which go from channel to channel. A key on the frame itself is left out of
+account: it is what is made anew. Where a segment has Blender's own in-betweens, the pose is what Blender's Breakdowner
+makes of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import bpy
+import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
+
+from ...motion import Poses, interpolate
+from ..actions.channels import KeyFields, key_fields, set_key_fields
+from ..actions.modifiers import added_values
+from ..actions.refusals import refuse_linked
+from ..actions.slots import SlotTransform
+from ..compute.bodies import body_poses
+from ..compute.differences import in_betweens
+from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
+from ..live import follower
+from ..live.inserted_keys import set_key
+from ..queries.keyed import active_place
+from ..queries.segments import frame_in_action, shown_components
+from ..transforms import Channel, Refused, Transform
+from ..writers.channel_values import components_near
+from .apply import Readings, Targets, apply_edit, readable
+
+BREAKDOWN, PUSH, RELAX = KINDS = ("BREAKDOWN", "PUSH", "RELAX")
+"""From the key before to the key after; away from the in-between of the mode; towards it."""
+
+LIKE_BLENDER = "lerp_slerp"
+"""What Blender's Breakdowner does to location and quaternion."""
+
+
+def breakdown(
+    targets: Targets, factor: float = 0.5, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None
+) -> None:
+    """Key a pose on the current frame that is a share of the way from the key before to the key after it.
+
+    Parameters
+    ----------
+    targets : bpy.types.Object or bpy.types.PoseBone, or several of them
+    factor : float
+        For BREAKDOWN 0 is the pose of the key before, 1 that of the key after, and beyond that the motion goes on. For
+        RELAX 0 is the pose that is seen and 1 the in-between of the mode; PUSH goes as far in the other direction.
+    kind : str
+        One of `KINDS`.
+    refused : list, optional
+        Takes the refusals, and all other targets are keyed.
+
+    Raises
+    ------
+    Refused
+        Where there are no keys on both sides of the frame, or rigid motion cannot act, and there is no list to take
+        that. Nothing is changed then.
+    """
+    Breakdowns(targets, kind, refused=refused).apply(factor)
+
+
+@dataclass(frozen=True, eq=False)
+class _Between:
+    """A transform, and what it is between on a frame."""
+
+    transform: Transform
+    place: SlotTransform
+
+    source: Source
+    """What is keyed without this frame."""
+
+    frame: float
+    """Of the Action."""
+
+    ends: tuple[float, float]
+    """The frames of the keys before and after."""
+
+    seen: np.ndarray
+    """Its components as it is seen, shape (10,)."""
+
+    properties: dict[str, tuple[float, ...]]
+    """Its properties as they were, keyed or not."""
+
+    keys: dict[Channel, KeyFields]
+    """The keys of its channels as they were."""
+
+    @property
+    def mode(self) -> str:
+        return MODE_NAMES[self.source.mode_at(self.ends[0] + SAME_FRAME)]
+
+    @cached_property
+    def _values_at_ends(self) -> np.ndarray:
+        """The components at both keys, shape (2, 10)."""
+        return self.source.values_at(np.array(self.ends)).T
+
+    def pose(self, kind: str, factor: float) -> np.ndarray:
+        """The components to be keyed, shape (10,)."""
+        if kind == BREAKDOWN:
+            first, last = self._values_at_ends
+            straight = first + factor * (last - first)
+            if self.mode == "BLENDER" and self.source.order is not None:
+                return straight
+            mode = LIKE_BLENDER if self.mode == "BLENDER" else None
+            middle = np.array([0.5 * sum(self.ends)])
+            return components_near(
+                self.source, in_betweens(self.source, middle, mode, np.array([factor])).wanted, straight
+            )
+        share = -factor if kind == PUSH else factor
+        native = self.source.values_at(np.array([self.frame]))[:, 0]
+        towards = in_betweens(self.source, np.array([self.frame])).wanted
+        straight = self.seen + share * (components_near(self.source, towards, native) - self.seen)
+        if self.mode == "BLENDER" and self.source.order is not None:
+            return straight
+        own, axes = self.source.original[:, None, None], self.source.location_axes
+        now = body_poses(self.seen[:, None, None], own, None if axes is None else axes[None], self.source)[0]
+        ways = Poses(
+            np.concatenate((now.positions, towards.positions)),
+            np.concatenate((now.quaternions, towards.quaternions)),
+            None if now.scales is None else np.concatenate((now.scales, towards.scales)),
+        )
+        mode = LIKE_BLENDER if self.mode == "BLENDER" else self.mode
+        return components_near(
+            self.source, interpolate((0.0, 1.0), ways, np.array([share]), mode, extrapolate=True), straight
+        )
+
+    def put_back(self) -> None:
+        """Give its channels the keys that they had."""
+        for channel, fields in self.keys.items():
+            set_key_fields(self.place.curves[channel], fields)
+
+    def key(self, components: np.ndarray) -> None:
+        """Set a key of these components in all channels that have keys."""
+        key_type = bpy.context.scene.tool_settings.keyframe_type
+        for row, channel in self.transform.channels.items():
+            if channel in self.keys:
+                fcurve = self.place.curves[channel]
+                before = len(fcurve.keyframe_points)
+                set_key(fcurve, self.frame, components[row])
+                if len(fcurve.keyframe_points) > before:
+                    next(one for one in fcurve.keyframe_points if _is_on(one, self.frame)).type = key_type
+
+
+class Breakdowns:
+    """Targets with keys before and after the current frame, of which poses in between are tried until one is good.
+
+    Parameters
+    ----------
+    targets, kind, refused
+        As `breakdown` has them.
+    """
+
+    def __init__(self, targets: Targets, kind: str = BREAKDOWN, *, refused: list[Refused] | None = None) -> None:
+        self.kind = kind
+        self._frame = bpy.context.scene.frame_current_final
+        self._between = list(apply_edit(targets, self._plan, lambda _, between: between, refused).values())
+
+    def __len__(self) -> int:
+        return len(self._between)
+
+    def apply(self, factor: float) -> None:
+        """Key the poses of this factor, in place of those of the factor before."""
+        with self._edit():
+            for between in self._between:
+                between.key(between.pose(self.kind, factor))
+                follower.follower.inserted.notice_values(between.transform, self._frame)
+
+    def cancel(self) -> None:
+        """Let all be as it was, with the poses that had no key yet."""
+        with self._edit():
+            pass
+        bpy.context.view_layer.update()
+        for between in self._between:
+            for name, values in between.properties.items():
+                setattr(between.transform.carrier, name, values)
+
+    @contextmanager
+    def _edit(self) -> Iterator[None]:
+        """Give all their keys back, edit them, and refresh."""
+        with follower.paused():
+            for between in self._between:
+                between.put_back()
+            yield
+        follower.refresh([between.transform for between in self._between])
+        for between in self._between:
+            between.place.slot.action.update_tag()
+
+    def _plan(self, transform: Transform, readings: Readings) -> _Between:
+        place = active_place(transform, [place for place, _ in readings])
+        if place is None:
+            raise Refused(
+                rpt_("{name} has no Action with keys: key it first, or enter a strip (NLA Editor, Tab)").format(
+                    name=transform.name
+                )
+            )
+        refuse_linked(transform, place)
+        frame = frame_in_action(transform.animated, self._frame)
+        whole = next(source for one, source in readable(transform, readings) if one is place)
+        source, added = _without(whole, frame), added_values(place, transform, whole, np.array([frame]))[:, 0]
+        keys = source.key_frames if source.channels else np.empty(0)
+        after = int(np.searchsorted(keys, frame))
+        if not 0 < after < len(keys):
+            raise Refused(
+                rpt_(
+                    "{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys"
+                ).format(name=transform.name, frame=frame)
+            )
+        seen = shown_components(transform)
+        keyed = [transform.channels[row] for rows, _ in source.channels for row in rows]
+        return _Between(
+            transform,
+            place,
+            source,
+            frame,
+            (float(keys[after - 1]), float(keys[after])),
+            (transform.components() if seen is None else seen) - added,
+            {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
+            {channel: key_fields(place.curves[channel]) for channel in keyed},
+        )
+
+
+def _without(source: Source, frame: float) -> Source:
+    """What is keyed but for this frame, and without holds. A channel with no other key keeps its value."""
+    channels, rest = [], dict(source.rest)
+    for rows, keys in source.channels:
+        others = np.abs(keys.times - frame) >= SAME_FRAME
+        if others.any():
+            channels.append((rows, keys if others.all() else keys.at(others)))
+        else:
+            rest |= dict(zip(rows, keys.values[:, 0].tolist(), strict=True))
+    return replace(source, channels=tuple(channels), rest=rest).unheld
+
+
+def _is_on(key: bpy.types.Keyframe, frame: float) -> bool:
+    return abs(key.co.x - frame) < SAME_FRAME

@@ -1,0 +1,57 @@
+"""What Stepped and other modifiers do to F-curves, asked of Blender itself: of spare ones, and with them muted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+
+import bpy
+import numpy as np
+
+STEPPED = ("frame_step", "frame_offset", "use_frame_start", "frame_start", "use_frame_end", "frame_end")
+"""The settings of a Stepped modifier."""
+
+FCurves = Sequence[bpy.types.FCurve]
+
+
+def acting(fcurves: Iterable[bpy.types.FCurve]) -> list[bpy.types.FModifier]:
+    """The modifiers of these that are not muted, without Cycles."""
+    return [one for fcurve in fcurves for one in fcurve.modifiers if one.type != "CYCLES" and not one.mute]
+
+
+def led_to(settings: Iterable[dict[str, object]], frames: Sequence[float]) -> np.ndarray:
+    """The frames that Blender shows with Stepped modifiers of these settings, first to last."""
+    action = bpy.data.actions.new("Frames")
+    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    fcurve = strip.channelbag(action.slots.new("OBJECT", "Frames"), ensure=True).fcurves.new("location")
+    for frame in (-1024.0, 1024.0):
+        fcurve.keyframe_points.insert(frame, frame).interpolation = "LINEAR"
+    for one in settings:
+        modifier = fcurve.modifiers.new("STEPPED")
+        for name, value in one.items():
+            setattr(modifier, name, value)
+    found = np.array([fcurve.evaluate(frame) for frame in frames])
+    bpy.data.actions.remove(action)
+    return np.round(found, 3)
+
+
+def held_frames(fcurves: FCurves, frames: Sequence[float]) -> np.ndarray:
+    """The frames whose poses channels hold on these ones, as the first that does so."""
+    for fcurve in fcurves:
+        stepped = [one for one in acting([fcurve]) if one.type == "STEPPED"]
+        if stepped and len(fcurve.keyframe_points) > 1:
+            return led_to([{name: getattr(one, name) for name in STEPPED} for one in stepped], frames)
+    return np.asarray(frames)
+
+
+@contextmanager
+def without_modifiers(fcurves: FCurves) -> Iterator[None]:
+    """Modifiers but for Cycles are muted meanwhile; nothing is evaluated."""
+    found = acting(fcurves)
+    for one in found:
+        one.mute = True
+    try:
+        yield
+    finally:
+        for one in found:
+            one.mute = False

@@ -1,0 +1,262 @@
+"""Breakdown, push and relax along modes: poses against `interpolate`, which is given the poses of the keys alone."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, write_channel
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from tests.animation.bones.rigs import new_rig
+from tests.animation.oracle import Own, as_quaternion, curves_of, key_frames, matrices, shown_worlds, snapshot, unit
+from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, push_down, random_values, tweak
+
+FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)
+BEFORE, NOW, AFTER = 11.0, 17.0, 24.0
+
+
+def key_poses(obj: bpy.types.Object, seed: int, own: Own, scaled: bool = False) -> Poses:
+    """What `key` sets on an object, with delta transforms of its own."""
+    rotation = "rotation_quaternion" if obj.rotation_mode == "QUATERNION" else "rotation_euler"
+    turned = random_values(obj, rotation, len(FRAMES), seed)
+    quaternions = [
+        unit(row) if obj.rotation_mode == "QUATERNION" else as_quaternion(row, obj.rotation_mode) for row in turned
+    ]
+    scales = random_values(obj, "scale", len(FRAMES), seed, True)[:, 0] if scaled else None
+    own_turn = np.array(own.quaternion)
+    w, x, y, z = own_turn
+    left = np.array(((w, -x, -y, -z), (x, w, -z, y), (y, z, w, -x), (z, -y, x, w)))
+    return Poses(random_values(obj, "location", len(FRAMES), seed) + own.location, quaternions @ left.T, scales)
+
+
+def as_matrix(poses: Poses, scale: float) -> np.ndarray:
+    """The matrix of one pose (1,), of something that has this scale of its own."""
+    scales = scale * (np.ones(1) if poses.scales is None else poses.scales)
+    return matrices(poses.positions, poses.quaternions, np.repeat(scales[:, None], 3, axis=1))[0]
+
+
+def on_path(keys: Poses, mode: str, factor: float, times=FRAMES) -> Poses:
+    """The pose of a factor between the second key and the third."""
+    if KEYFRAME_MODES[mode].is_smooth and 0.0 <= factor <= 1.0:
+        return interpolate(times, keys, np.array([times[1] + factor * (times[2] - times[1])]), mode)
+    return interpolate((0.0, 1.0), keys[1:3], np.array([factor]), mode, extrapolate=True)
+
+
+def basis(obj: bpy.types.Object) -> np.ndarray:
+    bpy.context.view_layer.update()
+    return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_basis)
+
+
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+@pytest.mark.parametrize("scale", [None, "even"])
+def test_a_breakdown_is_on_the_path_of_the_mode(live_file, mode, order, scale):
+    obj = new_object(rotation_mode=order)
+    own = give_own_deltas(obj, 3)
+    # Handles would shape a smooth mode.
+    key(obj, seed=5, scale=scale, interpolation="LINEAR" if KEYFRAME_MODES[mode].is_smooth else "BEZIER")
+    set_mode(obj, mode)
+    bpy.context.scene.frame_set(int(NOW))
+    keys = key_poses(obj, 5, own, scale is not None)
+    tries = Breakdowns(obj)
+    for factor in FACTORS:
+        if KEYFRAME_MODES[mode].is_smooth and not 0.0 <= factor <= 1.0:
+            continue
+        tries.apply(factor)
+        wanted = as_matrix(on_path(keys, mode, factor), own.scale[0])
+        np.testing.assert_allclose(basis(obj), wanted, atol=2e-5 * np.abs(wanted).max())
+        assert key_frames(obj).tolist() == [FRAMES[0], BEFORE, NOW, AFTER, FRAMES[3]]
+        # It is a key like any other: from frame to frame and back it stays.
+        shown = shown_worlds([obj], [NOW])[0][0]
+        np.testing.assert_allclose(shown, wanted, atol=2e-5 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+def test_where_a_segment_is_blenders_a_breakdown_is_blenders_own(live_file, order):
+    obj = new_object(rotation_mode=order)
+    key(obj, seed=2, scale="uneven")
+    set_mode(obj, "dq_sclerp", (AFTER,))
+    bpy.context.scene.frame_set(int(NOW))
+    breakdown(obj, 0.25)
+    bpy.context.view_layer.update()
+    location, scale = (random_values(obj, path, 4, 2, False) for path in ("location", "scale"))
+    np.testing.assert_allclose(obj.location, 0.75 * location[1] + 0.25 * location[2], atol=1e-5)
+    np.testing.assert_allclose(obj.scale, 0.75 * scale[1] + 0.25 * scale[2], atol=1e-5)
+    if order == "XYZ":
+        angles = random_values(obj, "rotation_euler", 4, 2)
+        np.testing.assert_allclose(obj.rotation_euler, 0.75 * angles[1] + 0.25 * angles[2], atol=1e-5)
+    else:
+        first, last = (unit(row) for row in random_values(obj, "rotation_quaternion", 4, 2)[1:3])
+        half = np.arccos(np.clip(np.abs(np.dot(first, last)), 0.0, 1.0))
+        last = np.multiply(last, np.sign(np.dot(first, last)))
+        wanted = (np.sin(0.75 * half) * np.array(first) + np.sin(0.25 * half) * last) / np.sin(half)
+        turned = np.array(obj.rotation_quaternion.normalized())
+        np.testing.assert_allclose(turned * np.sign(turned @ wanted), wanted, atol=1e-5)
+
+
+def test_a_key_on_the_frame_is_made_anew_and_the_others_stay(live_file):
+    obj = key(new_object(), seed=4)
+    set_mode(obj, "cga_slerp")
+    before = snapshot(obj)
+    bpy.context.scene.frame_set(int(BEFORE))
+    breakdown(obj, 0.5)
+    poses = key_poses(obj, 4, Own())
+    wanted = interpolate((0.0, 1.0), poses[np.array((0, 2))], np.array([0.5]), "cga_slerp")
+    np.testing.assert_allclose(basis(obj), as_matrix(wanted, 1.0), atol=2e-5)
+    after = snapshot(obj)
+    assert set(after) == set(before)
+    for channel, (*_, keys) in after.items():
+        others = [number for number in range(4) if number != 1]
+        assert [keys[number][:2] for number in others] == [before[channel][-1][number][:2] for number in others]
+
+
+def test_another_factor_and_cancelling_leave_nothing_behind(live_file):
+    obj = key(new_object(), seed=6)
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(int(NOW))
+    breakdown(obj, 0.7)
+    once = snapshot(obj)
+    bpy.context.view_layer.update()
+    for fcurve in curves_of(obj).values():
+        if len(fcurve.keyframe_points) == 5:
+            fcurve.keyframe_points.remove(fcurve.keyframe_points[2])
+    bpy.context.scene.frame_set(int(NOW))
+    before, played = snapshot(obj), shown_worlds([obj], np.arange(1.0, 41.0))[0]
+    bpy.context.scene.frame_set(int(NOW))
+    # A pose without a key is the animator's as well.
+    obj.location = (7.0, 8.0, 9.0)
+    bpy.context.view_layer.update()
+    seen = basis(obj)
+    tries = Breakdowns(obj)
+    for factor in (0.1, 0.9, 0.7):
+        tries.apply(factor)
+        bpy.context.view_layer.update()
+    assert snapshot(obj) == once, "as if it had been this factor from the first"
+    tries.cancel()
+    assert snapshot(obj) == before
+    assert tuple(obj.location) == (7.0, 8.0, 9.0)
+    np.testing.assert_allclose(basis(obj), seen, atol=1e-6)
+    assert np.abs(shown_worlds([obj], np.arange(1.0, 41.0))[0] - played).max() == 0.0
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline", "pga_lerp", "lerp_slerp"])
+@pytest.mark.parametrize("kind", ["PUSH", "RELAX"])
+def test_push_and_relax_go_from_the_pose_that_is_seen_along_the_mode(live_file, kind, mode):
+    obj = new_object()
+    own = give_own_deltas(obj, 8)
+    key(obj, seed=9, interpolation="LINEAR")
+    set_mode(obj, mode)
+    bpy.context.scene.frame_set(int(NOW))
+    keys = key_poses(obj, 9, own)
+    share = (NOW - BEFORE) / (AFTER - BEFORE)
+    between = on_path(keys, mode, share)
+    np.testing.assert_allclose(basis(obj), as_matrix(between, own.scale[0]), atol=2e-5)
+    obj.location = np.add(obj.location, (0.4, -0.3, 0.2))
+    bpy.context.view_layer.update()
+    seen = basis(obj)
+    breakdown(obj, 0.3, kind)
+    now = Poses(seen[None, :3, 3], np.array([bpy_quaternion(seen)]))
+    ends = Poses(
+        np.concatenate((now.positions, between.positions)), np.concatenate((now.quaternions, between.quaternions))
+    )
+    factor = -0.3 if kind == "PUSH" else 0.3
+    wanted = interpolate((0.0, 1.0), ends, np.array([factor]), mode, extrapolate=True)
+    np.testing.assert_allclose(basis(obj), as_matrix(wanted, own.scale[0]), atol=3e-5 * max(1.0, np.abs(seen).max()))
+
+
+def bpy_quaternion(matrix: np.ndarray) -> np.ndarray:
+    return np.array(Matrix(matrix.tolist()).to_quaternion())
+
+
+def test_bones_of_a_rig_each_go_between_their_own_keys(live_file):
+    rig = new_rig()
+    upper, hand = rig.pose.bones["Upper"], rig.pose.bones["Hand"]
+    frames = {"Upper": (1.0, 11.0, 24.0, 40.0), "Hand": (5.0, 15.0, 35.0)}
+    places = {}
+    for bone in (upper, hand):
+        random, count = np.random.default_rng(len(bone.name)), len(frames[bone.name])
+        places[bone.name] = Poses(random.normal(size=(count, 3)), [unit(q) for q in random.normal(size=(count, 4))])
+        for path, values in zip(
+            ("location", "rotation_quaternion"),
+            (places[bone.name].positions, places[bone.name].quaternions),
+            strict=True,
+        ):
+            write_channel(rig, f'pose.bones["{bone.name}"].{path}', np.array(frames[bone.name]), values)
+        set_mode(bone, "dq_sclerp")
+    bpy.context.scene.frame_set(int(NOW))
+    breakdown([upper, hand], 0.4)
+    bpy.context.view_layer.update()
+    for bone in (upper, hand):
+        wanted = interpolate((0.0, 1.0), places[bone.name][1:3], np.array([0.4]), "dq_sclerp")
+        np.testing.assert_allclose(bone.location, wanted.positions[0], atol=1e-5)
+        turned = np.array(bone.rotation_quaternion.normalized())
+        np.testing.assert_allclose(turned * np.sign(turned @ wanted.quaternions[0]), wanted.quaternions[0], atol=1e-5)
+    # The constraint adds nothing on a key.
+    for bone in (upper, hand):
+        assert bone.constraints[0].name == "Rigid Motion"
+
+
+def test_in_a_strip_it_is_the_frame_of_the_strip(live_file):
+    obj = key(new_object(), seed=1)
+    set_mode(obj, "dq_sclerp")
+    strip = push_down(obj, 101)
+    tweak(obj, strip)
+    bpy.context.scene.frame_set(100 + int(NOW))
+    breakdown(obj, 0.5)
+    wanted = interpolate((0.0, 1.0), key_poses(obj, 1, Own())[1:3], np.array([0.5]), "dq_sclerp")
+    assert NOW in key_frames(obj).tolist()
+    np.testing.assert_allclose(basis(obj), as_matrix(wanted, 1.0), atol=2e-5)
+
+
+def axis_and_angle(obj: bpy.types.Object) -> None:
+    obj.rotation_mode = "AXIS_ANGLE"
+
+
+@pytest.mark.parametrize("frame", [-3, 1, 40, 55])
+def test_without_keys_on_both_sides_it_is_refused(live_file, frame):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(frame)
+    before = snapshot(obj)
+    with pytest.raises(Refused, match=f"^Tool needs a key before and a key after frame {frame}:"):
+        breakdown(obj)
+    assert snapshot(obj) == before
+
+
+def test_what_cannot_be_keyed_is_refused_and_the_others_are_keyed(live_file):
+    good, bad, idle = (new_object(name) for name in ("Good", "Bad", "Idle"))
+    for obj in (good, bad):
+        key(obj)
+        set_mode(obj, "dq_sclerp")
+    axis_and_angle(bad)
+    bpy.context.scene.frame_set(int(NOW))
+    refused: list[Refused] = []
+    breakdown([good, bad, idle], 0.5, refused=refused)
+    assert NOW in key_frames(good).tolist()
+    assert NOW not in key_frames(bad).tolist()
+    assert sorted(str(one).split(" ")[0] for one in refused) == ["Bad", "Idle"]
+
+
+def test_a_breakdown_below_noise_and_holds_is_that_of_the_keys(live_file):
+    poses = []
+    for with_modifiers in (False, True):
+        obj = key(new_object(), seed=6)
+        set_mode(obj, "dq_sclerp")
+        if with_modifiers:
+            for (path, _), fcurve in curves_of(obj).items():
+                if path in ("location", "rotation_quaternion"):
+                    fcurve.modifiers.new("STEPPED").frame_step = 5.0
+            curves_of(obj)["location", 0].modifiers.new("NOISE").strength = 3.0
+            bpy.context.view_layer.update()
+        bpy.context.scene.frame_set(int(NOW))
+        breakdown(obj, 0.4)
+        poses.append(
+            [
+                next(one.co[1] for one in fcurve.keyframe_points if one.co[0] == NOW)
+                for (path, _), fcurve in curves_of(obj).items()
+                if path in ("location", "rotation_quaternion")
+            ]
+        )
+    np.testing.assert_allclose(*poses, atol=1e-6)

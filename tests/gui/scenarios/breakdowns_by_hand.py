@@ -1,0 +1,136 @@
+"""Breakdown, Push and Relax by hand: from the menu, dragged with the mouse, confirmed and cancelled, undone."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from rigid_motion.motion import Poses, interpolate
+from tests.animation.oracle import as_quaternion, snapshot
+from tests.gui import places
+from tests.gui.driver import Hand, Steps
+from tests.gui.scenarios.bones_by_hand import ALIKE, SCREW, hand_bone, key_frames, now, pose_the_rig, rig
+
+FRAME, WAY = 8, 300
+
+
+def scenario(hand: Hand) -> Steps[None]:
+    view = yield from pose_the_rig(hand)
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    bpy.context.scene.frame_set(FRAME)
+    bpy.ops.ed.undo_push(message="Screw")
+    yield from dragged_and_cancelled(hand, view)
+    yield from dragged_and_confirmed(hand, view)
+    yield from typed_and_beyond(hand, view)
+    yield from pushed(hand, view)
+    yield from an_object(hand, view)
+
+
+def keys() -> Poses:
+    """The first two keys of the hand, as `make_the_rig` sets them."""
+    turns = [0.0, 1.6]
+    quaternions = [(np.cos(a / 2), 0.6 * np.sin(a / 2), 0.0, 0.8 * np.sin(a / 2)) for a in turns]
+    return Poses([(-1.0, -0.3, 0.4), (0.0, 0.0, 0.0)], quaternions)
+
+
+def assert_on_the_screw(factor: float) -> None:
+    wanted = interpolate((0.0, 1.0), keys(), np.array([factor]), SCREW, extrapolate=True)
+    np.testing.assert_allclose(now()[:3, 3], wanted.positions[0], atol=ALIKE)
+    turned = np.array(hand_bone().rotation_quaternion.normalized())
+    np.testing.assert_allclose(turned * np.sign(turned @ wanted.quaternions[0]), wanted.quaternions[0], atol=ALIKE)
+
+
+def start(hand: Hand, view: bpy.types.Area, label: str, picture: str | None = None) -> Steps[tuple[int, int]]:
+    """Run it from Pose > In-Betweens; where the mouse is then."""
+    centre = places.centre(places.region(view))
+    yield from hand.hover(centre)
+    with bpy.context.temp_override(window=hand.window, area=view, region=places.region(view)):
+        bpy.ops.wm.call_menu("INVOKE_DEFAULT", name="VIEW3D_MT_pose_slide")
+    yield 0.3
+    if picture:
+        yield from hand.picture(picture)
+    yield from hand.choose(label)
+    yield 0.2
+    return hand.place
+
+
+def dragged_and_cancelled(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    before, seen, steps = snapshot(hand_bone()), now(), undo_steps()
+    x, y = yield from start(hand, view, "Breakdown along Mode", "menu")
+    assert_on_the_screw(0.5)
+    yield from hand.picture("half-way")
+    yield from hand.glide((x + WAY // 5, y), 4)
+    yield
+    assert_on_the_screw(0.7)
+    assert key_frames() == [1, FRAME, 20, 40]
+    yield from hand.picture("dragged")
+    yield from hand.press("ESC")
+    assert snapshot(hand_bone()) == before, "Esc leaves the keys as they were"
+    np.testing.assert_allclose(now(), seen, atol=1e-6)
+    assert undo_steps() == steps, "and no undo step"
+    yield from hand.picture("cancelled")
+
+
+def dragged_and_confirmed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    before, steps = snapshot(hand_bone()), undo_steps()
+    x, y = yield from start(hand, view, "Breakdown along Mode")
+    yield from hand.glide((x - 3 * WAY // 10, y), 4)
+    yield from hand.click()
+    assert_on_the_screw(0.2)
+    assert key_frames() == [1, FRAME, 20, 40]
+    assert undo_steps() == steps + 1
+    yield from hand.picture("confirmed")
+    yield from hand.press("Z", ctrl=True)
+    assert snapshot(hand_bone()) == before, "one step back"
+    yield from hand.press("Z", ctrl=True, shift=True)
+    assert_on_the_screw(0.2)
+    yield from hand.press("Z", ctrl=True)
+
+
+def typed_and_beyond(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    yield from start(hand, view, "Breakdown along Mode")
+    yield from hand.press("E")
+    yield from hand.type("125")
+    yield from hand.picture("beyond")
+    yield from hand.press("RET")
+    assert_on_the_screw(1.25)
+    yield from hand.press("F9")
+    yield from hand.picture("adjust-last-operation")
+    yield from hand.press("ESC")
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.press("Z", ctrl=True)
+
+
+def pushed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    before = snapshot(hand_bone())
+    yield from start(hand, view, "Push from In-Between of Mode")
+    yield from hand.picture("push")
+    yield from hand.click(button="RIGHTMOUSE")
+    assert snapshot(hand_bone()) == before
+
+
+def an_object(hand: Hand, view: bpy.types.Area) -> Steps[None]:
+    """By F3 in Object Mode."""
+    yield from hand.press("TAB", ctrl=True)
+    obj = rig()
+    for frame, x in ((1, 0.0), (20, 2.0)):
+        obj.location, obj.rotation_euler = (x, 0.0, 0.0), (0.0, 0.0, x)
+        obj.keyframe_insert("location", frame=frame)
+        obj.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.rigid_motion.set_mode(mode=SCREW)
+    bpy.context.scene.frame_set(FRAME)
+    bpy.ops.ed.undo_push(message="Object")
+    yield from hand.hover(places.centre(places.region(view)))
+    yield from hand.search("Breakdown along Mode")
+    yield 0.2
+    yield from hand.type("25")
+    yield from hand.picture("object")
+    yield from hand.press("RET")
+    ends = Poses([(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)], [as_quaternion((0.0, 0.0, x), "XYZ") for x in (0.0, 2.0)])
+    wanted = interpolate((0.0, 1.0), ends, np.array([0.25]), SCREW)
+    np.testing.assert_allclose(rig().matrix_basis.translation, wanted.positions[0], atol=ALIKE)
+
+
+def undo_steps() -> int:
+    """How many operators Blender remembers."""
+    return len(bpy.context.window_manager.operators)

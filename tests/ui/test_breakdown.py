@@ -1,0 +1,145 @@
+"""Breakdown, Push and Relax as operators: by a factor, and by the mouse, whose events are made up here."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion import animation
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.ui import manual, menus
+from rigid_motion.ui.breakdown import CLASSES
+from rigid_motion.ui.slider import WAY, Slider
+from tests.animation.oracle import snapshot
+from tests.animation.scenes import new_object
+from tests.ui import rigs
+from tests.ui.conftest import FRAMES
+from tests.ui.test_manual import page
+from tests.ui.test_menus import drawn
+
+operators = bpy.ops.rigid_motion
+
+
+def event(kind: str, value: str = "PRESS", x: float = 0.0, **held: bool) -> SimpleNamespace:
+    return SimpleNamespace(type=kind, value=value, mouse_x=x, **{"ctrl": False, "shift": False} | held)
+
+
+def test_a_breakdown_is_keyed_by_its_factor(tool):
+    animation.set_mode(tool, "dq_sclerp")
+    bpy.context.scene.frame_set(14)
+    assert operators.breakdown(factor=0.25) == {"FINISHED"}
+    # A quarter of the quarter turn about an axis beside the origin: x and y go along an arc.
+    keys = Poses(
+        [[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]], [[np.cos(a), 0.0, 0.0, np.sin(a)] for a in np.pi * np.arange(1, 3) / 4]
+    )
+    wanted = interpolate((0.0, 1.0), keys, np.array([0.25]), "dq_sclerp")
+    np.testing.assert_allclose(tool.location, wanted.positions[0], atol=1e-5)
+    assert animation.key_frames(tool).tolist() == sorted([*FRAMES.tolist(), 14.0])
+
+
+def test_a_new_key_has_the_type_that_the_scene_is_set_to(tool):
+    animation.set_mode(tool, "dq_sclerp")
+    bpy.context.scene.frame_set(14)
+    bpy.context.scene.tool_settings.keyframe_type = "BREAKDOWN"
+    operators.breakdown(factor=0.25)
+    for fields in snapshot(tool).values():
+        assert [key[11] for key in fields[-1]] == ["KEYFRAME", "KEYFRAME", "BREAKDOWN", "KEYFRAME", "KEYFRAME"]
+
+
+def test_push_and_relax_undo_each_other(tool):
+    animation.set_mode(tool, "dq_sclerp")
+    bpy.context.scene.frame_set(11)
+    before = np.array(tool.location)
+    operators.push(factor=1.0)
+    pushed = np.array(tool.location)
+    assert np.linalg.norm(pushed - before) > 0.1
+    bpy.context.view_layer.update()
+    operators.relax(factor=0.5)
+    np.testing.assert_allclose(tool.location, before, atol=1e-5)
+
+
+def test_selected_bones_are_meant_in_pose_mode(extension):
+    rig = rigs.keyed_rig()
+    animation.set_mode(list(rig.pose.bones), "dq_sclerp")
+    bpy.context.scene.frame_set(15)
+    operators.breakdown(factor=0.5)
+    keys = {bone.name: animation.key_frames(bone).tolist() for bone in rig.pose.bones}
+    assert {name for name, frames in keys.items() if 15.0 in frames} == {"Arm", "Hand"}
+
+
+@pytest.mark.parametrize("cls", CLASSES)
+def test_without_a_mode_it_is_greyed_out(tool, cls):
+    assert not cls.poll(bpy.context)
+    animation.set_mode(tool, "dq_sclerp")
+    assert cls.poll(bpy.context)
+
+
+def test_outside_of_the_keys_it_is_refused(tool):
+    animation.set_mode(tool, "dq_sclerp")
+    bpy.context.scene.frame_set(60)
+    with pytest.raises(RuntimeError, match="Tool needs a key before and a key after frame 60"):
+        operators.breakdown(factor=0.25)
+
+
+def test_what_has_no_keys_does_not_keep_the_others_from_theirs(tool):
+    animation.set_mode(tool, "dq_sclerp")
+    new_object("Idle").select_set(True)
+    bpy.context.scene.frame_set(14)
+    assert operators.breakdown(factor=0.25) == {"FINISHED"}
+    assert 14.0 in animation.key_frames(tool).tolist()
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
+def test_they_are_in_menus_and_have_a_page(cls, tool):
+    name = cls.bl_idname
+    for menu in (menus.RIGID_MOTION_MT_object, menus.RIGID_MOTION_MT_pose, menus.RIGID_MOTION_MT_keys):
+        assert name in [drawn_name for drawn_name, *_ in drawn(menu)]
+    assert any(draw is menus._draw_in_betweens for draw in bpy.types.VIEW3D_MT_pose_slide.draw._draw_funcs)
+    assert page(name).startswith(manual.DOCS)
+
+
+def test_the_mouse_moves_the_factor_and_stops_at_the_ends(extension):
+    slider = Slider(0.5, 100.0, 1.0)
+    assert slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 0.2 * WAY))
+    assert slider.factor == pytest.approx(0.7)
+    slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 2.0 * WAY))
+    assert slider.factor == 1.0
+    slider.handle(event("MOUSEMOVE", "NOTHING", 100.0 + 1.9 * WAY))
+    assert slider.factor == pytest.approx(0.9), "it comes back at once"
+
+
+def test_shift_is_fine_and_ctrl_goes_in_steps(extension):
+    slider = Slider(0.5, 0.0, 1.0)
+    slider.handle(event("MOUSEMOVE", "NOTHING", 0.2 * WAY, shift=True))
+    assert slider.factor == pytest.approx(0.52)
+    slider.handle(event("MOUSEMOVE", "NOTHING", 0.25 * WAY, ctrl=True))
+    assert slider.factor == pytest.approx(0.6)
+    slider.handle(event("LEFT_CTRL", "RELEASE", 0.25 * WAY))
+    assert slider.factor == pytest.approx(0.57)
+
+
+def test_e_lets_it_go_beyond_the_ends(extension):
+    slider = Slider(0.5, 0.0, 1.0)
+    slider.handle(event("E"))
+    slider.handle(event("MOUSEMOVE", "NOTHING", WAY))
+    assert slider.factor == pytest.approx(1.5)
+    slider.handle(event("E"))
+    assert slider.factor == 1.0
+
+
+def test_a_number_is_typed_in_per_cent(extension):
+    slider = Slider(0.5, 0.0, 1.0)
+    for kind in ("MINUS", "TWO", "NUMPAD_5", "PERIOD", "FIVE"):
+        assert slider.handle(event(kind))
+    assert slider.factor == pytest.approx(-0.255)
+    for _ in range(10):
+        slider.handle(event("BACK_SPACE"))
+    assert slider.factor == 0.5
+
+
+@pytest.mark.parametrize("kind", ["LEFTMOUSE", "ESC", "A", "TIMER"])
+def test_other_keys_are_not_for_the_slider(extension, kind):
+    assert not Slider(0.5, 0.0, 1.0).handle(event(kind))
