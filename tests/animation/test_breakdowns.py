@@ -225,6 +225,18 @@ def test_without_keys_on_both_sides_it_is_refused(live_file, frame):
     assert snapshot(obj) == before
 
 
+def test_copies_of_keys_in_cycles_are_not_keyed_between(live_file):
+    obj = key(new_object())
+    for fcurve in curves_of(obj).values():
+        fcurve.modifiers.new("CYCLES")
+    set_mode(obj, "dq_sclerp")
+    bpy.context.scene.frame_set(52)
+    before = snapshot(obj)
+    with pytest.raises(Refused, match=r"^Tool needs a key before and a key after frame 52:"):
+        breakdown(obj)
+    assert snapshot(obj) == before
+
+
 def test_what_cannot_be_keyed_is_refused_and_the_others_are_keyed(live_file):
     good, bad, idle = (new_object(name) for name in ("Good", "Bad", "Idle"))
     for obj in (good, bad):

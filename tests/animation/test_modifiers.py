@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Quaternion
 
-from rigid_motion.animation import Refused, bake, problem_of, reduce_keys_of, set_mode, unbake
+from rigid_motion.animation import Refused, bake, problem_of, reduce_keys_of, refresh, set_mode, unbake
 from rigid_motion.animation.curves import Stepped, held
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.poses import assert_same_poses, expected_poses, shown_poses
@@ -29,7 +29,7 @@ from tests.animation.oracle import (
     shown_worlds,
     snapshot,
 )
-from tests.animation.scenes import give_own_deltas, key, new_object
+from tests.animation.scenes import give_own_deltas, key, new_object, push_down
 
 PLAYED = np.arange(-9.0, 52.0)
 
@@ -130,6 +130,55 @@ def test_bones_hold_their_poses(live_file, settings):
     at = led_to([settings], frames)
     bases = {bone.name: expected(bone, at if number else frames) for number, bone in enumerate(rig.pose.bones)}
     assert_same_poses(rig, frames, *shown_poses([rig], frames), expected_poses(rig, frames, bases))
+
+
+@pytest.mark.parametrize("cycles", [False, True], ids=["once", "round and round"])
+def test_bones_hold_their_poses_before_zero_and_in_cycles(live_file, cycles):
+    rig = new_rig()
+    bone = key_bone(rig.pose.bones["Body"], (-21.0, -11.0, -1.0), seed=2)
+    if cycles:
+        for fcurve in channels(bone):
+            fcurve.modifiers.new("CYCLES")
+    modify(channels(bone), "STEPPED", frame_step=3.0)
+    set_mode(bone, "dq_sclerp")
+    frames = np.arange(-30.0, 25.0)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 0, 24
+    bpy.context.view_layer.update()
+    at = led_to([{"frame_step": 3.0}], frames)
+    if cycles:
+        # A frame on a seam is the end of a round behind the keys, and the beginning of one before them.
+        behind, before = -1.0 - (-1.0 - at) % 20.0, -21.0 + (at + 21.0) % 20.0
+        at = np.where(at > -1.0, behind, np.where(at < -21.0, before, at))
+    assert_same_poses(
+        rig, frames, *shown_poses([rig], frames), expected_poses(rig, frames, {"Body": expected(bone, at)}), ["Body"]
+    )
+
+
+@pytest.mark.parametrize("kind", ["object", "bone"])
+def test_in_a_strip_and_after_saving_holds_and_noise_are_there(live_file, tmp_path, kind):
+    if kind == "object":
+        found = key(new_object("Carrier"), seed=3)
+    else:
+        found = key_bone(new_rig("Carrier").pose.bones["Body"], seed=3)
+    set_mode(found, "motor_spline")
+    modify(channels(found), "STEPPED", frame_step=4.0, frame_offset=1.0)
+    modify([curves_of(found)["location", 2]], "NOISE", **NOISE)
+    obj, frames = found.id_data, np.arange(0.0, 44.0)
+
+    def seen(obj: bpy.types.Object, frames: np.ndarray) -> np.ndarray:
+        return shown_worlds([obj], frames)[0] if kind == "object" else shown_poses([obj], frames)[0]["Body"]
+
+    wanted = seen(obj, frames)
+    assert np.ptp(wanted[:, 0, 3]) > 0.1
+    path = str(tmp_path / "held.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    obj = bpy.data.objects["Carrier"]
+    assert refresh() == 0, "what was saved is complete"
+    assert_same(seen(obj, frames), wanted)
+    push_down(obj, 101, action_frame_end=44.0)
+    inside = slice(1, -1)
+    assert_same(seen(obj, frames[inside] + 100.0), wanted[inside])
 
 
 def test_another_step_is_followed_and_so_is_muting(live_file):

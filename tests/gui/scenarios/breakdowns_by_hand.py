@@ -23,6 +23,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from dragged_and_confirmed(hand, view)
     yield from typed_and_beyond(hand, view)
     yield from pushed(hand, view)
+    yield from in_the_dope_sheet(hand, hand.area("DOPESHEET_EDITOR"))
     yield from an_object(hand, view)
 
 
@@ -109,8 +110,22 @@ def pushed(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert snapshot(hand_bone()) == before
 
 
+def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
+    """By F3, for the bones whose channels are shown; the slider is in its header."""
+    before = snapshot(hand_bone())
+    yield from hand.hover(places.centre(places.region(sheet)))
+    yield from hand.search("Relax to In-Between of Mode")
+    yield 0.2
+    yield from hand.picture("dope-sheet")
+    yield from hand.press("RET")
+    assert key_frames() == [1, FRAME, 20, 40]
+    yield from hand.press("Z", ctrl=True)
+    assert snapshot(hand_bone()) == before
+
+
 def an_object(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     """By F3 in Object Mode."""
+    yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("TAB", ctrl=True)
     obj = rig()
     for frame, x in ((1, 0.0), (20, 2.0)):

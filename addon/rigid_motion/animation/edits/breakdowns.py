@@ -201,14 +201,16 @@ class Breakdowns:
         frame = frame_in_action(transform.animated, self._frame)
         whole = next(source for one, source in readable(transform, readings) if one is place)
         source, added = _without(whole, frame), added_values(place, transform, whole, np.array([frame]))[:, 0]
-        keys = source.key_frames if source.channels else np.empty(0)
-        after = int(np.searchsorted(keys, frame))
-        if not 0 < after < len(keys):
+        # Copies of keys in cycles are none to set others between.
+        first, last = source.keyed_range if source.channels else (np.inf, -np.inf)
+        if not first < frame < last:
             raise Refused(
                 rpt_(
                     "{name} needs a key before and a key after frame {frame:g}: go to a frame between two keys"
                 ).format(name=transform.name, frame=frame)
             )
+        keys = source.key_frames
+        after = int(np.searchsorted(keys, frame))
         seen = shown_components(transform)
         keyed = [transform.channels[row] for rows, _ in source.channels for row in rows]
         return _Between(
