@@ -17,7 +17,7 @@ from ..compute.components import LOCATION, ROWS
 from ..compute.differences import in_betweens
 from ..compute.source_cache import cached_source
 from ..compute.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, WHOLE_TURN, Source
-from ..compute.turning import Turning, shortest_turns, turning_in
+from ..compute.turning import Turning, needs_turning, shortest_turns, turning_in
 from ..queries.keyed import frames_in, modes_in, turns_in
 from ..transforms import Channel
 
@@ -98,6 +98,9 @@ def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
 STRAIGHT = ("lerp_slerp",)
 """Modes by which the path of the origin does not depend on how the body turns."""
 
+ONE_AXIS = 1e-5
+"""Radians off an axis, for rounding."""
+
 SAMPLES = 16
 """Of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
@@ -105,33 +108,39 @@ SAMPLES = 16
 def share_out_turns(place: SlotTransform, source: Source) -> bool:
     """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
 
-    `source` is what is keyed by now. Returns whether there were any.
+    `source` is what is keyed by now. Returns whether there was anything that the keys do not share out by themselves.
     """
     old = cached_source(recorded_digest(place))
-    if old is None or old.turns is None or source.turns is None or old.order != source.order or source.cyclic:
+    if old is None or source.key_count <= old.key_count or old.order != source.order or source.cyclic is not None:
         return False
-    if source.key_count <= old.key_count:
+    if not needs_turning(old):
         return False
-    shared: dict[float, int] = {}
-    for segment in np.flatnonzero(old.segment_turns):
+    shared: dict[float, float] = {}
+    for segment in np.flatnonzero(old.modes).tolist():
         first, last = old.key_frames[segment : segment + 2]
         parts = np.flatnonzero((source.key_frames > first - SAME_FRAME) & (source.key_frames < last - SAME_FRAME))
         if len(parts) > 1 and np.all(source.segment_turns[parts] == old.segment_turns[segment]):
-            turned = turning_in(old, int(segment))
-            shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]])
-            is_straight = MODE_NAMES[old.modes[segment]] in STRAIGHT or _rests(old, segment)
-            for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
-                parted = _turns_of(source, part, turned, share, axis, whole=is_straight)
-                shared[float(source.key_frames[part])] = parted
-    if shared:
-        set_turns_in(place, list(shared.values()), list(shared))
-    return bool(shared)
+            turned = turning_in(old, segment)
+            if turned.spins.turns[0]:
+                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]])
+                whole = _is_enough_in_whole_turns(old, segment, turned)
+                for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
+                    shared[float(source.key_frames[part])] = _turns_of(source, part, turned, share, axis, whole=whole)
+    chosen = np.array(list(shared))
+    if not shared or np.array_equal(turns_in(place, chosen), list(shared.values())):
+        return False
+    set_turns_in(place, list(shared.values()), chosen)
+    return True
 
 
-def _rests(source: Source, segment: int) -> bool:
-    """Whether the origin stays where it is from one key to the next."""
-    ends = source.values_at(source.key_frames[segment : segment + 2])
-    return not np.ptp(ends[ROWS[LOCATION]], axis=1).any()
+def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> bool:
+    """Whether it makes no difference for the motion what part of a turn is spin.
+
+    So it is where all of it is about one axis, and the path of the origin does not depend on it.
+    """
+    ends = source.values_at(source.key_frames[segment : segment + 2])[ROWS[LOCATION]]
+    is_straight = MODE_NAMES[source.modes[segment]] in STRAIGHT or not np.ptp(ends, axis=1).any()
+    return is_straight and float(np.abs(np.cross(turned.turn[:, 0], turned.axes_in_body[:, 0])).max()) < ONE_AXIS
 
 
 def _shares(source: Source, turned: Turning, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
