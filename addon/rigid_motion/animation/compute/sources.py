@@ -243,11 +243,13 @@ class Source:
     @cached_property
     def has_half_turns(self) -> bool:
         """Whether an Euler angle goes by half a turn or more from one of its keys to the next."""
-        return self.order is not None and any(
-            np.any(np.abs(np.diff(values)) >= HALF_TURN)
-            for rows, keys in self.channels
-            for row, values in zip(rows, keys.values, strict=True)
-            if 3 <= row < 6
+        if self.order is None:
+            return False
+        angles = (
+            (keys.values, [place for place, row in enumerate(rows) if 3 <= row < 6]) for rows, keys in self.channels
+        )
+        return any(
+            places and np.abs(np.diff(values[places])).max(initial=0.0) >= HALF_TURN for values, places in angles
         )
 
     @property
