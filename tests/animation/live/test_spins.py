@@ -356,3 +356,20 @@ def test_undo_takes_turns_back_and_redo_brings_them_again(live_file):
             assert np.abs(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0] - wanted).max() < 1e-4
     finally:
         bpy.utils.unregister_class(Edit)
+
+
+def test_without_the_key_in_between_turns_are_whole_again(live_file):
+    obj = propeller("dq_sclerp")
+    set_turns(obj, 3, [1.0])
+    before = shown_worlds([obj], EACH[:49])[0]
+    insert(obj, 10)
+    keys = curve_of(obj, "rigid_motion.turns").keyframe_points
+    assert keys[0].co[1] != round(keys[0].co[1])
+    for path in ("location", "rotation_quaternion", "rigid_motion.turns"):
+        for index in range(4):
+            curve = curve_of(obj, path, index)
+            for key in [] if curve is None else [key for key in curve.keyframe_points if key.co[0] == 10.0]:
+                curve.keyframe_points.remove(key)
+    bpy.context.view_layer.update()
+    assert curve_of(obj, "rigid_motion.turns").keyframe_points[0].co[1] == 3.0
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5

@@ -108,17 +108,27 @@ SAMPLES = 16
 def share_out_turns(place: SlotTransform, source: Source) -> bool:
     """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
 
-    `source` is what is keyed by now. Returns whether there was anything that the keys do not share out by themselves.
+    Where keys go between such parts, these have whole turns together again. `source` is what is keyed by now. Returns
+    whether there was anything to change.
     """
     old = cached_source(recorded_digest(place))
-    if old is None or source.key_count <= old.key_count or old.order != source.order or source.cyclic is not None:
+    if old is None or old.order != source.order or source.cyclic is not None or not needs_turning(old):
         return False
-    if not needs_turning(old):
+    if source.key_count == old.key_count:
         return False
+    shared = _divided(old, source) if source.key_count > old.key_count else _joined(old, source)
+    chosen = np.array(list(shared))
+    if not shared or np.array_equal(turns_in(place, chosen), list(shared.values())):
+        return False
+    set_turns_in(place, list(shared.values()), chosen)
+    return True
+
+
+def _divided(old: Source, source: Source) -> dict[float, float]:
+    """The turns of the parts that keys divide segments into, by the frames that these begin on."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(old.modes).tolist():
-        first, last = old.key_frames[segment : segment + 2]
-        parts = np.flatnonzero((source.key_frames > first - SAME_FRAME) & (source.key_frames < last - SAME_FRAME))
+        parts = _within(source.key_frames, *old.key_frames[segment : segment + 2])
         if len(parts) > 1 and np.all(source.segment_turns[parts] == old.segment_turns[segment]):
             turned = turning_in(old, segment)
             if turned.spins.turns[0]:
@@ -126,11 +136,25 @@ def share_out_turns(place: SlotTransform, source: Source) -> bool:
                 whole = _is_enough_in_whole_turns(old, segment, turned)
                 for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
                     shared[float(source.key_frames[part])] = _turns_of(source, part, turned, share, axis, whole=whole)
-    chosen = np.array(list(shared))
-    if not shared or np.array_equal(turns_in(place, chosen), list(shared.values())):
-        return False
-    set_turns_in(place, list(shared.values()), chosen)
-    return True
+    return shared
+
+
+def _joined(old: Source, source: Source) -> dict[float, float]:
+    """The whole turns of segments in place of which there were several, not all of them in whole turns."""
+    shared: dict[float, float] = {}
+    for segment in np.flatnonzero(source.segment_turns != np.rint(source.segment_turns)).tolist():
+        ends = source.key_frames[segment : segment + 2]
+        parts = _within(old.key_frames, *ends)
+        if len(parts) > 1 and source.segment_turns[segment] == old.segment_turns[parts[0]]:
+            turned = turning_in(old, int(parts[0]))
+            shares, axes = _shares(old, turned, ends, float(np.abs(old.segment_turns[parts]).sum()))
+            shared[float(ends[0])] = _turns_of(source, segment, turned, shares[0], axes[0], whole=True)
+    return shared
+
+
+def _within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
+    """The segments between these frames of keys that begin from a first frame on, and before a last one."""
+    return np.flatnonzero((frames[:-1] > first - SAME_FRAME) & (frames[:-1] < last - SAME_FRAME))
 
 
 def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> bool:
@@ -143,10 +167,12 @@ def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> 
     return is_straight and float(np.abs(np.cross(turned.turn[:, 0], turned.axes_in_body[:, 0])).max()) < ONE_AXIS
 
 
-def _shares(source: Source, turned: Turning, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _shares(
+    source: Source, turned: Turning, frames: np.ndarray, turns: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """What part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and the axis
-    of its spins as it lies in the body on each of them, (p, 3)."""
-    steps = SAMPLES * (1 + int(abs(turned.spins.turns[0])))
+    of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all."""
+    steps = SAMPLES * (1 + int(abs(turned.spins.turns[0] if turns is None else turns)))
     samples = np.concatenate([np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(frames)])
     quaternions = in_betweens(source, np.append(samples, frames[-1])).wanted.quaternions
     axes = np.tile(turned.spins.axes[:, 0], (len(quaternions), 1))
