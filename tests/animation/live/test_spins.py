@@ -373,3 +373,20 @@ def test_without_the_key_in_between_turns_are_whole_again(live_file):
     bpy.context.view_layer.update()
     assert curve_of(obj, "rigid_motion.turns").keyframe_points[0].co[1] == 3.0
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_parts_of_turns_are_as_the_oracle_has_them(live_file, mode, order):
+    if order == "QUATERNION":
+        obj = propeller(mode)
+        set_turns(obj, 2, [1.0])
+    else:
+        obj = wheel((0.0, 2.0 * tau + 1.0), mode, order=order, frames=(1.0, 25.0))
+        write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
+    insert(obj, 10)
+    insert(obj, 16)
+    if mode not in ("lerp_slerp",):
+        values = [key.co[1] for key in curve_of(obj, "rigid_motion.turns").keyframe_points]
+        assert any(abs(value - round(value)) > 0.01 for value in values)
+    assert_shown([obj], EACH[:25])
