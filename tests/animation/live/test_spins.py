@@ -390,3 +390,21 @@ def test_parts_of_turns_are_as_the_oracle_has_them(live_file, mode, order):
         values = [key.co[1] for key in curve_of(obj, "rigid_motion.turns").keyframe_points]
         assert any(abs(value - round(value)) > 0.01 for value in values)
     assert_shown([obj], EACH[:25])
+
+
+@pytest.mark.parametrize(
+    ("turns", "axis", "problem"), [(1001, None, "-1000 to 1000"), (0.5, None, "whole"), (1, "W", "SCREW")]
+)
+def test_what_are_no_turns_is_refused(live_file, turns, axis, problem):
+    obj = propeller("dq_sclerp")
+    with pytest.raises(animation.Refused, match=problem):
+        set_turns(obj, turns, [1.0], axis=axis)
+    assert curve_of(obj, "rigid_motion.turns") is None
+
+
+def test_too_many_turns_of_the_channel_are_told(live_file):
+    obj = propeller("dq_sclerp")
+    set_turns(obj, 1, [1.0])
+    curve_of(obj, "rigid_motion.turns").keyframe_points[0].co_ui.y = 1e6
+    bpy.context.view_layer.update()
+    assert "key 1 of the channel Turns" in animation.problem_of(obj)

@@ -3,7 +3,8 @@
 Euler angles say how far: of the axis that goes furthest in a segment, if that is more than half a turn, as many turns
 are added to the shortest rotation as it lacks of the angle; at half a turn, which has two shortest ways, the sense of
 the angle decides. The axis stands still in the body where the angles turned about before it change less, and else in
-space. What the channel of turns has comes on top.
+space. What the channel of turns has comes on top. Inserted keys may leave parts of turns in it: a part is taken off the
+way to the second key, and made by the spin.
 """
 
 from __future__ import annotations
