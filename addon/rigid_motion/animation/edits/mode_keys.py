@@ -121,9 +121,11 @@ def set_turns(
         set_turns_in(place, turns, frames_in(place)[:-1] if frames is None else frames)
 
     if isinstance(turns, bool) or not isinstance(turns, int) or abs(turns) > MOST_TURNS:
-        raise Refused(f"turns is {turns!r}: give a whole number from {-MOST_TURNS} to {MOST_TURNS}")
+        text = rpt_("{turns} is no number of turns: give a whole number from -{most} to {most}")
+        raise Refused(text.format(turns=turns, most=MOST_TURNS))
     if axis is not None and axis not in TURN_AXES:
-        raise Refused(f"there is no axis {axis!r} of turns; they are {', '.join(TURN_AXES)}")
+        text = rpt_("{axis} is no axis of turns: give one of {axes}")
+        raise Refused(text.format(axis=axis, axes=", ".join(TURN_AXES)))
     apply_edit(targets, plan, act, refused)
 
 
