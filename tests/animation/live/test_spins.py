@@ -202,6 +202,7 @@ def test_a_bake_has_the_turns_and_undoing_it_brings_them_back(live_file, mode):
     before = shown_worlds([obj], EACH[:49])[0]
     animation.bake(obj)
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
+    assert [key.co[1] for key in curve_of(obj, "rigid_motion.turns").keyframe_points] == [3.0, 0.0]
     animation.unbake(obj)
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
 
@@ -408,3 +409,15 @@ def test_too_many_turns_of_the_channel_are_told(live_file):
     curve_of(obj, "rigid_motion.turns").keyframe_points[0].co_ui.y = 1e6
     bpy.context.view_layer.update()
     assert "key 1 of the channel Turns" in animation.problem_of(obj)
+
+
+def test_a_bake_of_euler_angles_needs_no_channel_of_turns(live_file):
+    obj = wheel((0.0, 3.0 * tau + 1.0), "dq_sclerp", frames=(1.0, 25.0))
+    write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
+    before = shown_worlds([obj], EACH[:25])[0]
+    animation.bake(obj)
+    assert curve_of(obj, "rigid_motion.turns") is None
+    assert np.abs(shown_worlds([obj], EACH[:25])[0] - before).max() < 1e-5
+    animation.unbake(obj)
+    animation.bake(obj, step=2, first=5, last=15)
+    assert np.abs(shown_worlds([obj], EACH[:25:2])[0] - before[::2]).max() < 1e-5

@@ -129,7 +129,8 @@ def _divided(old: Source, source: Source) -> dict[float, float]:
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(old.modes).tolist():
         parts = _within(source.key_frames, *old.key_frames[segment : segment + 2])
-        if len(parts) > 1 and np.all(source.segment_turns[parts] == old.segment_turns[segment]):
+        are_as_before = source.segment_turns[parts] == old.segment_turns[segment]
+        if len(parts) > 1 and np.all(are_as_before & (source.modes[parts] != 0)):
             turned = turning_in(old, segment)
             if turned.spins.turns[0]:
                 shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]])
