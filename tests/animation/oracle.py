@@ -20,7 +20,7 @@ from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate,
 from rigid_motion.motion.quaternions import multiply, normalise
 from tests.animation.modified import acting, held_frames, without_modifiers
 from tests.animation.smooth_oracle import share_of, with_tangents
-from tests.animation.spin_oracle import Spin, spin_by_angles, with_channel
+from tests.animation.spin_oracle import Spin, spin_and_end
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
 """What has location, rotation and scale. Pose bones have no delta transforms of their own."""
@@ -171,10 +171,12 @@ def _components(
             leaving, arriving = _passings(obj, keys, first, own)
             share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
             poses = _smooth(obj, keys, first, share, mode, own, scaled, (leaving[0], arriving[0]))
+            spin = _spin(obj, first, last, own)
         else:
             ends = _key_poses(obj, np.array((first, last)), own, scaled)
+            spin, ends.quaternions[1] = _spin_and_end(obj, first, last, own)
             poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
-        poses = _spin(obj, first, last, own).add_to(poses, share)
+        poses = spin.add_to(poses, share)
         location[inside], quaternion[inside] = poses.positions @ _axes(obj), poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
@@ -200,16 +202,22 @@ def _key_poses(obj: Carrier, frames: np.ndarray, own: Own, scaled: bool) -> Pose
 
 def _spin(obj: Carrier, first: float, last: float, own: Own, *, channel: bool = True) -> Spin:
     """The whole turns more from one key to the next, of the angles and of the channel."""
-    quaternions = _key_poses(obj, np.array((first, last)), own, False).quaternions
-    spin = Spin()
+    return _spin_and_end(obj, first, last, own, channel=channel, whole=True)[0]
+
+
+def _spin_and_end(
+    obj: Carrier, first: float, last: float, own: Own, *, channel: bool = True, whole: bool = False
+) -> tuple[Spin, np.ndarray]:
+    """The turns more from one key to the next, and where the body turns to without them."""
+    ends = np.array((first, last))
+    fcurve, turns = curve_of(obj, "rigid_motion.turns"), 0.0
+    if channel and fcurve is not None and not fcurve.mute and mode_at(obj, first) != "BLENDER":
+        turns = next((key.co[1] for key in reversed(fcurve.keyframe_points) if key.co[0] < first + 0.005), 0.0)
+    by_angles = {}
     if obj.rotation_mode != "QUATERNION":
-        angles = _channels(obj, "rotation_euler", np.array((first, last)))
-        spin = spin_by_angles(angles, obj.rotation_mode, quaternions, own.quaternion)
-    fcurve = curve_of(obj, "rigid_motion.turns")
-    if not channel or fcurve is None or fcurve.mute or mode_at(obj, first) == "BLENDER":
-        return spin
-    before = [key.co[1] for key in fcurve.keyframe_points if key.co[0] < first + 0.005]
-    return with_channel(spin, round(before[-1]) if before else 0, quaternions)
+        by_angles = {"angles": _channels(obj, "rotation_euler", ends), "order": obj.rotation_mode}
+    quaternions = _key_poses(obj, ends, own, False).quaternions
+    return spin_and_end(quaternions, turns, **by_angles, own=own.quaternion, whole=whole)
 
 
 def _smooth(

@@ -1,4 +1,4 @@
-"""How many whole turns a body makes between two keys, worked out one segment at a time, by `mathutils`."""
+"""How many turns a body makes between two keys, worked out one segment at a time, by `mathutils`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rigid_motion.motion.quaternions import multiply
 class Spin(NamedTuple):
     """Turns about an axis that stands still in space, or in the body."""
 
-    turns: int = 0
+    turns: float = 0
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     in_space: bool = False
 
@@ -44,14 +44,12 @@ def shortest(first: Sequence[float], second: Sequence[float]) -> np.ndarray:
     return np.array(xyz) * (2.0 * np.arctan2(length, abs(w)) / max(length, 1e-12))
 
 
-def spin_by_angles(
-    angles: np.ndarray, order: str, quaternions: np.ndarray, own: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
-) -> Spin:
-    """The turns of Euler angles (2, 3) beyond the shortest rotation of quaternions (2, 4) with `own` on top."""
+def _axis_of_angles(
+    angles: np.ndarray, order: str, quaternions: np.ndarray, own: Sequence[float]
+) -> tuple[float, Vector, bool]:
+    """How far that of two sets of Euler angles (2, 3) goes which goes furthest; its axis, and whether in space."""
     change = angles[1] - angles[0]
     which = int(np.argmax(np.abs(change)))
-    if abs(change[which]) <= np.pi - 1e-4:
-        return Spin()
     in_space, in_body = [], []
     for set_of_angles, quaternion in zip(angles, quaternions, strict=True):
         further = set_of_angles.copy()
@@ -62,19 +60,62 @@ def spin_by_angles(
         in_body.append(Quaternion(quaternion).inverted() @ axis)
     stands = (in_space[1] - in_space[0]).length < (in_body[1] - in_body[0]).length
     axis = sum(in_space if stands else in_body, Vector((0.0, 0.0, 0.0))).normalized()
-    turn = Vector(shortest(*quaternions))
-    if stands:
-        turn.rotate(Quaternion(quaternions[0]))
-    return Spin(round((change[which] - turn.dot(axis)) / (2.0 * np.pi)), tuple(axis), stands)
+    return float(change[which]), axis, stands
 
 
-def with_channel(spin: Spin, turns: int, quaternions: np.ndarray, axis: str = "SCREW") -> Spin:
-    """The same with the turns of the channel on top."""
-    if not turns:
-        return spin
-    if spin.turns:
-        return spin._replace(turns=spin.turns + turns * (1 if spin.turns > 0 else -1))
-    turn = shortest(*quaternions)
-    if axis == "SCREW" and np.linalg.norm(turn) >= 1e-4:
-        return Spin(turns, tuple(turn / np.linalg.norm(turn)))
-    return Spin(turns, tuple(np.eye(3)["XYZ".find(axis)]))
+def _about(spin: Spin, first: Sequence[float], second: Sequence[float]) -> float:
+    """How far the shortest rotation goes about the axis of a spin."""
+    turn = Vector(shortest(first, second))
+    if spin.in_space:
+        turn.rotate(Quaternion(first))
+    return turn.dot(Vector(spin.axis))
+
+
+def spin_and_end(
+    quaternions: np.ndarray,
+    turns: float,
+    *,
+    angles: np.ndarray | None = None,
+    order: str = "XYZ",
+    own: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
+    axis: str = "SCREW",
+    whole: bool = False,
+) -> tuple[Spin, np.ndarray]:
+    """The spin between two quaternions (2, 4), and where the body turns to without it, (4,).
+
+    With the turns that Euler angles (2, 3) say, and those of the channel on top; what is not whole of these is a part
+    of the rotation, unless `whole` turns are wanted.
+    """
+    first, second = quaternions
+    part = 0.0 if abs(turns - round(turns)) < 1e-5 else turns - round(turns)
+    spin, sense, change = Spin(), 0, 0.0
+    if angles is not None:
+        change, about, stands = _axis_of_angles(angles, order, quaternions, own)
+        if part or abs(change) > np.pi - 1e-4:
+            spin, sense = Spin(0, tuple(about), stands), 1 if change > 0.0 else -1
+    if sense:
+        end = _without(spin._replace(turns=sense * part), second)
+        lacking = round((change - 2.0 * np.pi * sense * part - _about(spin, first, end)) / (2.0 * np.pi))
+        sense = sense if lacking or part else 0
+        spin = spin._replace(turns=lacking + sense * turns)
+    if not sense and turns:
+        turn = shortest(first, second)
+        length = np.linalg.norm(turn)
+        is_screw = axis == "SCREW" and length >= 1e-4
+        spin = Spin(turns, tuple(turn / length if is_screw else np.eye(3)["XYZ".find(axis)]))
+        end = _without(spin._replace(turns=part), second)
+    elif not sense:
+        end = second
+    if part and whole:
+        total = _about(spin, first, end) + 2.0 * np.pi * spin.turns
+        return spin._replace(turns=round((total - _about(spin, first, second)) / (2.0 * np.pi))), second
+    return spin, end
+
+
+def _without(spin: Spin, quaternion: np.ndarray) -> np.ndarray:
+    """A quaternion turned back by a spin; to the last bit where that is by nothing."""
+    if not spin.turns:
+        return quaternion
+    angle = -2.0 * np.pi * spin.turns
+    back = np.concatenate(((np.cos(0.5 * angle),), np.sin(0.5 * angle) * np.array(spin.axis)))
+    return multiply(back, quaternion) if spin.in_space else multiply(np.array(quaternion), back)

@@ -57,6 +57,52 @@ def test_a_mode_fills_in_at_once_and_leaves_the_keys_alone(tool):
     assert values(tool) == before
 
 
+def turns(obj):
+    """The keys of the channel of turns, frames and values."""
+    fcurve = curves_of(obj).get(("rigid_motion.turns", 0))
+    return {} if fcurve is None else {key.co.x: key.co.y for key in fcurve.keyframe_points}
+
+
+def test_turns_are_of_the_segment_under_the_playhead_or_of_all(tool):
+    operators.set_mode(mode="dq_sclerp")
+    bpy.context.scene.frame_set(int(FRAMES[1]) + 2)
+    assert operators.set_turns(turns=2) == {"FINISHED"}
+    assert turns(tool) == {FRAMES[0]: 0.0, FRAMES[1]: 2.0, FRAMES[2]: 0.0}
+    assert operators.set_turns(turns=-1, on="WHOLE") == {"FINISHED"}
+    assert set(turns(tool).values()) <= {-1.0, 0.0}
+    assert [value for frame, value in turns(tool).items() if frame < FRAMES[-1]] == [-1.0] * (len(turns(tool)) - 1)
+    assert operators.set_turns(turns=0, on="WHOLE") == {"FINISHED"}
+    assert turns(tool) == {}
+
+
+def test_turns_of_selected_keys_keep_the_axis_unless_there_is_another(tool):
+    operators.set_mode(mode="dq_sclerp")
+    select_keys(tool, FRAMES[2])
+    operators.set_turns(turns=1, on="SELECTED", axis="X")
+    record = tool.animation_data.action.rigid_motion.slots[0]
+    assert turns(tool)[FRAMES[2]] == 1.0
+    assert record.turns_axis == "X"
+    operators.set_turns(turns=2, on="SELECTED")
+    assert turns(tool)[FRAMES[2]] == 2.0
+    assert record.turns_axis == "X"
+
+
+def test_another_axis_moves_what_turns_at_once(tool):
+    operators.set_mode(mode="dq_sclerp")
+    bpy.context.scene.frame_set(int(FRAMES[0]) + 3)
+    operators.set_turns(turns=1)
+    before = np.array(tool.matrix_world)
+    tool.animation_data.action.rigid_motion.slots[0].turns_axis = "X"
+    bpy.context.scene.frame_set(int(FRAMES[0]) + 3)
+    assert np.abs(np.array(tool.matrix_world) - before).max() > 0.1
+
+
+def test_blenders_own_in_betweens_refuse_turns(tool):
+    with pytest.raises(RuntimeError, match="choose a mode first"):
+        operators.set_turns(turns=1)
+    assert turns(tool) == {}
+
+
 def test_selected_keys_get_the_mode_for_the_segments_they_begin(tool):
     select_keys(tool, 11.0)
     operators.set_mode(mode="dq_sclerp", on="SELECTED")

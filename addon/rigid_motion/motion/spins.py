@@ -22,7 +22,7 @@ class Spins:
     """The spins of S segments."""
 
     turns: np.ndarray
-    """Whole turns, by their sign in the sense of the axis or against it, shape (S,)."""
+    """By their sign in the sense of the axis or against it, shape (S,). Whole ones end as they begin."""
 
     axes: np.ndarray
     """Unit vectors, shape (3, S)."""

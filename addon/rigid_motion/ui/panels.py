@@ -56,7 +56,7 @@ class _Main:
         if segment is not None:
             _draw_segment(context, layout, segment)
             if segment.mode != "BLENDER":
-                _draw_turns(layout, target, segment)
+                _draw_turns(layout, target)
         for icon, text in notes:
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:
@@ -144,11 +144,11 @@ def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segmen
         labelled(column, label).label(text=text, translate=False)
 
 
-def _draw_turns(layout: bpy.types.UILayout, target: Transform, segment: SegmentFacts) -> None:
+def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
     """Turns of the segment, to be set; and what they are about once there are any."""
     row = labelled(layout, iface_("Turns", OWN_WORDS))
     row.prop(target.motion, "turns", text="")
-    place = active_place(target) if segment.turns else None
+    place = active_place(target) if target.motion.turns else None
     if place is not None and (record := record_of(place)) is not None:
         row.prop(record, "turns_axis", text="")
 

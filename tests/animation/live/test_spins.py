@@ -13,6 +13,7 @@ from rigid_motion import animation
 from rigid_motion.animation import set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion.motion.eulers import ORDERS
+from tests.animation.edit_steps import Edit
 from tests.animation.oracle import assert_shown, curve_of, rotation_path, shown_worlds
 from tests.animation.scenes import give_own_deltas, new_object
 
@@ -201,6 +202,7 @@ def test_a_bake_has_the_turns_and_undoing_it_brings_them_back(live_file, mode):
     before = shown_worlds([obj], EACH[:49])[0]
     animation.bake(obj)
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
+    assert [key.co[1] for key in curve_of(obj, "rigid_motion.turns").keyframe_points] == [3.0, 0.0]
     animation.unbake(obj)
     assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
 
@@ -290,3 +292,132 @@ def test_what_has_no_mode_refuses_turns(live_file):
     with pytest.raises(animation.Refused, match="choose a mode first"):
         set_turns(obj, 2, [1.0])
     assert curve_of(obj, "rigid_motion.turns") is None
+
+
+@pytest.mark.parametrize("frames", [(9,), (3, 20), (13, 7, 16)])
+@pytest.mark.parametrize(("turns", "axis"), [(3, "SCREW"), (-2, "SCREW"), (2, "X")])
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "pga_slerp", "cga_slerp"])
+def test_keys_in_between_keep_the_path_of_what_moves(live_file, mode, turns, axis, frames):
+    obj = propeller(mode)
+    set_turns(obj, turns, [1.0], axis=axis)
+    before = shown_worlds([obj], EACH[:49])[0]
+    for frame in frames:
+        insert(obj, frame)
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-4
+
+
+@pytest.mark.parametrize("order", ["XYZ", "YZX", "ZYX"])
+@pytest.mark.parametrize("frames", [(3,), (9, 20)])
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "pga_slerp", "cga_slerp"])
+def test_keys_in_between_keep_the_path_of_a_wheel_that_rolls_by_angles(live_file, mode, frames, order):
+    obj = wheel((0.0, 3.0 * tau + 1.0), mode, order=order, frames=(1.0, 25.0))
+    write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
+    before = shown_worlds([obj], EACH[:25])[0]
+    for frame in frames:
+        insert(obj, frame)
+    assert np.abs(shown_worlds([obj], EACH[:25])[0] - before).max() < 1e-4
+
+
+@pytest.mark.parametrize("mode", ["lerp_slerp", "dq_sclerp", "motor_spline"])
+def test_keys_all_along_have_no_turns_of_their_own(live_file, mode):
+    """As Blender's Bake Action sets them: the values of the curves, on every frame."""
+    obj = propeller(mode)
+    set_turns(obj, 2, [1.0])
+    before = shown_worlds([obj], EACH[:49])[0]
+    for path, count in (("location", 3), ("rotation_quaternion", 4)):
+        for index in range(count):
+            curve = curve_of(obj, path, index)
+            values = [(frame, curve.evaluate(frame)) for frame in range(1, 50)]
+            for frame, value in values:
+                curve.keyframe_points.insert(frame, value).interpolation = "LINEAR"
+    bpy.context.view_layer.update()
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 2e-4
+
+
+def test_undo_takes_turns_back_and_redo_brings_them_again(live_file):
+    bpy.utils.register_class(Edit)
+    try:
+        obj = propeller("dq_sclerp")
+        bpy.ops.ed.undo_push(message="Keys")
+        before = shown_worlds([obj], EACH[:49])[0]
+        after = []
+        for change in (
+            lambda: set_turns(bpy.data.objects["Tool"], 3, [1.0]),
+            lambda: insert(bpy.data.objects["Tool"], 9),
+        ):
+            Edit.change = change
+            bpy.ops.test.edit("EXEC_DEFAULT", True)
+            after.append(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0])
+        assert np.abs(after[1] - after[0]).max() < 1e-4
+        for wanted in (after[0], before):
+            bpy.ops.ed.undo()
+            assert np.abs(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0] - wanted).max() < 1e-4
+        for wanted in after:
+            bpy.ops.ed.redo()
+            assert np.abs(shown_worlds([bpy.data.objects["Tool"]], EACH[:49])[0] - wanted).max() < 1e-4
+    finally:
+        bpy.utils.unregister_class(Edit)
+
+
+def test_without_the_key_in_between_turns_are_whole_again(live_file):
+    obj = propeller("dq_sclerp")
+    set_turns(obj, 3, [1.0])
+    before = shown_worlds([obj], EACH[:49])[0]
+    insert(obj, 10)
+    keys = curve_of(obj, "rigid_motion.turns").keyframe_points
+    assert keys[0].co[1] != round(keys[0].co[1])
+    for path in ("location", "rotation_quaternion", "rigid_motion.turns"):
+        for index in range(4):
+            curve = curve_of(obj, path, index)
+            for key in [] if curve is None else [key for key in curve.keyframe_points if key.co[0] == 10.0]:
+                curve.keyframe_points.remove(key)
+    bpy.context.view_layer.update()
+    assert curve_of(obj, "rigid_motion.turns").keyframe_points[0].co[1] == 3.0
+    assert np.abs(shown_worlds([obj], EACH[:49])[0] - before).max() < 1e-5
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "YZX"])
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_parts_of_turns_are_as_the_oracle_has_them(live_file, mode, order):
+    if order == "QUATERNION":
+        obj = propeller(mode)
+        set_turns(obj, 2, [1.0])
+    else:
+        obj = wheel((0.0, 2.0 * tau + 1.0), mode, order=order, frames=(1.0, 25.0))
+        write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
+    insert(obj, 10)
+    insert(obj, 16)
+    if mode not in ("lerp_slerp",):
+        values = [key.co[1] for key in curve_of(obj, "rigid_motion.turns").keyframe_points]
+        assert any(abs(value - round(value)) > 0.01 for value in values)
+    assert_shown([obj], EACH[:25])
+
+
+@pytest.mark.parametrize(
+    ("turns", "axis", "problem"), [(1001, None, "-1000 to 1000"), (0.5, None, "whole"), (1, "W", "SCREW")]
+)
+def test_what_are_no_turns_is_refused(live_file, turns, axis, problem):
+    obj = propeller("dq_sclerp")
+    with pytest.raises(animation.Refused, match=problem):
+        set_turns(obj, turns, [1.0], axis=axis)
+    assert curve_of(obj, "rigid_motion.turns") is None
+
+
+def test_too_many_turns_of_the_channel_are_told(live_file):
+    obj = propeller("dq_sclerp")
+    set_turns(obj, 1, [1.0])
+    curve_of(obj, "rigid_motion.turns").keyframe_points[0].co_ui.y = 1e6
+    bpy.context.view_layer.update()
+    assert "key 1 of the channel Turns" in animation.problem_of(obj)
+
+
+def test_a_bake_of_euler_angles_needs_no_channel_of_turns(live_file):
+    obj = wheel((0.0, 3.0 * tau + 1.0), "dq_sclerp", frames=(1.0, 25.0))
+    write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0, 0, 0), (4, 1, 0))), interpolation="LINEAR")
+    before = shown_worlds([obj], EACH[:25])[0]
+    animation.bake(obj)
+    assert curve_of(obj, "rigid_motion.turns") is None
+    assert np.abs(shown_worlds([obj], EACH[:25])[0] - before).max() < 1e-5
+    animation.unbake(obj)
+    animation.bake(obj, step=2, first=5, last=15)
+    assert np.abs(shown_worlds([obj], EACH[:25:2])[0] - before[::2]).max() < 1e-5

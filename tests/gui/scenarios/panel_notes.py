@@ -133,10 +133,11 @@ def awkward(reader: Reader) -> Steps[None]:
     key({1: 0, 20: 700}, "XYZ")
     bpy.context.scene.frame_set(10)
     bpy.ops.rigid_motion.set_mode(mode=SCREW)
-    for frame, scale in ((1, (1, 1, 1)), (20, (1, 2, 1))):
-        cube().scale = scale
+    for frame, scale, angle in ((1, (1, 1, 1), 0.0), (20, (1, 2, 1), 4.0)):
+        cube().scale, cube().rotation_euler.x = scale, angle
         cube().keyframe_insert("scale", frame=frame)
-    yield from reader.read("long-way-and-uneven-scale", "short way", "scale is not the same", mode=SCREW)
+        cube().keyframe_insert("rotation_euler", index=0, frame=frame)
+    yield from reader.read("two-angles-and-uneven-scale", "larger one", "scale is not the same", mode=SCREW)
 
     key({1: 0, 20: 90})
     bpy.ops.rigid_motion.set_mode(mode=STRAIGHT)

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from tests.animation.oracle import assert_shown, shown_worlds
+from tests.animation.oracle import assert_shown, curve_of, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
@@ -111,12 +111,28 @@ def by_turns(hand: Hand, view: bpy.types.Area, centre: places.Place) -> Steps[No
     np.testing.assert_allclose(turned("Quaternions")[-1] - without[-1], 6.0 * math.pi, atol=1e-4)
     yield from hand.search("Set Turns")
     yield from hand.picture("set-turns")
-    yield from hand.type("5")
     yield from hand.press("RET")
-    yield from hand.press("RET")
-    assert wheel("Quaternions").rigid_motion.turns == 5
-    yield from hand.press("Z", ctrl=True)
+    last = bpy.context.window_manager.operators[-1]
+    assert (last.bl_idname, last.turns) == ("RIGID_MOTION_OT_set_turns", 3), "it begins with the turns that there are"
     assert wheel("Quaternions").rigid_motion.turns == 3
+    yield from key_in_between(hand, centre)
+
+
+def key_in_between(hand: Hand, centre: places.Place) -> Steps[None]:
+    """I on an in-between shares the turns out, and nothing moves."""
+    before = shown_worlds([wheel("Quaternions")], EACH)[0]
+    bpy.context.scene.frame_set(30)
+    yield from hand.hover(centre)
+    yield from hand.press("I")
+    keys = curve_of(wheel("Quaternions"), "rigid_motion.turns").keyframe_points
+    assert [round(key.co.x) for key in keys] == [1, 30, 73], [tuple(key.co) for key in keys]
+    moved = shown_worlds([wheel("Quaternions")], EACH)[0]
+    assert_shown([wheel("Quaternions")], EACH)
+    assert np.abs(moved[29] - before[29]).max() < 1e-5, "the pose that was seen"
+    angles = turned("Quaternions")
+    np.testing.assert_allclose(angles[-1], 6.5 * math.pi, atol=1e-4)
+    yield from hand.press("Z", ctrl=True)
+    np.testing.assert_allclose(shown_worlds([wheel("Quaternions")], EACH)[0], before, atol=1e-5)
 
 
 def pictures(hand: Hand, view: bpy.types.Area, name: str) -> Steps[None]:

@@ -333,6 +333,9 @@ class _Ends:
     turning: Turning | None = None
     """How they turn, None where all of them go the shortest way."""
 
+    whole: Turning | None = None
+    """The same in whole turns alone, for smooth modes."""
+
     spins: np.ndarray | None = None
     """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
 
@@ -352,14 +355,17 @@ class _Ends:
         own = np.stack([source.original for source in sources], axis=1)[:, owners]
         axes = location_axes(sources, owners)
         keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
-        turned = turning_of(sources, start, end, keys, own) if any(map(needs_turning, sources)) else None
-        ends = cls(owners, times, keys, axes, own, turning=turned)
+        turned = whole = None
+        if any(map(needs_turning, sources)):
+            turned, whole = turning_of(sources, start, end, keys, own)
+        ends = cls(owners, times, keys, axes, own, turning=turned, whole=whole)
         if not smooth.any():
             return ends
         holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys)
         (frames, around), spins = with_neighbours(times, keys, holds, pairs), None
         if turned is not None:
-            around, spins = spins_of_neighbours(turned.signs, turned.twists, around, holds, pairs)
+            signs = np.where(np.einsum("si,si->s", whole.second, keys.quaternions[:, 1]) < 0.0, -1.0, 1.0)
+            around, spins = spins_of_neighbours(signs, whole.twists, around, holds, pairs)
         return replace(ends, pairs=pairs, around=(frames, around), spins=spins)
 
     def idle_progress(self, segment: int, frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
@@ -369,28 +375,21 @@ class _Ends:
 
     def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
         """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
-        (first, second), slopes = self.signed, progress_slopes(progress)
+        first, second, slopes = self.keys[:, 0], self.keys[:, 1], progress_slopes(progress)
+        turned = second.quaternions if self.whole is None else self.whole.second
         screws = twists.between(
-            first.positions, first.quaternions, second.positions, second.quaternions, shortest=self.turning is None
+            first.positions, first.quaternions, second.positions, turned, shortest=self.whole is None
         )
         screws, poses = np.stack((screws, screws)), body_poses(measured, self.own[..., None], self.axes, source)
-        if self.turning is not None:
+        if self.whole is not None:
             # Angles turn by spins, too. These are known, and what is left is less than half a turn.
-            poses = without_spins(poses, self.turning.by_angles, progress)
+            poses = without_spins(poses, self.whole.by_angles, progress)
         native = native_twists(self.keys, poses)
-        if self.turning is not None:
-            added = np.moveaxis(self.turning.twists, 1, 0)
+        if self.whole is not None:
+            added = np.moveaxis(self.whole.twists, 1, 0)
             screws[:, :3] += added
             native[:, :3] += slopes[:, None] * added
         return tangents_and_lacks(slopes, native, screws, self.times, self.pairs)
-
-    @property
-    def signed(self) -> tuple[Poses, Poses]:
-        """The poses at both keys, with signs that say which way round a segment turns, (S,) each."""
-        first, second = self.keys[:, 0], self.keys[:, 1]
-        if self.turning is None:
-            return first, second
-        return first, replace(second, quaternions=second.quaternions * self.turning.signs[:, None])
 
     def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
@@ -407,7 +406,8 @@ class _Ends:
             of_each = np.multiply.outer(counts, (0, 1, 0)).ravel()
         poses = self.prepared[mode](of_each, progress, within)
         if self.turning is not None:
-            poses = self.turning.spins.add_to(poses, counts, progress, some)
+            turned = self.whole if KEYFRAME_MODES[mode].is_smooth else self.turning
+            poses = turned.spins.add_to(poses, counts, progress, some)
         return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
 
     def _prepare(self, mode: str) -> Callable[..., Poses]:
@@ -416,7 +416,7 @@ class _Ends:
             times, keys = np.broadcast_to((0.0, 1.0), self.times.shape), self.keys
             if turned is None:
                 return prepare(times, keys, mode)
-            quaternions = np.stack([keys.quaternions for keys in self.signed], axis=1)
+            quaternions = np.stack((turned.first, turned.second), axis=1)
             return prepare_within(curves, times, replace(keys, quaternions=quaternions), is_aligned=True)
         if self.tangents is None and turned is None:
             return prepare(*self.around, mode)

@@ -37,6 +37,9 @@ FULL_TURN = 2.0 * np.pi
 HALF_TURN = np.pi - 1e-4
 """Half a turn between two keys by angles, of which single precision has lost a little."""
 
+WHOLE_TURN = 1e-5
+"""What turns of the channel differ by from whole ones for rounding."""
+
 SCREW_AXIS = "SCREW"
 """Turns are about the axis that a segment turns about anyway, and the local Z axis where it does not turn."""
 
@@ -245,15 +248,17 @@ class Source:
 
     @cached_property
     def segment_turns(self) -> np.ndarray:
-        """The whole turns more of each segment that is not Blender's own, shape (n - 1,)."""
+        """The turns more of each segment that is not Blender's own, whole ones but for inserted keys, (n - 1,)."""
         if self.turns is None:
-            return np.zeros(len(self.key_frames) - 1, dtype=int)
+            return np.zeros(len(self.key_frames) - 1)
         starts = self.key_frames[:-1] + SAME_FRAME
         if self.cyclic is not None:
             starts = cycled(self.cyclic, starts)[0]
         at = np.searchsorted(self.turns.times, starts, side="right") - 1
         turns = np.where(at < 0, 0.0, self.turns.values[0, np.clip(at, 0, None)])
-        return np.where(self.modes == 0, 0, np.rint(turns)).astype(int)
+        whole = np.rint(turns)
+        turns = np.where(np.abs(turns - whole) < WHOLE_TURN, whole, turns)
+        return np.where(self.modes == 0, 0.0, turns)
 
     @cached_property
     def run_backwards(self) -> np.ndarray:
@@ -264,11 +269,13 @@ class Source:
     @cached_property
     def has_half_turns(self) -> bool:
         """Whether an Euler angle goes by half a turn or more from one of its keys to the next."""
-        return self.order is not None and any(
-            np.any(np.abs(np.diff(values)) >= HALF_TURN)
-            for rows, keys in self.channels
-            for row, values in zip(rows, keys.values, strict=True)
-            if 3 <= row < 6
+        if self.order is None:
+            return False
+        angles = (
+            (keys.values, [place for place, row in enumerate(rows) if 3 <= row < 6]) for rows, keys in self.channels
+        )
+        return any(
+            places and np.abs(np.diff(values[places])).max(initial=0.0) >= HALF_TURN for values, places in angles
         )
 
     @property

@@ -3,13 +3,15 @@
 Euler angles say how far: of the axis that goes furthest in a segment, if that is more than half a turn, as many turns
 are added to the shortest rotation as it lacks of the angle; at half a turn, which has two shortest ways, the sense of
 the angle decides. The axis stands still in the body where the angles turned about before it change less, and else in
-space. What the channel of turns has comes on top.
+space. What the channel of turns has comes on top. Inserted keys may leave parts of turns in it: a part is taken off the
+way to the second key, and made by the spin.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -37,19 +39,35 @@ class Turning:
     by_angles: Spins
     """Those of them that the angles of the channels make by themselves."""
 
-    signs: np.ndarray
-    """By what to multiply the second quaternion of a segment for the way round that it turns, shape (S,)."""
+    first: np.ndarray
+    """The quaternions of the first keys, shape (S, 4)."""
+
+    second: np.ndarray
+    """Where segments turn to without spins, in the sign that says which way round: the second keys, but for what is not
+    whole of the spins, shape (S, 4)."""
 
     turn: np.ndarray
-    """The rotation that is left without spins, as a vector along the axes of the body, shape (3, S)."""
+    """That rotation as a vector along the axes of the body, shape (3, S)."""
 
-    twists: np.ndarray
-    """The angular velocities that spins add at both ends in unit time, along the body's axes, shape (3, 2, S)."""
+    @cached_property
+    def twists(self) -> np.ndarray:
+        """The angular velocities that spins add at both ends in unit time, along the body's axes, shape (3, 2, S)."""
+        return self.spins.twists(self.first, self.second)
 
     @property
     def totals(self) -> np.ndarray:
         """By how much each segment turns, in radians, shape (S,)."""
         return np.linalg.norm(self.turn + self.twists[:, 0], axis=0)
+
+    @property
+    def about(self) -> np.ndarray:
+        """How far each segment turns about the axis of its spins, in radians, shape (S,)."""
+        return np.einsum("ks,ks->s", self.turn + self.twists[:, 0], self.axes_in_body)
+
+    @property
+    def axes_in_body(self) -> np.ndarray:
+        """The axes of spins, along those of the body at the first key, shape (3, S)."""
+        return replace(self.spins, turns=np.ones(len(self.first))).twists(self.first, self.second)[:, 0] / FULL_TURN
 
 
 def needs_turning(source: Source) -> bool:
@@ -79,38 +97,55 @@ def turning(
         The rotations of the objects' own delta transforms, which the channels' are turned by.
     order : str or None
         Of the Euler angles, None for quaternions.
-    turns : array of int, shape (S,)
-        What the channel of turns has.
+    turns : array, shape (S,)
+        What the channel of turns has. What is not whole of it is a part of the turn to the second key.
     axes : array of str, shape (S,)
         Of `TURN_AXES`, what they are about.
     backwards : array of bool, shape (S,)
         Whether time runs backwards.
     """
-    first, second = keys.quaternions[:, 0], keys.quaternions[:, 1]
-    signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
-    turn = shortest_turns(first, second)
-    spins = Spins(np.zeros(len(turns), dtype=int), np.zeros((3, len(turns))), np.zeros(len(turns), dtype=bool))
+    first, count = keys.quaternions[:, 0], len(turns)
+    second, turn = _shortest(first, keys.quaternions[:, 1])
+    spins = Spins(np.zeros(count), np.zeros((3, count)), np.zeros(count, dtype=bool))
+    found, senses = Turning(spins, spins, first, second, turn), np.zeros(count)
+    parts = turns - np.rint(turns)
     if order is not None:
-        _add_angles(spins, turn, signs, start[ROWS[ROTATION]][:3], end[ROWS[ROTATION]][:3], first, own, order)
-    by_angles = replace(spins, turns=spins.turns.copy())
-    _add_channel(spins, turn, turns, axes, backwards)
-    return Turning(spins, by_angles, signs, turn, spins.twists(first, second))
+        ends = start[ROWS[ROTATION]][:3], end[ROWS[ROTATION]][:3]
+        senses = _add_angles(found, *ends, own, order, parts)
+    found = replace(found, by_angles=replace(spins, turns=spins.turns.copy()))
+    _add_channel(found, turns, senses, axes, backwards)
+    return found
 
 
-def turning_of(sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, own: np.ndarray) -> Turning:
-    """Return how S segments of alike sources turn, from their channels (10, S) and poses (S, 2) at both ends."""
-    turns, backwards = (
-        np.concatenate(parts)
-        for parts in (
-            [source.segment_turns for source in sources],
-            [source.run_backwards for source in sources],
-        )
-    )
+def in_whole_turns(found: Turning, by_angles: Turning) -> Turning:
+    """Return the same motion with whole turns alone: the rest of it by the shortest way between the keys.
+
+    `by_angles` is how they turn without what the channel has.
+    """
+    is_whole = found.spins.turns == np.rint(found.spins.turns)
+    lacking = found.about - np.einsum("ks,ks->s", by_angles.turn, found.axes_in_body)
+    turns = np.where(is_whole, found.spins.turns, np.rint(lacking / FULL_TURN))
+    return replace(by_angles, spins=replace(found.spins, turns=turns))
+
+
+def turning_of(
+    sources: Sequence[Source], start: np.ndarray, end: np.ndarray, keys: Poses, own: np.ndarray
+) -> tuple[Turning, Turning]:
+    """Return how S segments of alike sources turn, and the same in whole turns alone.
+
+    From their channels (10, S) and poses (S, 2) at both ends, and the objects' own delta transforms (10, S).
+    """
+    turns = np.concatenate([source.segment_turns for source in sources])
+    backwards = np.concatenate([source.run_backwards for source in sources])
     axes = np.repeat([source.turns_axis for source in sources], [len(source.segment_turns) for source in sources])
-    return turning(start, end, keys, own[ROWS[ROTATION]].T, sources[0].order, turns, axes, backwards)
+    given = (start, end, keys, own[ROWS[ROTATION]].T, sources[0].order)
+    found = turning(*given, turns, axes, backwards)
+    if np.all(turns == np.rint(turns)):
+        return found, found
+    return found, in_whole_turns(found, turning(*given, np.zeros_like(turns), axes, backwards))
 
 
-def turning_in(source: Source, segment: int, turns: int | None = None) -> Turning:
+def turning_in(source: Source, segment: int, turns: float | None = None) -> Turning:
     """Return how one of the segments of a source turns, with other turns than those of its channel if so given."""
     keys, own = source.key_frames[segment : segment + 2], source.original[:, None]
     # As seen from within the segment where cycles jump.
@@ -129,43 +164,60 @@ def shortest_turns(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return twists.between(nowhere, first, nowhere, second)[:3]
 
 
+def _shortest(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The second quaternions (S, 4) in the sign of the shorter way from the first, and the turns (3, S) there."""
+    signs = np.where(np.einsum("si,si->s", first, second) < 0.0, -1.0, 1.0)
+    return second * signs[:, None], shortest_turns(first, second)
+
+
+def _take_off(found: Turning, some: np.ndarray, parts: np.ndarray) -> None:
+    """Take off what is not whole of the spins of some segments, in turns (s,), from where they turn to; in place."""
+    if parts.any():
+        spins = Spins(-parts, found.spins.axes[:, some], found.spins.in_space[some])
+        ends = Poses(np.zeros((len(some), 3)), found.second[some])
+        turned = spins.add_to(ends, np.ones(len(some), dtype=int), np.ones(len(some))).quaternions
+        found.second[some], found.turn[:, some] = _shortest(found.first[some], turned)
+
+
 def _add_angles(
-    spins: Spins,
-    turn: np.ndarray,
-    signs: np.ndarray,
-    start: np.ndarray,
-    end: np.ndarray,
-    first: np.ndarray,
-    own: np.ndarray,
-    order: str,
-) -> None:
-    """Add the turns that Euler angles (3, S) at both ends say, and have half turns go in their sense; in place."""
-    change = end - start
+    found: Turning, start: np.ndarray, end: np.ndarray, own: np.ndarray, order: str, parts: np.ndarray
+) -> np.ndarray:
+    """Add the turns that Euler angles (3, S) at both ends say, and have half turns go in their sense; in place.
+
+    `parts` (S,) is what the channel has that is not whole: so much of what the angles say is spin. Returns the sense of
+    the angle that counts, 0 where none does, shape (S,).
+    """
+    change, senses, spins = end - start, np.zeros(len(parts)), found.spins
     furthest = np.abs(change).argmax(axis=0)
     by = np.take_along_axis(change, furthest[None], axis=0)[0]
-    some = np.flatnonzero(np.abs(by) >= HALF_TURN)
+    some = np.flatnonzero((np.abs(by) >= HALF_TURN) | (parts != 0.0))
     if not len(some):
-        return
-    by, furthest = by[some], furthest[some]
+        return senses
+    by, furthest, sense = by[some], furthest[some], np.sign(by[some])
     in_body, in_space = (
         np.stack([_axis(angles[:, some], furthest, order, before=before) for angles in (start, end)])
         for before in (True, False)
     )
     stands = np.linalg.norm(np.diff(in_space, axis=0)[0], axis=1) < np.linalg.norm(np.diff(in_body, axis=0)[0], axis=1)
     axes = np.where(stands[:, None], rotate(own[some], _mean(in_space)), _mean(in_body))
-    about = np.einsum(
-        "sk,sk->s", axes, np.where(stands[:, None], rotate(first[some], turn[:, some].T), turn[:, some].T)
-    )
+    spins.axes[:, some], spins.in_space[some] = axes.T, stands
+    part = sense * parts[some]
+    _take_off(found, some, part)
+    turn, by = found.turn[:, some], by - FULL_TURN * part
+    about = np.einsum("sk,sk->s", axes, np.where(stands[:, None], rotate(found.first[some], turn.T), turn.T))
     # Half a turn has two shortest ways, and rounding errors would choose one of them.
-    sense, size = np.sign(by), np.linalg.norm(turn[:, some], axis=0)
+    size = np.linalg.norm(turn, axis=0)
     is_half = np.abs(np.abs(by - FULL_TURN * np.rint(by / FULL_TURN)) - np.pi) <= np.pi - HALF_TURN
     other = is_half & (size >= HALF_TURN) & (about * sense < -1.0)
     factor = np.where(other, 1.0 - FULL_TURN / np.maximum(size, 1.0), 1.0)
-    turn[:, some] *= factor
-    signs[some] *= np.where(other, -1.0, 1.0)
-    lacking = np.rint((by - about * factor) / FULL_TURN).astype(int)
-    spins.turns[some] = np.where(np.abs(by) > FULL_TURN - HALF_TURN, lacking, 0)
-    spins.axes[:, some], spins.in_space[some] = axes.T, stands
+    found.turn[:, some] *= factor
+    found.second[some] *= np.where(other, -1.0, 1.0)[:, None]
+    turns = np.where(
+        (np.abs(by) > FULL_TURN - HALF_TURN) | (part != 0.0), np.rint((by - about * factor) / FULL_TURN), 0
+    )
+    spins.turns[some] = turns
+    senses[some] = np.where((turns != 0) | (part != 0.0), sense, 0.0)
+    return senses
 
 
 def _axis(angles: np.ndarray, axis: np.ndarray, order: str, *, before: bool) -> np.ndarray:
@@ -185,20 +237,23 @@ def _mean(ends: np.ndarray) -> np.ndarray:
     return np.where(length > NO_TURN, total / np.maximum(length, NO_TURN), ends[0])
 
 
-def _add_channel(spins: Spins, turn: np.ndarray, turns: np.ndarray, axes: np.ndarray, backwards: np.ndarray) -> None:
-    """Add what the channel has, in place: about the axis of the angles' own turns where there are any."""
-    some = np.flatnonzero(turns)
-    if not len(some):
+def _add_channel(
+    found: Turning, turns: np.ndarray, senses: np.ndarray, axes: np.ndarray, backwards: np.ndarray
+) -> None:
+    """Add what the channel has, in place: about the axis of the angles' own turns where these have a sense (S,)."""
+    spins, others = found.spins, np.flatnonzero((turns != 0.0) & (senses == 0.0))
+    spins.turns[:] += senses * turns
+    if not len(others):
         return
-    by_angles, size = spins.turns[some], np.linalg.norm(turn[:, some], axis=0)
-    is_local = (axes[some] != SCREW_AXIS) | (size < NO_TURN)
+    size = np.linalg.norm(found.turn[:, others], axis=0)
+    is_local = (axes[others] != SCREW_AXIS) | (size < NO_TURN)
     # What has no axis of its own turns about the last of them, Z.
-    local = np.eye(3)[:, ["XYZ".find(name) for name in axes[some]]]
-    new = np.where(is_local, local, turn[:, some] / np.maximum(size, NO_TURN))
-    sense = np.where(is_local & backwards[some], -1, 1)
-    spins.axes[:, some] = np.where(by_angles != 0, spins.axes[:, some], new)
-    spins.in_space[some] &= by_angles != 0
-    spins.turns[some] += np.where(by_angles != 0, np.sign(by_angles), sense) * turns[some]
+    local = np.eye(3)[:, ["XYZ".find(name) for name in axes[others]]]
+    spins.axes[:, others] = np.where(is_local, local, found.turn[:, others] / np.maximum(size, NO_TURN))
+    spins.in_space[others] = False
+    added = np.where(is_local & backwards[others], -1, 1) * turns[others]
+    spins.turns[others] += added
+    _take_off(found, others, added - np.rint(added))
 
 
 def without_spins(measured: Poses, spins: Spins, progress: np.ndarray) -> Poses:

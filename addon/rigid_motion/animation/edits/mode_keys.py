@@ -19,10 +19,10 @@ from ...motion.modes import no_such_mode
 from ..actions.mode_property import is_keyed, set_pending_mode
 from ..actions.reading import read
 from ..actions.records import record_mode, record_turns_axis
-from ..actions.refusals import refuse_linked, refuse_numbers
+from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
 from ..actions.slots import SlotTransform, slot_transforms_of
-from ..compute.sources import MODE_NUMBERS
+from ..compute.sources import MODE_NUMBERS, TURN_AXES
 from ..live import follower
 from ..live.segment_keys import set_mode_in, set_turns_in
 from ..queries.keyed import active_place, frames_in, modes_in
@@ -103,7 +103,8 @@ def set_turns(
     Raises
     ------
     Refused
-        Where rigid motion cannot act on one of them, and there is no list to take that. Nothing is changed then.
+        Where rigid motion cannot act on one of them, and there is no list to take that; and where there is no such
+        number of turns, or axis. Nothing is changed then.
     """
 
     def plan(transform: Transform, readings: Readings) -> SlotTransform:
@@ -119,6 +120,12 @@ def set_turns(
             record_turns_axis(place, axis)
         set_turns_in(place, turns, frames_in(place)[:-1] if frames is None else frames)
 
+    if isinstance(turns, bool) or not isinstance(turns, int) or abs(turns) > MOST_TURNS:
+        text = rpt_("{turns} is no number of turns: give a whole number from -{most} to {most}")
+        raise Refused(text.format(turns=turns, most=MOST_TURNS))
+    if axis is not None and axis not in TURN_AXES:
+        text = rpt_("{axis} is no axis of turns: give one of {axes}")
+        raise Refused(text.format(axis=axis, axes=", ".join(TURN_AXES)))
     apply_edit(targets, plan, act, refused)
 
 

@@ -13,10 +13,11 @@ from ...motion.spins import FULL_TURN
 from ..actions.channels import replace_keys
 from ..actions.records import recorded_digest
 from ..actions.slots import SlotTransform
+from ..compute.components import LOCATION, ROWS
 from ..compute.differences import in_betweens
 from ..compute.source_cache import cached_source
-from ..compute.sources import MODE_NUMBERS, SAME_FRAME, Source
-from ..compute.turning import shortest_turns, turning_in
+from ..compute.sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, WHOLE_TURN, Source
+from ..compute.turning import Turning, needs_turning, shortest_turns, turning_in
 from ..queries.keyed import frames_in, modes_in, turns_in
 from ..transforms import Channel
 
@@ -26,7 +27,7 @@ def set_mode_in(place: SlotTransform, mode: str, frames: Sequence[float]) -> Non
     _key_segments(place, place.users[0].mode_channel, MODE_NUMBERS[mode], frames, modes_in)
 
 
-def set_turns_in(place: SlotTransform, turns: int | Sequence[int], frames: Sequence[float]) -> None:
+def set_turns_in(place: SlotTransform, turns: float | Sequence[float], frames: Sequence[float]) -> None:
     """Key the channel of turns likewise, with one number on all of these frames or one on each, rising.
 
     Where there are none in any segment, the channel goes.
@@ -40,9 +41,9 @@ def set_turns_in(place: SlotTransform, turns: int | Sequence[int], frames: Seque
 def _key_segments(
     place: SlotTransform,
     channel: Channel,
-    values: int | Sequence[int],
+    values: float | Sequence[float],
     frames: Sequence[float],
-    values_in: Callable[[SlotTransform, np.ndarray], Sequence[int]],
+    values_in: Callable[[SlotTransform, np.ndarray], Sequence[float]],
 ) -> None:
     """Key values on the frames of keys that begin segments, and behind them where another one goes on.
 
@@ -50,7 +51,7 @@ def _key_segments(
     """
     chosen, keyed = np.asarray(frames, dtype=np.float64), frames_in(place)
     is_chosen = _is_among(chosen, keyed)
-    wanted = np.array(values_in(place, keyed))
+    wanted = np.array(values_in(place, keyed), dtype=np.float64)
     wanted[is_chosen] = values
     fcurve = place.curves.get(channel) or _new(place, channel)
     # Muted it has no say. Now it has, and all other segments keep the mode that they had without.
@@ -63,7 +64,7 @@ def _key_segments(
             keys.append(old[passed])
             passed += 1
         replaced = passed < len(old) and old[passed][0] <= frame + SAME_FRAME
-        if meant or replaced or not keys or round(keys[-1][1]) != number:
+        if meant or replaced or not keys or abs(keys[-1][1] - number) > WHOLE_TURN:
             # Selected as the key of the pose is, so that both move together.
             keys.append((frame, number, meant or (replaced and old[passed][2])))
         passed += replaced
@@ -94,6 +95,12 @@ def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:
     return fcurve
 
 
+STRAIGHT = ("lerp_slerp",)
+"""Modes by which the path of the origin does not depend on how the body turns."""
+
+ONE_AXIS = 1e-5
+"""Radians off an axis, for rounding."""
+
 SAMPLES = 16
 """Of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
@@ -101,47 +108,97 @@ SAMPLES = 16
 def share_out_turns(place: SlotTransform, source: Source) -> bool:
     """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
 
-    `source` is what is keyed by now. Returns whether there were any.
+    Where keys go between such parts, these have whole turns together again. `source` is what is keyed by now. Returns
+    whether there was anything to change.
     """
     old = cached_source(recorded_digest(place))
-    if old is None or old.turns is None or source.turns is None or old.order != source.order or source.cyclic:
+    if old is None or old.order != source.order or source.cyclic is not None or not needs_turning(old):
         return False
-    if source.key_count <= old.key_count:
+    if source.key_count == old.key_count:
         return False
-    shared: dict[float, int] = {}
-    for segment in np.flatnonzero(old.segment_turns):
-        first, last = old.key_frames[segment : segment + 2]
-        parts = np.flatnonzero((source.key_frames > first - SAME_FRAME) & (source.key_frames < last - SAME_FRAME))
-        if len(parts) > 1 and np.all(source.segment_turns[parts] == old.segment_turns[segment]):
-            turned = _swept(old, int(segment), source.key_frames[[*parts, parts[-1] + 1]])
-            shared.update(zip(source.key_frames[parts].tolist(), _turns_of(source, parts, turned), strict=True))
-    if shared:
-        set_turns_in(place, list(shared.values()), list(shared))
-    return bool(shared)
+    shared = _divided(old, source) if source.key_count > old.key_count else _joined(old, source)
+    chosen = np.array(list(shared))
+    if not shared or np.array_equal(turns_in(place, chosen), list(shared.values())):
+        return False
+    set_turns_in(place, list(shared.values()), chosen)
+    return True
 
 
-def _swept(source: Source, segment: int, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """By how much a body turns from each of the frames (p + 1,) in a segment to the next about the axis of its spins,
-    in radians (p,), and that axis as it lies in the body on each of them (p, 3)."""
-    turned = turning_in(source, segment)
-    axis, turns = turned.spins.axes[:, 0], abs(int(turned.spins.turns[0]))
-    steps = SAMPLES * (turns + 1)
+def _divided(old: Source, source: Source) -> dict[float, float]:
+    """The turns of the parts that keys divide segments into, by the frames that these begin on."""
+    shared: dict[float, float] = {}
+    for segment in np.flatnonzero(old.modes).tolist():
+        parts = _within(source.key_frames, *old.key_frames[segment : segment + 2])
+        are_as_before = source.segment_turns[parts] == old.segment_turns[segment]
+        if len(parts) > 1 and np.all(are_as_before & (source.modes[parts] != 0)):
+            turned = turning_in(old, segment)
+            if turned.spins.turns[0]:
+                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]])
+                whole = _is_enough_in_whole_turns(old, segment, turned)
+                for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
+                    shared[float(source.key_frames[part])] = _turns_of(source, part, turned, share, axis, whole=whole)
+    return shared
+
+
+def _joined(old: Source, source: Source) -> dict[float, float]:
+    """The whole turns of segments in place of which there were several, not all of them in whole turns."""
+    shared: dict[float, float] = {}
+    for segment in np.flatnonzero(source.segment_turns != np.rint(source.segment_turns)).tolist():
+        ends = source.key_frames[segment : segment + 2]
+        parts = _within(old.key_frames, *ends)
+        if len(parts) > 1 and source.segment_turns[segment] == old.segment_turns[parts[0]]:
+            turned = turning_in(old, int(parts[0]))
+            shares, axes = _shares(old, turned, ends, float(np.abs(old.segment_turns[parts]).sum()))
+            shared[float(ends[0])] = _turns_of(source, segment, turned, shares[0], axes[0], whole=True)
+    return shared
+
+
+def _within(frames: np.ndarray, first: float, last: float) -> np.ndarray:
+    """The segments between these frames of keys that begin from a first frame on, and before a last one."""
+    return np.flatnonzero((frames[:-1] > first - SAME_FRAME) & (frames[:-1] < last - SAME_FRAME))
+
+
+def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> bool:
+    """Whether it makes no difference for the motion what part of a turn is spin.
+
+    So it is where all of it is about one axis, and the path of the origin does not depend on it.
+    """
+    ends = source.values_at(source.key_frames[segment : segment + 2])[ROWS[LOCATION]]
+    is_straight = MODE_NAMES[source.modes[segment]] in STRAIGHT or not np.ptp(ends, axis=1).any()
+    return is_straight and float(np.abs(np.cross(turned.turn[:, 0], turned.axes_in_body[:, 0])).max()) < ONE_AXIS
+
+
+def _shares(
+    source: Source, turned: Turning, frames: np.ndarray, turns: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """What part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and the axis
+    of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all."""
+    steps = SAMPLES * (1 + int(abs(turned.spins.turns[0] if turns is None else turns)))
     samples = np.concatenate([np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(frames)])
     quaternions = in_betweens(source, np.append(samples, frames[-1])).wanted.quaternions
-    axes = np.tile(axis, (len(quaternions), 1))
+    axes = np.tile(turned.spins.axes[:, 0], (len(quaternions), 1))
     if turned.spins.in_space[0]:
         axes = rotate(conjugate(quaternions), axes)
     angles = np.einsum("sk,sk->s", shortest_turns(quaternions[:-1], quaternions[1:]).T, axes[:-1])
-    return angles.reshape(-1, steps).sum(axis=1), axes[:-1:steps]
+    return angles.reshape(-1, steps).sum(axis=1) / turned.about[0], axes[:-1:steps]
 
 
-def _turns_of(source: Source, parts: np.ndarray, swept: tuple[np.ndarray, np.ndarray]) -> list[int]:
-    """How many turns each of these segments needs to turn by so much about an axis in the body, as `_swept` has it."""
-    found = []
-    for segment, angle, axis in zip(parts.tolist(), *swept, strict=True):
-        turned = turning_in(source, segment, turns=1)
-        about = float(axis @ turned.spins.axes[:, 0])
-        sense = np.copysign(1.0, about * (turned.spins.turns[0] - turned.by_angles.turns[0]))
-        there = float(axis @ turned.turn[:, 0]) + FULL_TURN * about * turned.by_angles.turns[0]
-        found.append(int(sense * np.rint((angle - there) / FULL_TURN)))
-    return found
+def _turns_of(source: Source, segment: int, of: Turning, share: float, axis: np.ndarray, *, whole: bool) -> float:
+    """The turns that a segment needs to have this share of a turning, whose axis (3,) is as it lies in the body there.
+
+    They are whole where that is enough: where the path of the origin does not depend on what part of a turn is spin.
+    """
+
+    def about(found: Turning) -> float:
+        return float(axis @ found.twists[:, 0, 0]) / FULL_TURN
+
+    one = turning_in(source, segment, turns=1.0)
+    sense = np.copysign(
+        1.0, about(one) - float(axis @ one.by_angles.twists(one.first, one.second)[:, 0, 0]) / FULL_TURN
+    )
+    if whole:
+        none = turning_in(source, segment, turns=0.0)
+        return float(sense * np.rint((share * of.about[0] - float(axis @ none.turn[:, 0])) / FULL_TURN - about(none)))
+    turns = share * float(of.spins.turns[0])
+    part = turns - np.rint(turns)
+    return float(sense * (part + np.rint(turns - about(turning_in(source, segment, turns=sense * part)))))

@@ -115,16 +115,16 @@ def modes_in(place: SlotTransform, frames: np.ndarray) -> list[int]:
 
 
 def turns_in(place: SlotTransform, frames: np.ndarray) -> np.ndarray:
-    """The whole turns more of the segments at these frames, shape (n,)."""
+    """The turns more of the segments at these frames, shape (n,)."""
     fcurve = place.curves.get(place.users[0].turns_channel)
     if fcurve is None or fcurve.mute or not fcurve.keyframe_points:
-        return np.zeros(len(frames), dtype=int)
+        return np.zeros(len(frames))
     keys = fcurve.keyframe_points
     points = np.empty(2 * len(keys), np.float32)
     keys.foreach_get("co", points)
     at = np.searchsorted(points[::2], frames + 0.5 * SAME_FRAME, side="right") - 1
     turns = np.where(at < 0, 0.0, points[1::2][np.clip(at, 0, None)])
-    return np.rint(np.nan_to_num(turns)).astype(int)
+    return np.nan_to_num(turns)
 
 
 def _mode_at(fcurve: bpy.types.FCurve, frame: float) -> int:

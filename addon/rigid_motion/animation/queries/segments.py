@@ -56,8 +56,8 @@ class SegmentFacts:
     turn: float
     """By how much it turns, spins included."""
 
-    turns: int
-    """The whole turns among it that are more than the shortest way, by their sign: of the angles and of the channel."""
+    turns: float
+    """The turns among it that are more than the shortest way, by their sign: of the angles and of the channel."""
 
     distance: float
     """From its first position to its last."""
@@ -103,7 +103,7 @@ def segment_at(source: Source, frame: float) -> SegmentFacts | None:
         key=_deciding_key(source, ends[0]),
         mode=MODE_NAMES[source.modes[place]],
         turn=float(turned.totals[0]),
-        turns=int(turned.spins.turns[0]),
+        turns=float(turned.spins.turns[0]),
         distance=float(np.linalg.norm(location[:, 1] - location[:, 0])),
         long_way=source.order is None and -1.0 + NEAR < alike < -NEAR,
         is_sure=source.order is not None and bool(np.any(swept > NEAR_HALF_TURN)),

@@ -24,6 +24,12 @@ REFUSALS = {
         "{name} hat keine Aktion mit Schlüsselbildern, die einen Modus haben könnten: "
         "zuerst welche setzen oder einen Streifen öffnen (NLA-Editor, Tab)"
     ),
+    "{turns} is no number of turns: give a whole number from -{most} to {most}": (
+        "{turns} ist keine Zahl von Umdrehungen: eine ganze Zahl von -{most} bis {most} angeben"
+    ),
+    "{axis} is no axis of turns: give one of {axes}": (
+        "{axis} ist keine Achse von Umdrehungen: eine von {axes} angeben"
+    ),
     "{name}: Blender's own in-betweens make no turns more: choose a mode first": (
         "{name}: Blenders eigene Zwischenbilder machen keine zusätzlichen Umdrehungen: zuerst einen Modus wählen"
     ),
