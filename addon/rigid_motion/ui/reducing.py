@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import bpy
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
@@ -19,7 +18,7 @@ from ..animation.transforms import Transform
 from .on_targets import OnChanged, OnTargets
 from .rows import labelled
 from .targets import each_target, with_bones_of_rigs
-from .wording import counted_modes, length, reduction_rows, reduction_summary
+from .wording import counted_modes, reduced_to, reduction_rows, reduction_summary
 
 MOST_LISTED = 5
 """Targets whose reductions are listed one by one."""
@@ -110,10 +109,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             return
         for target in targets[:MOST_LISTED]:
             if (reduction := animation.reduction_of(target)) is not None:
-                error = length(context.scene, reduction.largest_error, precision=3)
-                became = f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"
-                text = iface_("{keys}, {error} off").format(keys=became, error=error)
-                labelled(layout, target.name).label(text=text, translate=False)
+                labelled(layout, target.name).label(text=reduced_to(context.scene, reduction), translate=False)
                 if self.best_of:
                     column = layout.column(align=True)
                     for line in counted_modes(reduction.segments):

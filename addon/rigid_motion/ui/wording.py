@@ -24,6 +24,7 @@ DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """What each mode does for the motion, in one sentence without a full stop."""
 
 NO_KEYS = n_("No keys of location, rotation or scale yet")
+KEYED_BONES = n_("The keys are those of its bones, which have their modes in Pose Mode")
 NO_SEGMENT = n_("No segment on this frame")
 STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
 BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
@@ -113,6 +114,13 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     if len(reduction.segments) > 1:
         summary += rpt_("; segments: {modes}").format(modes=", ".join(counted_modes(reduction.segments)))
     return summary
+
+
+def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
+    """How many keys became how many, and how far off the motion is, for a line of a panel."""
+    became = f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"
+    error = length(scene, reduction.largest_error, precision=3)
+    return iface_("{keys}, {error} off").format(keys=became, error=error)
 
 
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:

@@ -76,6 +76,8 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     show = yield from hand.find_button(view, "UI", "show_paths")
     yield from hand.click(show)
     assert settings.show_paths
+    x, y = show
+    yield from hand.click((x + 60, y))  # the header, to unfold the panel
     seen = yield from look(hand, view, "native")
     assert seen[NATIVE] > without[NATIVE] + 100, seen
     assert seen[MODE] == 0, "no mode is chosen yet"

@@ -3,6 +3,9 @@
 NOTES = {
     "No Bone Active": "Kein Knochen aktiv",
     "No keys of location, rotation or scale yet": ("Noch keine Schlüsselbilder von Position, Rotation oder Skalierung"),
+    "The keys are those of its bones, which have their modes in Pose Mode": (
+        "Die Schlüsselbilder sind die seiner Knochen, die ihre Modi im Posenmodus haben"
+    ),
     "No segment on this frame": "Kein Segment auf diesem Einzelbild",
     "Moved by strips: enter one to see its segments (NLA Editor, Tab)": (
         "Von Streifen bewegt: einen öffnen, um seine Segmente zu sehen (NLA-Editor, Tab)"

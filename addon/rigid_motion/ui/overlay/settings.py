@@ -61,7 +61,6 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """The settings of the overlay, for a panel."""
     settings = context.scene.rigid_motion_overlay
-    labelled(layout).prop(settings, "show_paths", text="Show")
     if settings.show_paths and not are_paths_shown(context):
         draw_text(context, layout, HIDDEN, "INFO")
     column = layout.column()
