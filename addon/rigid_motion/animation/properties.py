@@ -89,6 +89,8 @@ class ChangedAction(bpy.types.PropertyGroup):
     components: FloatVectorProperty(size=10, options={"HIDDEN"})
     keys_before: IntProperty(options={"HIDDEN"})
     keys_after: IntProperty(options={"HIDDEN"})
+    channel_keys_before: IntProperty(description="How many keys all channels had together", options={"HIDDEN"})
+    channel_keys_after: IntProperty(description="How many keys all channels have together", options={"HIDDEN"})
     largest_error: FloatProperty(
         description="How far the reduced motion is off where it is furthest, in Blender's units", options={"HIDDEN"}
     )

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import bpy
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from .. import animation
 from ..animation import Refused
 from ..animation.baking.copies import REDUCED
 from ..animation.baking.sizes import first_tolerance
-from ..animation.properties import MODE_ITEMS
+from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.polls import with_more_keys_than
 from ..animation.transforms import Transform
 from .on_targets import OnChanged, OnTargets
@@ -45,11 +46,21 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         "(Object > Animation > Bake Action, with Visual Keying)"
     )
 
+    by: EnumProperty(
+        name="Reduce By",
+        description="What decides how many keys are left",
+        items=[
+            ("TOLERANCE", "Tolerance", "As few keys as keep the motion within the tolerance"),
+            ("NUMBER", "Number", "So many keys, or of a rig key poses, with the smallest error that is found"),
+        ],
+        translation_context=OWN_WORDS,
+    )
     tolerance: FloatProperty(
         name="Tolerance",
         description=(
             "How far off any point may be on any frame, within the radius around what is moved. Of bones that counts "
-            "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size"
+            "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size, "
+            "or 2 % for key poses"
         ),
         default=0.001,
         min=1e-6,
@@ -57,6 +68,16 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         step=0.1,
         precision=4,
         subtype="DISTANCE",
+    )
+    offered: FloatProperty(
+        description="The tolerance that was offered last, for as long as nobody sets another", options={"HIDDEN"}
+    )
+    count: IntProperty(
+        name="Number",
+        description="Keys left of each object, or key poses of each rig. Below is how far off the motion is then",
+        default=12,
+        min=2,
+        soft_max=100,
     )
     radius: FloatProperty(
         name="Radius",
@@ -102,7 +123,15 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
         layout.use_property_decorate = False
         targets = list(self.each_target(context))
         rigs = any(target.is_part for target in targets)
-        for name in ("tolerance", "radius", "mode", "best_of", *(("shared", "hold") if rigs else ())):
+        layout.row().prop(self, "by", expand=True)
+        if self.by == "NUMBER":
+            text = iface_("Key Poses") if rigs else iface_("Keys", OWN_WORDS)
+            layout.prop(self, "count", text=text, translate=False)
+        else:
+            layout.prop(self, "tolerance")
+        # So many key poses are shared as it is.
+        of_rigs = ("hold",) if self.by == "NUMBER" else ("shared", "hold")
+        for name in ("radius", "mode", "best_of", *(of_rigs if rigs else ())):
             layout.prop(self, name)
         if rigs:
             self._draw_rigs(context.scene, targets)
@@ -129,8 +158,8 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         targets = list(self.each_target(context))
-        if not self.properties.is_property_set("tolerance"):
-            self.tolerance = first_tolerance(context.scene, targets)
+        if not self.properties.is_property_set("tolerance") or self.tolerance == self.offered:
+            self.tolerance = self.offered = first_tolerance(context.scene, targets, shared=self.shared)
         if not self.radius and len(targets) == 1:
             self.radius = animation.radius_of(targets[0].carrier)
         return self.act(targets, lambda refused: self._reduce(context.scene, targets, refused))
@@ -145,6 +174,7 @@ class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
             best_of=self.best_of,
             shared=self.shared,
             hold=self.hold,
+            count=self.count if self.by == "NUMBER" else None,
             refused=refused,
         )
         reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]

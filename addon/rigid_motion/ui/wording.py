@@ -104,6 +104,11 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     summary = rpt_("{before} keys became {after}, largest error {error}").format(
         before=reduction.before, after=reduction.after, error=error
     )
+    before, after = reduction.channel_keys
+    if after > before:
+        summary += rpt_(", but channels have {after} keys together, and had {before}").format(
+            before=before, after=after
+        )
     if reduction.rig is not None:
         summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
         if (feet := _slides(scene, reduction.rig)) is not None:
@@ -132,6 +137,11 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[s
             iface_("{error} at most").format(error=length(scene, reduction.largest_error, precision=3)),
         ),
     ]
+    before, after = reduction.channel_keys
+    if after > before:
+        rows.append(
+            (iface_("Channels", OWN_WORDS), iface_("{before} to {after} keys").format(before=before, after=after))
+        )
     if reduction.rig is not None:
         rows.insert(1, (iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
         if (feet := _slides(scene, reduction.rig)) is not None:

@@ -73,7 +73,7 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert without[MODE] == 0, without
 
     yield from hand.open_sidebar(view, "Animation")
-    show = yield from hand.find_button(view, "UI", "show_paths")
+    show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
     yield from hand.click(show)
     assert settings.show_paths
     x, y = show
@@ -123,7 +123,7 @@ def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert seen[MODE] > 300, seen
     assert seen[NATIVE] < both[NATIVE] - 100, (seen, both)
     yield from hand.click(native)
-    show = yield from hand.find_button(view, "UI", "show_paths")
+    show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
     yield from hand.click(show)
     seen = yield from look(hand, view, "switched-off")
     assert seen[MODE] == 0, seen

@@ -44,6 +44,7 @@ LABELS = {
     "Radius": "Radius",
     "Best per Segment": "Bester je Segment",
     "Key Poses": "Schlüsselposen",
+    "Number": "Anzahl",
     "Hold Feet": "Füße halten",
     # Channels
     "Location": "Position",
@@ -99,6 +100,9 @@ OF_OWN_CONTEXT = {
     "Action": "Aktion",
     "Scene": "Szene",
     "Custom": "Eigene",
+    "Reduce By": "Reduzieren nach",
+    "Tolerance": "Toleranz",
+    "Number": "Anzahl",
     # One word each: the panel has a quarter of its width for them
     "Object": "Objekt",
     "Bone": "Knochen",
@@ -107,6 +111,7 @@ OF_OWN_CONTEXT = {
     "Frames": "Bilder",
     "Keys": "Keys",
     "Off By": "Fehler",
+    "Channels": "Kanäle",
     "Not Promised": "Nicht zugesagt",
     "Feet": "Füße",
     "Mode": "Modus",

@@ -59,6 +59,7 @@ NOTES = {
     "Hidden by Viewport Overlays": "Durch die Überlagerungen des Ansichtsfensters ausgeblendet",
     # Rows
     "{error} at most": "höchstens {error}",
+    "{before} to {after} keys": "{before} auf {after} Schlüsselbilder",
     "{frames} with keys": "{frames} mit Schlüsselbildern",
     "slide {distance}": "rutschen {distance}",
     "{after}, recorded {before}": "{after}, aufgenommen {before}",

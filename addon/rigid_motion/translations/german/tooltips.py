@@ -124,10 +124,22 @@ TOOLTIPS = {
         "„Schlüsselbilder wiederherstellen“ gibt alle zurück"
     ),
     "How far off any point may be on any frame, within the radius around what is moved. Of bones that counts "
-    "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size": (
+    "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size, "
+    "or 2 % for key poses": (
         "Wie weit irgendein Punkt im Radius um das Bewegte auf irgendeinem Einzelbild abweichen darf. Bei Knochen "
         "zählt der Ort, an den sie durch alles gelangen, woran sie hängen. Anfangs ein Millimeter, bei einem Rig 0,3 "
-        "% seiner Größe"
+        "% seiner Größe, für Schlüsselposen 2 %"
+    ),
+    "What decides how many keys are left": "Wovon abhängt, wie viele Schlüsselbilder bleiben",
+    "As few keys as keep the motion within the tolerance": (
+        "So wenige Schlüsselbilder, wie die Bewegung in der Toleranz halten"
+    ),
+    "So many keys, or of a rig key poses, with the smallest error that is found": (
+        "So viele Schlüsselbilder, bei einem Rig Schlüsselposen, mit dem kleinsten Fehler, der sich findet"
+    ),
+    "Keys left of each object, or key poses of each rig. Below is how far off the motion is then": (
+        "So viele Schlüsselbilder jedes Objekts oder Schlüsselposen jedes Rigs bleiben. Darunter steht, wie weit die "
+        "Bewegung dann abweicht"
     ),
     "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
     "At 0 each object has the size of its own bounding box, and each bone its length": (
