@@ -29,6 +29,8 @@ UNSEEN = {
     "Object Transforms",
     "Object Mode",
     "Graph Editor",
+    # A part of the name of a mode, by which its algebra is looked up
+    "Dual Quaternion",
     # Parts of a sentence that stand for what is meant, before it is translated as a whole
     "objects and bones",
     "an object",

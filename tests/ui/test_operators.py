@@ -329,7 +329,7 @@ def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension
     said = capfd.readouterr().out
     assert "; segments: " in said
     for mode, count in segments.items():
-        assert f"{count} {MODES[mode].label}" in said
+        assert f"{count} {MODES[mode].short_label}" in said
     bpy.ops.ed.undo()
     assert values(bpy.data.objects["Tool"]) == before
 

@@ -32,8 +32,8 @@ FIRST = ("motor_spline", "dq_sclerp")
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
     *(
-        (name, KEYFRAME_MODES[name].label, KEYFRAME_MODES[name].description, KEYFRAME_MODES[name].number)
-        for name in (*FIRST, *(name for name in KEYFRAME_MODES if name not in FIRST))
+        (name, mode.label, ". ".join(filter(None, (mode.description, mode.same))), mode.number)
+        for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST, item[0]).index(item[0]))
     ),
 ]
 """The modes as items of an enumeration. Files have the numbers."""

@@ -32,7 +32,7 @@ from .targets import (
     scope_for,
     targets_of,
 )
-from .wording import DESCRIPTIONS, LABELS, listed, spoken_of
+from .wording import DESCRIPTIONS, LABELS, algebra_of, listed, spoken_of
 
 SCOPE_NAMES = {scope: label for scope, label, _ in SCOPES}
 
@@ -71,7 +71,8 @@ class RIGID_MOTION_OT_set_mode(OnTargets, bpy.types.Operator):
             return super().description(context, properties)
         what = tip_(spoken_of(DESCRIPTIONS[properties.mode], "bones" if is_posing(context) else "objects"))
         on = tip_("On: {segments}").format(segments=tip_(SCOPE_NAMES[properties.on], OWN_WORDS))
-        return f"{what}.\n{on}"
+        algebra = tip_(algebra_of(properties.mode))
+        return "\n".join(filter(None, (f"{what}.", algebra, on)))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self.properties.is_property_set("mode"):

@@ -16,9 +16,20 @@ from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.segments import SegmentFacts
 from ..animation.transforms import Transform
 from ..animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from ..motion import KEYFRAME_MODES
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
+
+SHORT_LABELS = {name: KEYFRAME_MODES[name].short_label if name in KEYFRAME_MODES else LABELS[name] for name in LABELS}
+"""The same without the algebra, for pies and lists."""
+
+ALGEBRAS = {
+    "Dual Quaternion": n_("Algebra: dual quaternions"),
+    "PGA": n_("Algebra: motors of projective geometric algebra (PGA)"),
+    "CGA": n_("Algebra: versors of conformal geometric algebra (CGA)"),
+}
+"""The algebras that modes are named after."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """What each mode does for the motion, in one sentence without a full stop."""
@@ -83,6 +94,11 @@ def cautions(segment: SegmentFacts) -> list[str]:
     if segment.scales_unevenly:
         texts.append(iface_("The scale is not the same along all axes, and stays Blender's own"))
     return texts
+
+
+def algebra_of(mode: str) -> str:
+    """The line of a tooltip that says which algebra a mode is in, in English; empty where it is named after none."""
+    return ALGEBRAS.get(KEYFRAME_MODES[mode].algebra, "") if mode in KEYFRAME_MODES else ""
 
 
 def degrees(angle: float) -> str:
@@ -162,7 +178,9 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
 
 def counted_modes(segments: Mapping[str, int]) -> list[str]:
     """Each mode with how many segments have it, most of them first."""
-    return [f"{count} {iface_(LABELS[mode])}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])]
+    return [
+        f"{count} {iface_(SHORT_LABELS[mode])}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])
+    ]
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:

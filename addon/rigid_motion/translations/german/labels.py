@@ -10,6 +10,13 @@ LABELS = {
     "Motor Screw (PGA)": "Motor-Schraube (PGA)",
     "Versor Blend (CGA)": "Versor-Mischung (CGA)",
     "Versor Spiral (CGA)": "Versor-Spirale (CGA)",
+    # The same in a pie
+    "Smooth Screw": "Weiche Schraube",
+    "Screw": "Schraube",
+    "Motor Blend": "Motor-Mischung",
+    "Motor Screw": "Motor-Schraube",
+    "Versor Blend": "Versor-Mischung",
+    "Spiral": "Spirale",
     "As Keyed": "Wie gesetzt",
     "Mixed": "Gemischt",
     "None": "Keine",

@@ -15,20 +15,34 @@ TOOLTIPS = {
     "Nearly the screw motion, slower at the keys and faster half-way": (
         "Fast die Schraubenbewegung, langsamer an den Schlüsselbildern und schneller auf halbem Weg"
     ),
-    "The screw motion, by the exponential of the motor's logarithm": (
-        "Die Schraubenbewegung, berechnet über den Logarithmus des Motors"
+    "The screw motion, by the exponential of the motor's logarithm. The same motion as Screw": (
+        "Die Schraubenbewegung, berechnet über den Logarithmus des Motors. Dieselbe Bewegung wie Schraube"
     ),
-    "The motor blend, with uniform scale blended along with it": (
-        "Die Motor-Mischung, bei der sich gleichmäßige Skalierung mitmischt"
+    "The motor blend, with uniform scale blended along with it. The same motion as Motor Blend where nothing grows": (
+        "Die Motor-Mischung, bei der sich gleichmäßige Skalierung mitmischt. Dieselbe Bewegung wie Motor-Mischung, wo "
+        "nichts wächst"
     ),
-    "Turns, slides and grows at even rates: a screw that widens as the object grows": (
-        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn das Objekt wächst"
+    "Turns, slides and grows at even rates: a screw that widens as the object grows. "
+    "The same motion as Screw where nothing grows": (
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn das Objekt wächst. Dieselbe "
+        "Bewegung wie Schraube, wo nichts wächst"
     ),
-    "Turns, slides and grows at even rates: a screw that widens as the bone grows": (
-        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn der Knochen wächst"
+    "Turns, slides and grows at even rates: a screw that widens as the bone grows. "
+    "The same motion as Screw where nothing grows": (
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn der Knochen wächst. Dieselbe "
+        "Bewegung wie Schraube, wo nichts wächst"
     ),
-    "Screws that flow into one another: no corner at a key, neither in the path nor in the turning": (
-        "Schrauben, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung"
+    "Screws that flow into one another: no corner at a key, neither in the path nor in the turning. "
+    "The same motion as Screw where there are two keys alone": (
+        "Schrauben, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung. Dieselbe "
+        "Bewegung wie Schraube, wo es nur zwei Schlüsselbilder gibt"
+    ),
+    "Algebra: dual quaternions": "Algebra: duale Quaternionen",
+    "Algebra: motors of projective geometric algebra (PGA)": (
+        "Algebra: Motoren der projektiven geometrischen Algebra (PGA)"
+    ),
+    "Algebra: versors of conformal geometric algebra (CGA)": (
+        "Algebra: Versoren der konformen geometrischen Algebra (CGA)"
     ),
     # Choosing modes
     "Choose how the selected objects move from key to key": (
