@@ -219,11 +219,16 @@ TOOLTIPS = {
     # Paths
     "Draw the paths of the selected objects or bones: Blender's own, and beside it that of a rigid-motion mode. "
     "Of a bone it is the path of its head, or of its tail where the bone only turns. "
-    "Parents are taken as they are on the current frame": (
+    "Parents that move by keys are followed; by constraints they are taken as they are on the current frame": (
         "Die Pfade der ausgewählten Objekte oder Knochen zeichnen: Blenders eigenen und daneben den eines Modus von "
         "Rigid Motion. Bei einem Knochen ist es der Pfad seines Kopfes, oder seines Endes, wo er sich nur dreht. "
-        "Elternteile werden so genommen, wie sie auf dem aktuellen Einzelbild sind"
+        "Elternteilen, die sich durch Schlüsselbilder bewegen, folgt er; solche mit Beschränkungen werden so genommen, "
+        "wie sie auf dem aktuellen Einzelbild sind"
     ),
+    "Draw the selected objects or bones as they are every few frames, in the mode of the path": (
+        "Die ausgewählten Objekte oder Knochen zeichnen, wie sie alle paar Einzelbilder sind, im Modus des Pfads"
+    ),
+    "Frames from one ghost to the next": "Einzelbilder von einem Geist zum nächsten",
     "The mode that each segment has": "Der Modus, den jedes Segment hat",
     "The mode to draw. Another one than keyed shows what it would do, and changes nothing": (
         "Der Modus, der gezeichnet wird. Ein anderer als der gesetzte zeigt, was er täte, und ändert nichts"
