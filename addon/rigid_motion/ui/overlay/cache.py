@@ -23,7 +23,7 @@ from ...animation.queries.keyed import active_places_of, frames_in, sources_of
 from ...animation.transforms import Transform, transform_of
 from .ghosts import ghosts_of
 from .kinds import PATH_KINDS
-from .parents import Followers, Parents
+from .parents import Carried, Parents
 from .points import Path, trace
 
 SPARE = 64
@@ -80,10 +80,10 @@ def paths_of(
     if stale:
         places = active_places_of(list(stale))
         sources = dict(zip(places, sources_of(list(places.values())), strict=True))
-        followers: Followers = {}
+        carried = Carried()
         for target, turn in stale.items():
             before = _entries.get(_identity(target))
-            entry = _read(target, places.get(target), sources.get(target), settings, turn, before, followers)
+            entry = _read(target, places.get(target), sources.get(target), settings, turn, before, carried)
             _entries[_identity(target)] = entry
     for target in targets:
         _entries.move_to_end(_identity(target))
@@ -135,7 +135,7 @@ def _read(
     settings: tuple,
     turn: np.ndarray | None,
     before: _Entry | None,
-    followers: Followers,
+    carried: Carried,
 ) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
@@ -143,7 +143,7 @@ def _read(
     if place is None or source is None:
         # Where it was refused, the panel says why.
         return entry
-    parents = None if target.animated.animation_data.use_tweak_mode else Parents(target, followers)
+    parents = None if target.animated.animation_data.use_tweak_mode else Parents(target, carried)
     if parents is not None and parents.move_by_keys:
         entry.above, entry.settings = frozenset(parents.ids), (*settings, b"")
     else:

@@ -6,7 +6,7 @@ the overlay takes parents as they are on the current frame. Frames are those of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
@@ -15,6 +15,7 @@ from mathutils import Matrix
 from ...animation.actions.slots import SlotTransform
 from ...animation.baking.channel_maps import shown
 from ...animation.baking.followers import MOVING, NotPromised, not_promised
+from ...animation.compute.sources import Source
 from ...animation.queries.keyed import active_places_of, sources_of
 from ...animation.transforms import WIDTHS, Transform, shows_differences, transform_of
 from ...animation.transforms.posing import Hierarchy
@@ -26,8 +27,60 @@ SAME = 1e-5
 WHOLE_OBJECTS = ("OBJECT", "ARMATURE")
 """Types of parents that carry an object by their own transform."""
 
-Followers = dict[bpy.types.Object, NotPromised]
-"""The bones of rigs that follow constraints or drivers, as far as they were looked up."""
+
+class Carried:
+    """What several targets hang on: read once, and worked out once for all that are looked at on the same frames."""
+
+    def __init__(self) -> None:
+        self._followers: dict[bpy.types.Object, NotPromised] = {}
+        self._hierarchies: dict[bpy.types.Object, tuple[Hierarchy, dict[str, int]]] = {}
+        self._read: dict[Transform, tuple[SlotTransform | None, Source | None]] = {}
+        self._channels: dict[tuple[Transform, bytes], AffineMaps] = {}
+        self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
+
+    def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[SlotTransform | None, Source | None]]:
+        """The place that each moves by, and what is keyed there; None where there is none."""
+        transforms = list(transforms)
+        if missing := [one for one in transforms if one not in self._read]:
+            places = active_places_of(missing)
+            sources = dict(zip(places, sources_of(list(places.values())), strict=True))
+            self._read |= {one: (places.get(one), sources.get(one)) for one in missing}
+        return {one: self._read[one] for one in transforms}
+
+    def follows(self, bone: Transform) -> bool:
+        """Whether a bone follows constraints or drivers, or hangs on one that does."""
+        rig = bone.animated
+        if rig not in self._followers:
+            self._followers[rig] = not_promised(rig)
+        return bone.carrier.name in self._followers[rig]
+
+    def hierarchy(self, rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
+        """The bones of a rig, and their numbers by name."""
+        if rig not in self._hierarchies:
+            numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
+            self._hierarchies[rig] = Hierarchy(list(rig.pose.bones)), numbers
+        return self._hierarchies[rig]
+
+    def channels(self, transform: Transform, frames: np.ndarray) -> AffineMaps:
+        """What the channels of something say on frames (n,), with its mode."""
+        key = transform, frames.tobytes()
+        if key not in self._channels:
+            _, source = self._read[transform]
+            if source is None:
+                self._channels[key] = _identity(len(frames)) @ _maps(transform.carrier.matrix_basis)
+            else:
+                self._channels[key] = shown(transform, source, frames)[1]
+        return self._channels[key]
+
+    def posed(self, bone: bpy.types.PoseBone, frames: np.ndarray) -> AffineMaps:
+        """Where a bone is in the space of its rig on frames (n,)."""
+        transform = transform_of(bone)
+        key = transform, frames.tobytes()
+        if key not in self._posed:
+            hierarchy, numbers = self.hierarchy(bone.id_data)
+            above = None if bone.parent is None else self.posed(bone.parent, frames)
+            self._posed[key] = hierarchy.placed(numbers[bone.name], self.channels(transform, frames), above)
+        return self._posed[key]
 
 
 class Parents:
@@ -36,31 +89,27 @@ class Parents:
     Parameters
     ----------
     target : Transform
-    followers : dict
-        Looked up once for several targets.
+    carried : Carried
+        That of all targets that are looked at together.
     """
 
-    def __init__(self, target: Transform, followers: Followers) -> None:
-        self.target = target
-        self.above = list(_above(target))
-        places = active_places_of(self.above) if self.above else {}
-        sources = dict(zip(places, sources_of(list(places.values())), strict=True))
-        self.sources = {transform: source for transform, source in sources.items() if source is not None}
-        self.move_by_keys = bool(self.sources) and all(
-            _moves_by_keys(one, followers) and (one in self.sources or not _is_keyed(places.get(one)))
-            for one in self.above
+    def __init__(self, target: Transform, carried: Carried) -> None:
+        self.target, self._carried = target, carried
+        self._read = carried.read(_above(target))
+        self.move_by_keys = any(source is not None for _, source in self._read.values()) and all(
+            _moves_by_keys(one, carried) and (source is not None or not _is_keyed(place))
+            for one, (place, source) in self._read.items()
         )
         """Whether they move, and by keys alone."""
-        self.ids = {one.animated.session_uid for one in self.above}
-        self.ids |= {place.slot.action.session_uid for place in places.values()}
+        self.ids = {one.animated.session_uid for one in self._read}
+        self.ids |= {place.slot.action.session_uid for place, _ in self._read.values() if place is not None}
         """Session ids of the data-blocks that decide on it."""
 
     @property
     def digest(self) -> tuple:
         """Differs wherever anything differs that decides where they carry the target."""
         found: list[object] = [_hung(self.target)]
-        for one in self.above:
-            source = self.sources.get(one)
+        for one, (_, source) in self._read.items():
             keyed = source.keyed if source is not None else ()
             stands = [getattr(one.carrier, prop)[:] for name, prop in one.properties.items() if name not in keyed]
             rest = None if source is None else (source.digest, tuple(source.rest.items()))
@@ -82,17 +131,19 @@ class Parents:
         """
         if not self.target.is_part:
             return self._carrying(self.target.carrier, frames), None
-        bone = self.target.carrier
-        hierarchy, posed = self._posed(bone, frames, _identity(len(frames)))
-        offset = hierarchy.offsets[-1]
-        above = posed[-2] if bone.parent else _identity(len(frames))
+        bone, stands = self.target.carrier, _identity(len(frames))
+        hierarchy, numbers = self._carried.hierarchy(self.target.animated)
+        number = numbers[bone.name]
+        above = None if bone.parent is None else self._carried.posed(bone.parent, frames)
+        placed, offset = hierarchy.placed(number, stands, above), hierarchy.offsets[number]
+        above = stands if above is None else above
         along = above.axes @ offset.axes if bone.bone.use_local_location else above.axes
-        turned = np.linalg.inv(along) @ posed[-1].axes
+        turned = np.linalg.inv(along) @ placed.axes
         maps = self._world(self.target.animated, frames) @ AffineMaps(along, above.at(offset.origins))
         return maps, None if np.abs(turned - np.eye(3)).max() < SAME else turned
 
     def _world(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
-        return self._carrying(obj, frames) @ self._channels(transform_of(obj), frames)
+        return self._carrying(obj, frames) @ self._carried.channels(transform_of(obj), frames)
 
     def _carrying(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
         parent = obj.parent
@@ -101,25 +152,9 @@ class Parents:
         carried = self._world(parent, frames)
         if obj.parent_type == "BONE":
             bone = parent.pose.bones[obj.parent_bone]
-            _, posed = self._posed(bone, frames, self._channels(transform_of(bone), frames))
-            carried = carried @ posed[-1] @ _maps(Matrix.Translation((0.0, bone.bone.length, 0.0)))
+            tail = _maps(Matrix.Translation((0.0, bone.bone.length, 0.0)))
+            carried = carried @ self._carried.posed(bone, frames) @ tail
         return carried @ _maps(obj.matrix_parent_inverse)
-
-    def _posed(
-        self, bone: bpy.types.PoseBone, frames: np.ndarray, channels: AffineMaps
-    ) -> tuple[Hierarchy, AffineMaps]:
-        """Where a bone with these channels (n,) and those above it are in the space of the rig, shape (bones, n)."""
-        above = list(reversed(bone.parent_recursive))
-        maps = [*(self._channels(transform_of(one), frames) for one in above), channels]
-        hierarchy = Hierarchy([*above, bone])
-        stacked = AffineMaps(np.stack([one.axes for one in maps]), np.stack([one.origins for one in maps]))
-        return hierarchy, hierarchy.posed(stacked)
-
-    def _channels(self, transform: Transform, frames: np.ndarray) -> AffineMaps:
-        source = self.sources.get(transform)
-        if source is not None:
-            return shown(transform, source, frames)[1]
-        return _identity(len(frames)) @ _maps(transform.carrier.matrix_basis)
 
 
 def _above(target: Transform) -> Iterator[Transform]:
@@ -135,13 +170,11 @@ def _above(target: Transform) -> Iterator[Transform]:
         obj = parent
 
 
-def _moves_by_keys(transform: Transform, followers: Followers) -> bool:
+def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
     """Whether nothing but keys of its Action has a part in where something is."""
     obj = transform.animated
     if transform.is_part:
-        if obj not in followers:
-            followers[obj] = not_promised(obj)
-        return transform.carrier.name not in followers[obj]
+        return not carried.follows(transform)
     data, body = obj.animation_data, obj.rigid_body
     in_strips = data is not None and (data.use_tweak_mode or any(track.strips for track in data.nla_tracks))
     driven = data is not None and any(driver.data_path.removeprefix("delta_") in MOVING for driver in data.drivers)
