@@ -3,8 +3,8 @@
 NOTES = {
     "No Bone Active": "Kein Knochen aktiv",
     "No keys of location, rotation or scale yet": ("Noch keine Schlüsselbilder von Position, Rotation oder Skalierung"),
-    "The keys are those of its bones, which have their modes in Pose Mode": (
-        "Die Schlüsselbilder sind die seiner Knochen, die ihre Modi im Posenmodus haben"
+    "Its bones have keys. Choose their modes in Pose Mode": (
+        "Seine Knochen haben Schlüsselbilder. Ihre Modi im Posenmodus wählen"
     ),
     "No segment on this frame": "Kein Segment auf diesem Einzelbild",
     "Moved by strips: enter one to see its segments (NLA Editor, Tab)": (
