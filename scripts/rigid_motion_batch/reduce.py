@@ -20,7 +20,7 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
-from rigid_motion.animation.baking.sizes import OF_A_RIG
+from rigid_motion.animation.baking.sizes import OF_A_RIG, OF_KEY_POSES
 from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.comparison.study.choices import Tolerance
@@ -41,11 +41,15 @@ from rigid_motion_batch.trajectories.arguments import add_reading_options, readi
 
 MODE = "motor_spline"
 
+MOST = 1000000
+"""Keys that can be asked for: Blender's last frame."""
+
 EPILOG = """
 examples:
   python scripts/reduce.py shot.blend
   python scripts/reduce.py shots/*.blend --tolerance 2mm --output reduced
   python scripts/reduce.py shot.blend --objects 'Camera,Rig/*' --shared
+  python scripts/reduce.py shot.blend --keys 12
   python scripts/reduce.py shot.blend --dry-run
   python scripts/reduce.py hand.csv --axes unity --tolerance 5mm
   python scripts/reduce.py hand.csv --axes unity --blend --fps 30
@@ -101,7 +105,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         type=_tolerance,
         metavar="LENGTH",
         help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
-        f"files 1mm for objects and {OF_A_RIG:.1%}% of the size of a rig; for recordings {TOLERANCE.written})",
+        f"files 1mm for objects and {OF_A_RIG:.1%}% of the size of a rig; for recordings {TOLERANCE.written}; with "
+        f"--shared {OF_KEY_POSES:.0%}% of the size of a rig or body)",
+    )
+    keys.add_argument(
+        "--keys",
+        type=_count,
+        metavar="N",
+        help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
     )
     keys.add_argument("--mode", choices=KEYFRAME_MODES, default=MODE, help="mode between the keys (%(default)s)")
     keys.add_argument(
@@ -129,10 +140,14 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add_file_options(parser)
     options = parser.parse_args(arguments)
     files, recorded = _sorted(options.inputs)
-    options.wishes = Wishes(options.mode, options.tolerance, options.radius, options.shared, options.discard)
+    options.wishes = Wishes(
+        options.mode, options.tolerance, options.radius, options.shared, options.discard, options.keys
+    )
     options.action = reducing(options.wishes, options.objects)
     try:
         refuse_odd_places(options)
+        if options.keys is not None and options.tolerance is not None:
+            raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
         if recorded and options.in_place:
             raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
         if options.objects and not files:
@@ -178,6 +193,12 @@ def _tolerance(text: str) -> Tolerance:
         return Tolerance(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 2 <= int(text) <= MOST):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 2 to {MOST}")
+    return int(text)
 
 
 def _radius(text: str) -> float:

@@ -78,6 +78,30 @@ def test_few_keys_show_the_recording_within_the_tolerance_on_every_frame(live_fi
     assert reduction.after < 0.5 * reduction.before
 
 
+@pytest.mark.parametrize("count", [2, 5, 12])
+def test_so_many_keys_have_less_of_an_error_than_as_many_evenly_in_time(live_file, count):
+    obj = recorded("throw")
+    frames = key_frames(obj)
+    truth = read_poses(obj, frames)
+    reduction = reduce_keys_of(obj, "motor_spline", radius=RADIUS, count=count)
+    assert len(key_frames(obj)) == reduction.after == count
+    assert reduction.largest_error == pytest.approx(off(obj, frames, truth), abs=1e-6)
+    evenly = frames[np.linspace(0, len(frames) - 1, count).round().astype(int)]
+    even = interpolate(evenly, truth[np.searchsorted(frames, evenly)], frames, "motor_spline")
+    even_error = shell_error(even, truth, RADIUS).max()
+    assert reduction.largest_error <= even_error * (1.0 if count > 2 else 1.0 + 1e-4)
+    restore_keys(obj)
+    assert key_frames(obj).tolist() == frames.tolist()
+
+
+@pytest.mark.parametrize(("count", "why"), [(1, "2 keys at least, not 1"), (100000, "keys: ask for fewer")])
+def test_no_motion_has_fewer_keys_than_two_or_more_than_it_had(live_file, count, why):
+    obj = recorded()
+    with pytest.raises(Refused, match=why):
+        reduce_keys_of(obj, count=count)
+    assert not is_reduced(obj)
+
+
 @pytest.mark.parametrize("mode", KEYFRAME_MODES)
 def test_every_mode_gets_the_keys_that_it_needs(live_file, mode):
     obj = recorded()
@@ -85,7 +109,7 @@ def test_every_mode_gets_the_keys_that_it_needs(live_file, mode):
     truth = read_poses(obj, frames)
     set_mode(obj, "cga_lerp", frames[::5])
     reduce_keys_of(obj, mode, TOLERANCE, RADIUS)
-    assert keys_of(obj, "rigid_motion.mode") == key_frames(obj).tolist()
+    assert ("rigid_motion.mode", 0) not in curves_of(obj), "one mode for all segments needs no keys"
     assert set(modes_of(obj, key_frames(obj))) == {mode}
     assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
 
@@ -329,7 +353,7 @@ def test_what_has_no_keys_gets_none(live_file, keyed):
     reduce_keys_of(obj, "motor_spline", TOLERANCE, RADIUS)
     assert off(obj, frames, truth) <= TOLERANCE * (1.0 + 1e-5)
     found = {name for name in curves_of(obj) if not name[0].startswith("delta_")}
-    assert found == wanted | {("rigid_motion.mode", 0)}
+    assert found == wanted
 
 
 def test_an_even_scale_is_part_of_the_pose(live_file):

@@ -15,6 +15,12 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 Place = tuple[int, int]
 Box = tuple[int, int, int, int]
 
+REDO_ROWS = 44
+"""Pixels from the top of the redo panel to the middle of its first row."""
+
+REDO_ROW = 22
+"""Pixels from there to the next row."""
+
 
 def area(window: bpy.types.Window, kind: str) -> bpy.types.Area:
     """The largest area of this type, for instance "VIEW_3D"."""
@@ -40,6 +46,11 @@ def centre(part: bpy.types.Area | bpy.types.Region) -> Place:
 def box(part: bpy.types.Area | bpy.types.Region) -> Box:
     """All of an area or a region."""
     return part.x, part.y, part.width, part.height
+
+
+def redo_row(redo: bpy.types.Region, number: int, across: float = 0.75) -> Place:
+    """A row of an unfolded redo panel, from 0, at a share of its width."""
+    return redo.x + int(across * redo.width), redo.y + redo.height - REDO_ROWS - number * REDO_ROW
 
 
 def box_around(place: Place, width: int, height: int) -> Box:

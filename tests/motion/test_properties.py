@@ -321,3 +321,17 @@ def test_every_mode_says_what_it_is():
     labels = [mode.label for mode in MODES.values()]
     assert len(set(labels)) == len(labels)
     assert all(mode.description and not mode.description.endswith(".") for mode in MODES.values())
+    short = [mode.short_label for mode in MODES.values()]
+    assert len(set(short)) == len(short)
+    assert not any("(" in label for label in short)
+
+
+@pytest.mark.parametrize("name", [name for name, mode in MODES.items() if mode.same])
+@given(motion=motions())
+def test_a_mode_that_is_said_to_be_the_same_motion_as_another_is_that(motion, name):
+    key_times, keys = motion
+    other = next(one for one, mode in MODES.items() if f"same motion as {mode.short_label} " in f"{MODES[name].same} ")
+    if MODES[name].is_smooth:
+        key_times, keys = key_times[:2], keys[:2]
+    times = times_between(key_times)
+    assert_close(interpolate(key_times, keys, times, name), interpolate(key_times, keys, times, other))

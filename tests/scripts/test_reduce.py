@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -149,6 +150,33 @@ def test_key_poses_are_on_the_same_frames_for_all_bones(tmp_path):
     ]
     assert frames[0] == frames[1] == frames[2]
     assert len(frames[0]) < len(FRAMES)
+
+
+def test_so_many_keys_of_objects_and_key_poses_of_rigs(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    key_densely(new_object("Camera"), swing(len(FRAMES), 7))
+    save(path)
+    assert run(path, "--keys", "7") == 0
+    said = capsys.readouterr().err
+    assert re.search(r"Rig: 3 bones reduced, 270 -> 21 keys on 7 frames, [\d.]+ mm off at most\n", said)
+    assert "allowed" not in said
+    open_again(reduced_name(path))
+    for carrier in (bpy.data.objects["Camera"], *bpy.data.objects["Rig"].pose.bones):
+        assert count_keys(carrier) == 7
+
+
+def test_key_poses_are_few_where_no_tolerance_is_given(tmp_path, capsys):
+    path = rig_file(tmp_path / "shot.blend")
+    assert run(path, "--shared") == 0
+    assert "(12 mm allowed)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("options", [("--keys", "1"), ("--keys", "x"), ("--keys", "5", "--tolerance", "5mm")])
+def test_a_number_of_keys_that_makes_no_sense_is_refused(tmp_path, capsys, options):
+    with pytest.raises(SystemExit) as stopped:
+        run(object_file(tmp_path / "shot.blend"), *options)
+    assert stopped.value.code == 2
+    assert "--keys" in capsys.readouterr().err
 
 
 def test_objects_and_bones_are_chosen_by_name(tmp_path, capsys):

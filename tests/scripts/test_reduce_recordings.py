@@ -50,6 +50,28 @@ def test_the_keys_of_a_recording_tell_its_motion_within_the_tolerance(tmp_path, 
     assert said.out == f"{tmp_path / 'hand-keys.csv'}\n"
 
 
+def test_so_many_keys_of_a_recording_and_key_poses_of_a_body(tmp_path, capsys):
+    path, body = tmp_path / "hand.csv", hand_made(tmp_path)
+    times, poses = write_csv(path)
+    assert run(path, body, "--keys", "9", "--output", tmp_path / "keyed") == 0
+    key_times, keys = read_table(tmp_path / "keyed" / "hand-keys.csv")
+    assert len(key_times) == 9
+    filled = interpolate(key_times, keys, times, "motor_spline")
+    (off,) = re.findall(r"hand.csv: reduced, \d+ -> 9 keys, ([\d.]+) mm off at most\n", capsys.readouterr().err)
+    assert displacement(worlds_of(filled), worlds_of(poses)) == pytest.approx(1e-3 * float(off), rel=0.01)
+    with extension():
+        open_again(tmp_path / "keyed" / f"{body.stem}-keys.blend")
+        (rig,) = bpy.data.objects
+        assert {len(key_frames(bone)) for bone in rig.pose.bones} <= {0, 9}
+
+
+@pytest.mark.recordings
+def test_a_walk_of_41_frames_has_few_key_poses_where_no_tolerance_is_given(tmp_path, capsys):
+    assert run(WALK, "--shared", "--output", tmp_path / "keyed") == 0
+    (frames,) = re.findall(r"keys on (\d+) frames", capsys.readouterr().err)
+    assert int(frames) <= 20
+
+
 @pytest.mark.parametrize("fps", [None, 30])
 def test_as_a_blend_file_it_plays_like_the_recording_in_any_blender(tmp_path, fps):
     path = tmp_path / "hand.csv"

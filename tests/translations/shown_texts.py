@@ -19,7 +19,7 @@ from rigid_motion.animation import properties
 from rigid_motion.ui.on_targets import OnTargets
 from rigid_motion.ui.overlay.settings import RigidMotionOverlay
 from rigid_motion.ui.shown import ShownTransform
-from rigid_motion.ui.wording import DESCRIPTIONS, OWN_WORDS, spoken_of
+from rigid_motion.ui.wording import DESCRIPTIONS, OWN_WORDS, SHORT_LABELS, spoken_of
 
 PACKAGE = Path(rigid_motion.__file__).parent
 FLOORS = ("animation", "ui")
@@ -53,6 +53,7 @@ def messages() -> set[Message]:
         found |= set(of_class(cls))
         found |= set(of_properties(cls))
     found |= {(DEFAULT, spoken_of(text, "bones")) for text in DESCRIPTIONS.values()}
+    found |= {(DEFAULT, label) for label in SHORT_LABELS.values()}
     return {(context, text) for context, text in found if text}
 
 

@@ -29,6 +29,8 @@ UNSEEN = {
     "Object Transforms",
     "Object Mode",
     "Graph Editor",
+    # A part of the name of a mode, by which its algebra is looked up
+    "Dual Quaternion",
     # Parts of a sentence that stand for what is meant, before it is translated as a whole
     "objects and bones",
     "an object",
@@ -43,6 +45,9 @@ UNSEEN = {
     "It has few of the keys",
     "How far the reduced motion is off where it is furthest, in Blender's units",
     "On how many frames any bone of the rig has keys",
+    "How many keys all channels had together",
+    "How many keys all channels have together",
+    "The tolerance that was offered last, for as long as nobody sets another",
     "How far what stands on the ground slid there",
     "How far it slides there with fewer keys",
     "The mode that was chosen before there was an Action to keep it",

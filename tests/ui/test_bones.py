@@ -10,6 +10,7 @@ import pytest
 
 from rigid_motion import animation
 from rigid_motion.animation import constraint_trouble, modes_of, restore_constraints, set_mode
+from rigid_motion.animation.baking.sizes import first_tolerance
 from rigid_motion.animation.transforms import CONSTRAINT, Refused, transform_of
 from rigid_motion.animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
 from rigid_motion.ui import menus
@@ -236,6 +237,27 @@ def test_the_tolerance_to_begin_with_is_one_of_the_rigs_size(body):
     operators.reduce_keys()
     largest = animation.total_reduction(list(body.pose.bones)).largest_error
     assert 0.001 * max(body.dimensions) < largest < 0.0031 * max(body.dimensions)
+
+
+def test_key_poses_begin_with_a_larger_tolerance_for_as_long_as_nobody_sets_one(body):
+    operators.reduce_keys(shared=True)
+    few = len(animation.key_frames(body.pose.bones["Root"]))
+    assert few < 0.3 * len(RECORDED)
+    operators.restore_keys()
+    offered = first_tolerance(bpy.context.scene, list(map(transform_of, body.pose.bones)), shared=True)
+    operators.reduce_keys(shared=True, tolerance=0.5 * offered)
+    assert len(animation.key_frames(body.pose.bones["Root"])) > few
+    operators.restore_keys()
+    # The redo panel, after Key Poses was switched on: the tolerance stands that own keys were offered.
+    own = first_tolerance(bpy.context.scene, list(map(transform_of, body.pose.bones)))
+    operators.reduce_keys(shared=True, tolerance=own, offered=own)
+    assert len(animation.key_frames(body.pose.bones["Root"])) == few
+
+
+def test_so_many_key_poses_can_be_asked_for(body, capfd):
+    assert operators.reduce_keys(by="NUMBER", count=12) == {"FINISHED"}
+    assert {len(animation.key_frames(bone)) for bone in body.pose.bones} == {12}
+    assert ", keys on 12 frames" in capfd.readouterr().out
 
 
 def test_in_pose_mode_it_is_the_selected_bones_alone(body):

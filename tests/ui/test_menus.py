@@ -28,7 +28,7 @@ class Layout:
         self.drawn.append((name, "", ""))
 
     def operator(self, name, text="", icon="NONE", translate=True):
-        properties = SimpleNamespace(mode="", on="", name="")
+        properties = SimpleNamespace(mode="", on="", name="", text=text)
         self.drawn.append((name, icon, properties))
         return properties
 
@@ -39,6 +39,11 @@ def drawn(menu):
     own = {name: getattr(menu, name, None) for name in ("scope", "pie", "posing")}
     menu.draw(SimpleNamespace(layout=layout, **own), bpy.context)
     return layout.drawn
+
+
+def names_in(menu):
+    """What a menu calls each mode."""
+    return {properties.mode: properties.text for name, _, properties in drawn(menu) if name == "rigid_motion.set_mode"}
 
 
 MODE_MENUS = [menu for menu in menus.CLASSES if menu.__name__.startswith("RIGID_MOTION_MT_")]
@@ -65,6 +70,35 @@ def test_a_pie_has_a_slice_for_each_mode_and_no_more(tool, menu):
     assert (west, east, north) == ("BLENDER", "dq_sclerp", "motor_spline")
     # More than eight slices would go into a menu below the pie.
     assert len(drawn(menu)) == len(MODE_IDS) == 8
+
+
+@pytest.mark.parametrize("menu", PIES)
+def test_a_pie_has_short_names_and_menus_keep_the_algebra(tool, menu):
+    slices = names_in(menu)
+    assert slices["motor_spline"] == "Smooth Screw"
+    assert slices["dq_sclerp"] == "Screw"
+    assert slices["cga_slerp"] == "Spiral"
+    assert not any("(" in text for text in slices.values())
+    assert len(set(slices.values())) == len(slices)
+    listed = names_in(menus.RIGID_MOTION_MT_object)
+    assert listed["motor_spline"] == "Smooth Screw (PGA)"
+    assert listed["dq_sclerp"] == "Screw (Dual Quaternion)"
+    assert listed["cga_slerp"] == "Versor Spiral (CGA)"
+
+
+def test_a_tooltip_has_the_algebra_and_says_what_is_the_same_motion_as_another(tool):
+    def tooltip(mode):
+        properties = SimpleNamespace(mode=mode, on="WHOLE", is_property_set=lambda name: True)
+        return bpy.types.RIGID_MOTION_OT_set_mode.description(bpy.context, properties).splitlines()
+
+    assert tooltip("dq_sclerp")[1] == "Algebra: dual quaternions"
+    assert tooltip("pga_slerp") == [
+        "The screw motion, by the exponential of the motor's logarithm. The same motion as Screw.",
+        "Algebra: motors of projective geometric algebra (PGA)",
+        "On: All Segments",
+    ]
+    assert tooltip("cga_lerp")[0].endswith("The same motion as Motor Blend where nothing grows.")
+    assert len(tooltip("lerp_slerp")) == len(tooltip("BLENDER")) == 2
 
 
 @pytest.mark.parametrize("mode", MODE_IDS)

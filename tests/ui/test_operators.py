@@ -19,12 +19,14 @@ from rigid_motion.animation import (
     set_enabled,
 )
 from rigid_motion.motion import MODES, Poses, interpolate, shell_error
-from rigid_motion.ui.operators import CLASSES
+from rigid_motion.ui import CLASSES
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.ui.conftest import FRAMES, keyed, select_keys
 
 operators = bpy.ops.rigid_motion
+
+OPERATORS = [cls for cls in CLASSES if issubclass(cls, bpy.types.Operator)]
 
 
 def modes(obj):
@@ -373,7 +375,7 @@ def test_the_best_mode_of_each_segment_is_said_and_is_one_step_to_undo(extension
     said = capfd.readouterr().out
     assert "; segments: " in said
     for mode, count in segments.items():
-        assert f"{count} {MODES[mode].label}" in said
+        assert f"{count} {MODES[mode].short_label}" in said
     bpy.ops.ed.undo()
     assert values(bpy.data.objects["Tool"]) == before
 
@@ -479,7 +481,7 @@ def test_refreshing_makes_up_for_edits_that_were_not_followed(tool):
     assert tuple(tool.delta_location) != pytest.approx(before)
 
 
-@pytest.mark.parametrize("operator", CLASSES, ids=lambda operator: operator.bl_idname)
+@pytest.mark.parametrize("operator", OPERATORS, ids=lambda operator: operator.bl_idname)
 def test_every_operator_and_property_says_what_it_is_for(extension, operator):
     assert operator.bl_idname.startswith("rigid_motion.")
     assert len(operator.bl_description) > 20
@@ -494,5 +496,5 @@ def test_every_operator_and_property_says_what_it_is_for(extension, operator):
 
 
 def test_the_names_of_operators_are_unique():
-    names = [operator.bl_idname for operator in CLASSES]
+    names = [operator.bl_idname for operator in OPERATORS]
     assert len(set(names)) == len(names)

@@ -5,11 +5,24 @@ from __future__ import annotations
 import bpy
 import pytest
 
-from rigid_motion.animation import modes_of
+from rigid_motion.animation import is_reduced, modes_of
 from rigid_motion.animation.transforms import transform_of
-from rigid_motion.ui.targets import CURRENT, KEY_EDITORS, SELECTED, WHOLE, modes_meant, scope_for, targets_of
+from rigid_motion.ui.notes import facts_and_notes
+from rigid_motion.ui.targets import (
+    CURRENT,
+    KEY_EDITORS,
+    SELECTED,
+    WHOLE,
+    modes_meant,
+    scope_for,
+    targets_of,
+    with_bones_of_rigs,
+)
+from rigid_motion.ui.wording import KEYED_BONES
 from tests.animation.scenes import editor
+from tests.rigs.recorded import NAMES, recorded_rig
 from tests.ui.conftest import FRAMES, keyed, select_keys
+from tests.ui.rigs import select
 
 
 @pytest.mark.parametrize("kind", KEY_EDITORS)
@@ -44,6 +57,35 @@ def test_elsewhere_the_selected_objects_are_meant_as_a_whole(tool):
     with editor("VIEW_3D"):
         assert scope_for(bpy.context) == WHOLE
         assert set(targets_of(bpy.context)) == {transform_of(tool), transform_of(other)}
+
+
+@pytest.mark.parametrize("kind", ["VIEW_3D", *KEY_EDITORS])
+def test_a_rig_in_object_mode_is_reduced_and_restored_in_every_editor(extension, kind):
+    rig = recorded_rig()
+    rig.select_set(True)
+    select(rig, ())
+    keys = bpy.ops.rigid_motion
+    with editor(kind) as space:
+        if kind in KEY_EDITORS:
+            space.dopesheet.show_only_selected = True
+        assert [text for _, text in facts_and_notes(rig, 5.0)[1]] == [KEYED_BONES]
+        assert keys.reduce_keys.poll()
+        assert not keys.restore_keys.poll()
+        assert keys.reduce_keys(tolerance=0.05) == {"FINISHED"}
+        assert all(is_reduced(rig.pose.bones[name]) for name in NAMES)
+        assert keys.restore_keys() == {"FINISHED"}
+        assert not any(is_reduced(rig.pose.bones[name]) for name in NAMES)
+
+
+def test_in_pose_mode_a_key_editor_means_the_bones_that_it_shows_and_no_whole_rig(extension):
+    rig = recorded_rig()
+    rig.select_set(True)
+    bpy.ops.object.mode_set(mode="POSE")
+    select(rig, ["Head"])
+    with editor("DOPESHEET_EDITOR") as space:
+        space.dopesheet.show_only_selected = True
+        meant = list(with_bones_of_rigs(bpy.context, targets_of(bpy.context)))
+    assert meant == [transform_of(rig.pose.bones["Head"])]
 
 
 def test_the_modes_meant_are_those_of_the_scope(tool):

@@ -105,4 +105,4 @@ def test_lengths_are_in_the_units_of_the_scene(empty_file):
 def test_modes_are_counted_where_there_are_several_most_of_them_first(empty_file):
     reduction = Reduction(before=9, after=5, largest_error=0.0, segments={"lerp_slerp": 1, "motor_spline": 3})
     summary = reduction_summary(bpy.context.scene, reduction)
-    assert summary.endswith("; segments: 3 Smooth Screw (PGA), 1 Vector + Quaternion")
+    assert summary.endswith("; segments: 3 Smooth Screw, 1 Vector + Quaternion")

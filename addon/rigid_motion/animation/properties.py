@@ -36,8 +36,8 @@ FIRST = ("motor_spline", "dq_sclerp")
 MODE_ITEMS = [
     ("BLENDER", "Blender", "Blender's own in-betweens: every channel for itself", 0),
     *(
-        (name, KEYFRAME_MODES[name].label, KEYFRAME_MODES[name].description, KEYFRAME_MODES[name].number)
-        for name in (*FIRST, *(name for name in KEYFRAME_MODES if name not in FIRST))
+        (name, mode.label, ". ".join(filter(None, (mode.description, mode.same))), mode.number)
+        for name, mode in sorted(KEYFRAME_MODES.items(), key=lambda item: (*FIRST, item[0]).index(item[0]))
     ),
 ]
 """The modes as items of an enumeration. Files have the numbers."""
@@ -117,6 +117,8 @@ class ChangedAction(bpy.types.PropertyGroup):
     components: FloatVectorProperty(size=10, options={"HIDDEN"})
     keys_before: IntProperty(options={"HIDDEN"})
     keys_after: IntProperty(options={"HIDDEN"})
+    channel_keys_before: IntProperty(description="How many keys all channels had together", options={"HIDDEN"})
+    channel_keys_after: IntProperty(description="How many keys all channels have together", options={"HIDDEN"})
     largest_error: FloatProperty(
         description="How far the reduced motion is off where it is furthest, in Blender's units", options={"HIDDEN"}
     )

@@ -60,6 +60,22 @@ class Mode:
     for_streams: bool = False
     """Whether it uses no key after the segment's own. It is for streams alone: keyframes have better modes."""
 
+    short: str = ""
+    """As a pie menu shows it, where that is not the label without the algebra."""
+
+    same: str = ""
+    """Which other mode makes the same motion, and when, in one sentence."""
+
+    @property
+    def short_label(self) -> str:
+        """The label without the algebra, for a pie menu."""
+        return self.short or self.label.partition(" (")[0]
+
+    @property
+    def algebra(self) -> str:
+        """The algebra that it is named after, as in its label; empty for vectors and quaternions."""
+        return self.label.partition(" (")[2].rstrip(")")
+
     @property
     def is_smooth(self) -> bool:
         """Whether it leaves a segment as it arrived from the one before, and needs the keys around for it."""
@@ -94,6 +110,7 @@ MODES: dict[str, Mode] = {
         "The screw motion, by the exponential of the motor's logarithm",
         curves.screw,
         pga.pga_slerp,
+        same="The same motion as Screw",
     ),
     "cga_lerp": Mode(
         5,
@@ -101,6 +118,7 @@ MODES: dict[str, Mode] = {
         "The motor blend, with uniform scale blended along with it",
         curves.similarity_lerp,
         cga.cga_lerp,
+        same="The same motion as Motor Blend where nothing grows",
     ),
     "cga_slerp": Mode(
         6,
@@ -108,6 +126,8 @@ MODES: dict[str, Mode] = {
         "Turns, slides and grows at even rates: a screw that widens as the object grows",
         curves.similarity_slerp,
         cga.cga_slerp,
+        short="Spiral",
+        same="The same motion as Screw where nothing grows",
     ),
     "motor_spline": Mode(
         7,
@@ -117,6 +137,7 @@ MODES: dict[str, Mode] = {
         pga.pga_slerp,
         behind=1,
         ahead=1,
+        same="The same motion as Screw where there are two keys alone",
     ),
     "motor_spline_causal": Mode(
         8,

@@ -1,7 +1,8 @@
 """What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
 
 targets      the transforms and keys an editor means    operators    what can be done to them
-on_targets   what these operators have in common        keymap       the pies' shortcut
+on_targets   what these operators have in common        reducing     fewer keys, and all of them again
+keymap       the pies' shortcut
 menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
@@ -16,13 +17,14 @@ from __future__ import annotations
 
 import bpy
 
-from . import breakdown, keymap, manual, menus, operators, overlay, panels, preferences, shown, turn_operator
+from . import breakdown, keymap, manual, menus, operators, overlay, panels, preferences, reducing, shown, turn_operator
 
 CLASSES = (
     *preferences.CLASSES,
     *operators.CLASSES,
     *turn_operator.CLASSES,
     *breakdown.CLASSES,
+    *reducing.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
 )

@@ -6,13 +6,13 @@ whole object, or in Pose Mode for the whole bone. The mode that is chosen at pre
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
-from .wording import LABELS
+from .wording import LABELS, SHORT_LABELS
 
 
 def _draw_modes(
@@ -20,13 +20,14 @@ def _draw_modes(
     layout: bpy.types.UILayout,
     scope: str,
     modes: Iterable[str] = LABELS,
+    labels: Mapping[str, str] = LABELS,
     no_icon: str = "BLANK1",
 ) -> None:
     present = modes_meant(context, active_target(context), scope)
     for mode in modes:
         # One tick where all is one; dots where modes are mixed.
         icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
-        text = iface_(LABELS[mode])
+        text = iface_(labels[mode])
         properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
         properties.mode, properties.on = mode, scope
 
@@ -139,7 +140,7 @@ class _Pie:
 
     def draw(self, context: bpy.types.Context) -> None:
         # Entries of a menu are aligned, those of a pie stand alone.
-        _draw_modes(context, self.layout.menu_pie(), self.scope, SLICES, "NONE")
+        _draw_modes(context, self.layout.menu_pie(), self.scope, SLICES, SHORT_LABELS, "NONE")
 
 
 class RIGID_MOTION_MT_pie_object(_Pie, bpy.types.Menu):

@@ -18,7 +18,19 @@ from ..animation.queries.segments import (
     segment_at,
 )
 from ..animation.transforms import Transform, transform_of
-from .wording import BAKED, BLENDED, DELTA_EDITED, NO_KEYS, NO_SEGMENT, OUT_OF_DATE, STRIPS, TROUBLES, cautions
+from .targets import with_keyed_bones
+from .wording import (
+    BAKED,
+    BLENDED,
+    DELTA_EDITED,
+    KEYED_BONES,
+    NO_KEYS,
+    NO_SEGMENT,
+    OUT_OF_DATE,
+    STRIPS,
+    TROUBLES,
+    cautions,
+)
 
 Notes = list[tuple[str, str]]
 """Texts, each behind its icon."""
@@ -37,7 +49,8 @@ def facts_and_notes(
     elif source is None:
         data = target.animated.animation_data
         in_strips = data is not None and any(track.strips for track in data.nla_tracks)
-        notes.append(("INFO", STRIPS if in_strips else NO_KEYS))
+        of_bones = with_keyed_bones(target) != [target]
+        notes.append(("INFO", KEYED_BONES if of_bones else STRIPS if in_strips else NO_KEYS))
     else:
         frame = frame_in_action(target.animated, frame)
         segment = segment_at(source, frame)

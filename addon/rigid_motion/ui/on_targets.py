@@ -16,6 +16,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.app.translations import pgettext_tip as tip_
 
 from ..animation import Refused
+from ..animation.baking.copies import BAKED, REDUCED, entries_of
 from ..animation.transforms import Transform
 from .targets import each_target, is_key_editor, is_posing
 from .wording import kind_of, names_of, spoken_of
@@ -30,6 +31,12 @@ BUT = {
     "objects and bones": n_("{done} of {count} objects and bones: {summary}. But"),
 }
 """What comes before refusals where something was done."""
+
+LATER = {
+    BAKED: n_("These keys were baked since: Un-Bake first"),
+    REDUCED: n_("These keys were reduced since: Restore Keys first"),
+}
+"""Why what was done before cannot be taken back yet, by what was done last."""
 
 MOST_REFUSALS = 8
 """Refusals that a report has room for."""
@@ -109,3 +116,42 @@ class OnTargets:
         else:
             self.report({"INFO"}, f"{names_of(targets)}: {summary}")
         return {"FINISHED"}
+
+
+class OnChanged(OnTargets):
+    """Operators on targets whose keys were baked or reduced last, while what they had before is still in the file."""
+
+    kind: ClassVar[str]
+    verb: ClassVar[Callable]
+    summary: ClassVar[str]
+
+    @classmethod
+    def last_changes(cls, targets: Iterable[Transform]) -> dict[Transform, str]:
+        """What was done last to the keys of each target that something was done to."""
+        found = {}
+        for target, entries in entries_of(targets):
+            if kind := next((entry.kind for entry in entries if entry.original is not None), None):
+                found[target] = kind
+        return found
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        targets = list(cls.each_target(context))
+        changes = cls.last_changes(targets)
+        if cls.kind in changes.values():
+            return True
+        reason = cls.reason(targets, context)
+        for target, later in changes.items():
+            if any(entry.kind == cls.kind and entry.original is not None for entry in target.motion.bakes):
+                reason = tip_(LATER[later])
+        cls.poll_message_set(reason)
+        return False
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        targets = [target for target, kind in self.last_changes(self.each_target(context)).items() if kind == self.kind]
+
+        def go_back(refused: list[Refused]) -> str:
+            type(self).verb(targets, refused=refused)
+            return rpt_(self.summary)
+
+        return self.act(targets, go_back)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -19,8 +18,17 @@ from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
 from . import overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
-from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
-from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, length, reduction_rows, turn
+from .targets import (
+    CURRENT,
+    SELECTED,
+    WHOLE,
+    active_target,
+    fcurves_of,
+    is_key_editor,
+    modes_meant,
+    with_keyed_bones,
+)
+from .wording import LABELS, NO_BONE, OUT_OF_DATE, TROUBLES, length, reduced_to, turn
 
 CATEGORY = "Animation"
 """The tab of the sidebar: in the viewport Blender has its own tools for animation there."""
@@ -77,6 +85,7 @@ class _Shown:
     )
     bl_region_type = "UI"
     bl_category = CATEGORY
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -98,6 +107,10 @@ class _Path:
     bl_label = "Path"
     bl_region_type = "UI"
     bl_category = CATEGORY
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012 - Blender reads it
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.rigid_motion_overlay, "show_paths", text="")
 
     def draw(self, context: bpy.types.Context) -> None:
         overlay.draw_settings(self.layout, context)
@@ -135,13 +148,9 @@ class _Delta:
 
 def _draw_segment(context: bpy.types.Context, layout: bpy.types.UILayout, segment: SegmentFacts) -> None:
     _draw_mode_menu(labelled(layout, iface_("Segment", OWN_WORDS)), CURRENT, {segment.mode})
-    column = layout.column(align=True)
-    for label, text in (
-        (iface_("Frames", OWN_WORDS), f"{segment.first:g} \N{EN DASH} {segment.last:g}"),
-        (iface_("Turn", OWN_WORDS), turn(segment)),
-        (iface_("Distance", OWN_WORDS), length(context.scene, segment.distance)),
-    ):
-        labelled(column, label).label(text=text, translate=False)
+    frames = f"{segment.first:g} \N{EN DASH} {segment.last:g}"
+    facts = frames, turn(segment), length(context.scene, segment.distance)
+    labelled(layout, iface_("Frames", OWN_WORDS)).label(text=", ".join(facts), translate=False)
 
 
 def _draw_turns(layout: bpy.types.UILayout, target: Transform) -> None:
@@ -164,12 +173,12 @@ def _draw_reduction(context: bpy.types.Context, layout: bpy.types.UILayout, targ
     row = layout.row(align=True)
     row.operator("rigid_motion.reduce_keys", text="Reduce Keys", text_ctxt=OWN_WORDS)
     row.operator("rigid_motion.restore_keys", text="Restore Keys", text_ctxt=OWN_WORDS)
-    reduction = animation.reduction_of(target)
+    keyed = with_keyed_bones(target)
+    reduction = animation.reduction_of(target) if keyed == [target] else animation.total_reduction(keyed)
     if reduction is not None:
         row.operator("rigid_motion.discard_dense_keys", text="", icon="TRASH")
-        column = layout.column(align=True)
-        for label, text in reduction_rows(context.scene, replace(reduction, rig=None)):
-            labelled(column, label).label(text=text, translate=False)
+        text = reduced_to(context.scene, reduction)
+        labelled(layout, iface_("Keys", OWN_WORDS)).label(text=text, translate=False)
 
 
 def _in_space(base: type, space: str, parent: type | None = None) -> type[bpy.types.Panel]:
@@ -177,16 +186,15 @@ def _in_space(base: type, space: str, parent: type | None = None) -> type[bpy.ty
     content: dict[str, object] = {"bl_space_type": space}
     if parent is not None:
         content["bl_parent_id"] = parent.__name__
-    if base is _Shown and space != "VIEW_3D":
-        # The Item tab, to be compared with, is in the viewport.
-        content["bl_options"] = {"DEFAULT_CLOSED"}
     return type(name, (base, bpy.types.Panel), content)
 
 
 def _panels() -> Iterator[type[bpy.types.Panel]]:
     for space in SPACES:
         yield (main := _in_space(_Main, space))
-        yield from (_in_space(base, space, main) for base in (_Shown, _Path, _Delta))
+        yield (shown := _in_space(_Shown, space, main))
+        yield _in_space(_Delta, space, shown)
+        yield _in_space(_Path, space, main)
 
 
 CLASSES = tuple(_panels())

@@ -60,12 +60,29 @@ def targets_of(context: bpy.types.Context) -> list[Transform]:
 
 
 def with_bones_of_rigs(context: bpy.types.Context, targets: Iterable[Transform]) -> Iterator[Transform]:
-    """The targets, and in place of rigs whose bones have keys, outside of Pose Mode, all of theirs that have any."""
+    """The targets, and outside of Pose Mode in place of rigs all that has keys of them and of their bones.
+
+    In a key editor these are the selected rigs too: it shows channels of bones only where the bones are selected.
+    """
+    if is_posing(context):
+        yield from targets
+        return
+    if is_key_editor(context):
+        rigs = (obj for obj in selected(context) if obj.type == "ARMATURE")
+        targets = (*map(transform_of, rigs), *targets)
+    seen: set[Transform] = set()
     for target in targets:
-        obj = target.carrier
-        bones = () if target.is_part or obj.type != "ARMATURE" or is_key_editor(context) else obj.pose.bones
-        keyed = list(with_more_keys_than((target, *map(transform_of, bones)), 0)) if bones else []
-        yield from keyed if any(one.is_part for one in keyed) else (target,)
+        keyed = [one for one in with_keyed_bones(target) if one not in seen]
+        yield from keyed
+        seen.update(keyed)
+
+
+def with_keyed_bones(target: Transform) -> list[Transform]:
+    """What has keys of a rig and its bones, where any of its bones has; otherwise the target alone."""
+    if target.is_part or target.carrier.type != "ARMATURE":
+        return [target]
+    keyed = list(with_more_keys_than((target, *map(transform_of, target.carrier.pose.bones)), 0))
+    return keyed if any(one.is_part for one in keyed) else [target]
 
 
 def selected(context: bpy.types.Context) -> list[bpy.types.Object] | list[bpy.types.PoseBone]:

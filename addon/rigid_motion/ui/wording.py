@@ -16,14 +16,26 @@ from ..animation.properties import MODE_ITEMS, OWN_WORDS
 from ..animation.queries.segments import NEAR_HALF_TURN, SegmentFacts
 from ..animation.transforms import Transform
 from ..animation.writers.constraint_repair import CHANGED, MUTED, NOT_FIRST, OTHER_SLOT, REMOVED, WEAK
+from ..motion import KEYFRAME_MODES
 
 LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
+
+SHORT_LABELS = {name: KEYFRAME_MODES[name].short_label if name in KEYFRAME_MODES else LABELS[name] for name in LABELS}
+"""The same without the algebra, for pies and lists."""
+
+ALGEBRAS = {
+    "Dual Quaternion": n_("Algebra: dual quaternions"),
+    "PGA": n_("Algebra: motors of projective geometric algebra (PGA)"),
+    "CGA": n_("Algebra: versors of conformal geometric algebra (CGA)"),
+}
+"""The algebras that modes are named after."""
 
 DESCRIPTIONS = {name: description for name, _, description, _ in MODE_ITEMS}
 """What each mode does for the motion, in one sentence without a full stop."""
 
 NO_KEYS = n_("No keys of location, rotation or scale yet")
+KEYED_BONES = n_("Its bones have keys. Choose their modes in Pose Mode")
 NO_SEGMENT = n_("No segment on this frame")
 STRIPS = n_("Moved by strips: enter one to see its segments (NLA Editor, Tab)")
 BAKED = n_("Baked to keys. Un-Bake brings its own keys back")
@@ -88,6 +100,11 @@ def cautions(segment: SegmentFacts) -> list[str]:
     return texts
 
 
+def algebra_of(mode: str) -> str:
+    """The line of a tooltip that says which algebra a mode is in, in English; empty where it is named after none."""
+    return ALGEBRAS.get(KEYFRAME_MODES[mode].algebra, "") if mode in KEYFRAME_MODES else ""
+
+
 def degrees(angle: float) -> str:
     """An angle in radians, to be read."""
     return f"{math.degrees(angle):.1f}°"
@@ -115,6 +132,11 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     summary = rpt_("{before} keys became {after}, largest error {error}").format(
         before=reduction.before, after=reduction.after, error=error
     )
+    before, after = reduction.channel_keys
+    if after > before:
+        summary += rpt_(", but channels have {after} keys together, and had {before}").format(
+            before=before, after=after
+        )
     if reduction.rig is not None:
         summary += rpt_(", keys on {frames} frames").format(frames=reduction.rig.frames)
         if (feet := _slides(scene, reduction.rig)) is not None:
@@ -127,6 +149,13 @@ def reduction_summary(scene: bpy.types.Scene, reduction: Reduction) -> str:
     return summary
 
 
+def reduced_to(scene: bpy.types.Scene, reduction: Reduction) -> str:
+    """How many keys became how many, and how far off the motion is, for a line of a panel."""
+    became = f"{reduction.before} \N{RIGHTWARDS ARROW} {reduction.after}"
+    error = length(scene, reduction.largest_error, precision=3)
+    return iface_("{keys}, {error} off").format(keys=became, error=error)
+
+
 def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[str, str]]:
     """What became of keys, and of the rig where it is one, as labels and what belongs to them."""
     rows = [
@@ -136,6 +165,11 @@ def reduction_rows(scene: bpy.types.Scene, reduction: Reduction) -> list[tuple[s
             iface_("{error} at most").format(error=length(scene, reduction.largest_error, precision=3)),
         ),
     ]
+    before, after = reduction.channel_keys
+    if after > before:
+        rows.append(
+            (iface_("Channels", OWN_WORDS), iface_("{before} to {after} keys").format(before=before, after=after))
+        )
     if reduction.rig is not None:
         rows.insert(1, (iface_("Frames", OWN_WORDS), iface_("{frames} with keys").format(frames=reduction.rig.frames)))
         if (feet := _slides(scene, reduction.rig)) is not None:
@@ -156,7 +190,9 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
 
 def counted_modes(segments: Mapping[str, int]) -> list[str]:
     """Each mode with how many segments have it, most of them first."""
-    return [f"{count} {iface_(LABELS[mode])}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])]
+    return [
+        f"{count} {iface_(SHORT_LABELS[mode])}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])
+    ]
 
 
 def listed(items: Sequence[str], most: int = 3) -> str:

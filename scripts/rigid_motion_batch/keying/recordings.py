@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rigid_motion.motion import reduce_keys
 from rigid_motion_batch.comparison.study.choices import Tolerance
 from rigid_motion_batch.comparison.study.clips import Clip
 from rigid_motion_batch.comparison.study.metrics import write_poses
@@ -155,12 +156,19 @@ class RecordingRun:
             self._refuse(title, path)
         mode, radius, tolerance = self.wishes.mode, self.wishes.radius or RIGID, self.wishes.tolerance or TOLERANCE
         frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps) if scene else None
-        keys = tolerance.keys(clip, mode, radius)
+        count = self.wishes.count
+        if count is None:
+            keys = tolerance.keys(clip, mode, radius)
+        else:
+            budget = min(count, len(clip.times))
+            keys = reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, budget=budget)
         largest = float(fill_in(clip, tolerance, {mode: keys}, radius).errors[mode].shell.max())
         self._stop_if_asked()
         if frames is not None:
             key_object(clip, keys, frames, mode, name)
-        told = fewer(len(clip.times), len(keys)) + off(tolerance, largest, clip.metres_per_unit)
+        told = fewer(len(clip.times), len(keys)) + off(
+            tolerance, largest, clip.metres_per_unit, by_number=count is not None
+        )
         self._note(f"{title}: {self._would}reduced{told}")
         if not self.writing.dry_run:
             try:
@@ -178,7 +186,9 @@ class RecordingRun:
         self._refuse(title, scene)
         tolerance = self.wishes.tolerance or TOLERANCE
         frames = new_file(clip, tolerance.tolerance(clip), self.writing.fps)
-        result = key_body(clip, frames, replace(self.wishes, tolerance=tolerance), name)
+        # Key poses are few by what is large for the body.
+        wishes = self.wishes if self.wishes.shared else replace(self.wishes, tolerance=tolerance)
+        result = key_body(clip, frames, wishes, name)
         self._stop_if_asked()
         for bones, reason, count in result.refusals():
             outcome.refused += count

@@ -41,6 +41,9 @@ class Wishes:
     discard: bool = False
     """Whether the dense keys go out of the file, so that Restore Keys cannot give them back."""
 
+    count: int | None = None
+    """So many keys of each object, or key poses of each rig, instead of a tolerance."""
+
 
 def reducing(wishes: Wishes, asked: Sequence[str] | None = None) -> Action:
     """Fewer keys for what has more than two; and for what was asked for by its very name, if only to say why not."""
@@ -60,7 +63,7 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     """Leave targets of the open file the few keys that they need."""
     scene = bpy.context.scene
     unit = metres_per_unit(scene)
-    tolerance = wishes.tolerance or _written(first_tolerance(scene, targets) * unit)
+    tolerance = wishes.tolerance or _written(first_tolerance(scene, targets, shared=wishes.shared) * unit)
     before = [len(target.motion.bakes) for target in targets]
     refusals: list[Refused] = []
     animation.reduce_keys_of(
@@ -69,6 +72,7 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
         tolerance.metres(unit) / unit,
         None if wishes.radius is None else wishes.radius / unit,
         shared=wishes.shared,
+        count=wishes.count,
         refused=refusals,
     )
     done = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
@@ -77,7 +81,8 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     doubt = _doubt(targets, wishes.tolerance, unit)
     left = {target for target, refusal in problems.items() if isinstance(refusal, NeedsItsKeys)}
     reasons = {target: _reason(target, refusal) for target, refusal in problems.items()}
-    told = f"{_described(animation.total_reduction(done), tolerance, unit)}{doubt}" if done else ""
+    by_number = wishes.count is not None
+    told = f"{_described(animation.total_reduction(done), tolerance, unit, by_number=by_number)}{doubt}" if done else ""
     if wishes.discard and done:
         animation.discard_dense_keys(done)
     return Result(
@@ -88,12 +93,15 @@ def reduced(targets: Sequence[Transform], wishes: Wishes) -> Result:
     )
 
 
-def _described(reduction: Reduction, tolerance: Tolerance, unit: float) -> str:
+def _described(reduction: Reduction, tolerance: Tolerance, unit: float, *, by_number: bool) -> str:
     """How many keys there were and are, and how far off they are; lengths of the reduction are of `unit` metres."""
     rig = reduction.rig
     told = fewer(reduction.before, reduction.after)
     told += f" on {counted(rig.frames, 'frame')}" if rig else ""
-    told += off(tolerance, reduction.largest_error * unit, unit)
+    told += off(tolerance, reduction.largest_error * unit, unit, by_number=by_number)
+    before, after = reduction.channel_keys
+    if after > before:
+        told += f"; channels have {after} keys together, and had {before}"
     if rig and rig.slide_before > 0.0:
         before, after = (tolerance.alike(slide * unit, unit) for slide in (rig.slide_before, rig.slide_after))
         told += f"; feet slide {after}, and {before} before"
@@ -125,8 +133,10 @@ def fewer(before: int, after: int) -> str:
     return f", {before} -> {after} keys"
 
 
-def off(tolerance: Tolerance, metres: float, per_unit: float) -> str:
+def off(tolerance: Tolerance, metres: float, per_unit: float, *, by_number: bool) -> str:
     """How far off that is, in the unit of the tolerance, which is of so many metres where it says none."""
+    if by_number:
+        return f", {tolerance.alike(metres, per_unit)} off at most"
     allowed = tolerance.alike(tolerance.metres(per_unit), per_unit)
     return f", {tolerance.alike(metres, per_unit)} off at most ({allowed} allowed)"
 

@@ -8,6 +8,7 @@ import pytest
 
 from rigid_motion.animation import (
     Refused,
+    channelbag_of,
     is_reduced,
     key_frames,
     modes_of,
@@ -18,6 +19,7 @@ from rigid_motion.animation import (
     total_reduction,
     write_channel,
 )
+from rigid_motion.ui.wording import reduction_summary
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object
 from tests.balls import largest_displacements
@@ -70,6 +72,53 @@ def test_no_bone_gets_further_off_than_the_tolerance(live_file, mode, shared, be
     assert total_reduction(bones(rig)).rig.frames == len({frame for some in keys for frame in some})
     if not best_of:
         assert {one for bone in bones(rig) for one in modes_of(bone, key_frames(bone))} == {mode}
+
+
+@pytest.mark.parametrize("best_of", [False, True])
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XZY"])
+@pytest.mark.parametrize("count", [4, 12])
+def test_so_many_key_poses_are_shared_by_all_bones_and_their_error_is_what_is_said(
+    live_file, count, rotation_mode, best_of
+):
+    rig = recorded_rig(rotation_mode)
+    truth = matrices(rig)
+    reduce_keys_of(bones(rig), "motor_spline", radius=RADIUS, best_of=best_of, count=count)
+    total = total_reduction(bones(rig))
+    keys = [key_frames(bone).tolist() for bone in bones(rig)]
+    assert keys == keys[:1] * len(keys)
+    assert len(keys[0]) == total.rig.frames == count
+    assert total.largest_error == pytest.approx(max(errors(rig, truth).values()), abs=2e-6)
+
+
+def test_a_rig_that_moves_itself_has_its_keys_on_the_key_poses(live_file):
+    rig = recorded_rig()
+    places = np.stack((np.sin(0.11 * FRAMES), 0.02 * FRAMES, 0.0 * FRAMES), axis=1)
+    write_channel(rig, "location", FRAMES, places)
+    rig.scale = (0.5, 0.5, 0.5)
+    bpy.context.view_layer.update()
+    reduce_keys_of([rig, *bones(rig)], "motor_spline", radius=RADIUS, count=9)
+    keys = [key_frames(one).tolist() for one in (rig, *bones(rig))]
+    assert keys == keys[:1] * len(keys)
+    assert len(keys[0]) == 9
+    by_nine = total_reduction([rig, *bones(rig)]).largest_error
+    restore_keys([rig, *bones(rig)])
+    reduce_keys_of([rig, *bones(rig)], "motor_spline", radius=RADIUS, count=20)
+    assert total_reduction([rig, *bones(rig)]).largest_error < by_nine
+
+
+def test_more_keys_in_all_channels_than_before_are_no_secret(live_file):
+    rig = recorded_rig()
+    # As importers leave what is always the same: with a key at either end.
+    for bone in bones(rig):
+        write_channel(rig, bone.path_from_id("scale"), FRAMES[[0, -1]], np.ones((2, 3)))
+    had = sum(len(fcurve.keyframe_points) for fcurve in channelbag_of(rig).fcurves)
+    reduce_keys_of(bones(rig), "motor_spline", radius=RADIUS, count=80)
+    has = sum(len(fcurve.keyframe_points) for fcurve in channelbag_of(rig).fcurves)
+    reduction = total_reduction(bones(rig))
+    assert reduction.channel_keys == (had, has)
+    assert has > had
+    said = reduction_summary(bpy.context.scene, reduction)
+    assert f"but channels have {has} keys together, and had {had}" in said
 
 
 def test_own_keys_are_fewer_than_key_poses_and_key_poses_are_on_fewer_frames(live_file):

@@ -145,6 +145,22 @@ class EditingObjects(WithTools):
                 f"{name} is baked otherwise on frame {frame} (keys on {keys}, step {step}):\n{now}\ninstead of\n{then}"
             )
 
+    @precondition(lambda self: self.on)
+    @rule(who=shares, count=st.integers(2, 8))
+    def reduce_to_a_number_and_restore(self, who, count):
+        name = self._object(who).name
+        if len(self._sharing(name)) > 1 or name in self.before_bake:
+            return
+        keyed, before = snapshot(bpy.data.objects[name]), len(key_frames(bpy.data.objects[name]))
+        refused: list[animation.Refused] = []
+        self._edit(lambda: animation.reduce_keys_of(bpy.data.objects[name], count=count, refused=refused))
+        if refused:
+            assert snapshot(bpy.data.objects[name]) == keyed
+            return
+        assert len(key_frames(bpy.data.objects[name])) < before
+        self._edit(lambda: animation.restore_keys(bpy.data.objects[name]))
+        assert snapshot(bpy.data.objects[name]) == keyed
+
     # Actions that go and come
 
     def _sharing(self, name: str) -> set[str]:

@@ -14,12 +14,6 @@ from tests.gui.driver import Hand, Steps
 FRAMES = np.arange(1.0, 252.0)
 CORNERS = np.array([(x, y, z, 1.0) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]).T
 
-REDO_ROWS = 44
-"""Pixels from the top of the redo panel to the middle of its first row."""
-
-REDO_ROW = 22
-"""Pixels from there to the next row."""
-
 
 def cube() -> bpy.types.Object:
     """The default cube, asked for anew each time: undo replaces it."""
@@ -78,7 +72,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.click(places.centre(redo))
     yield from hand.wait_until(lambda: redo.height > 100, "the redo panel unfolds")
     yield from hand.picture("redo-panel", places.box(view))
-    yield from hand.hover((redo.x + 3 * redo.width // 4, redo.y + redo.height - REDO_ROWS))
+    yield from hand.hover(places.redo_row(redo, 1))
     yield from hand.press("RET")
     yield from hand.press("A", ctrl=True)
     yield from hand.type("0.1")
@@ -89,7 +83,7 @@ def scenario(hand: Hand) -> Steps[None]:
     assert modes() == {"motor_spline"}
     few, single = keys(), off(truth)
 
-    yield from hand.click((redo.x + redo.width // 2, redo.y + redo.height - REDO_ROWS - 3 * REDO_ROW))
+    yield from hand.click(places.redo_row(redo, 4, across=0.5))
     yield from hand.wait_until(lambda: len(modes()) > 1, "a box in the redo panel gives segments the best mode each")
     assert keys() == few
     assert off(truth) < 1.1 * single

@@ -73,9 +73,11 @@ def shown_from_the_panel(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert without[MODE] == 0, without
 
     yield from hand.open_sidebar(view, "Animation")
-    show = yield from hand.find_button(view, "UI", "show_paths")
+    show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
     yield from hand.click(show)
     assert settings.show_paths
+    x, y = show
+    yield from hand.click((x + 60, y))  # the header, to unfold the panel
     seen = yield from look(hand, view, "native")
     assert seen[NATIVE] > without[NATIVE] + 100, seen
     assert seen[MODE] == 0, "no mode is chosen yet"
@@ -121,7 +123,7 @@ def hidden(hand: Hand, view: bpy.types.Area) -> Steps[None]:
     assert seen[MODE] > 300, seen
     assert seen[NATIVE] < both[NATIVE] - 100, (seen, both)
     yield from hand.click(native)
-    show = yield from hand.find_button(view, "UI", "show_paths")
+    show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
     yield from hand.click(show)
     seen = yield from look(hand, view, "switched-off")
     assert seen[MODE] == 0, seen

@@ -10,12 +10,6 @@ from tests.gui import places
 from tests.gui.driver import Hand, Steps
 from tests.rigs.recorded import FRAMES, NAMES, recorded_rig
 
-REDO_ROWS = 44
-"""Pixels from the top of the redo panel to the middle of its first row."""
-
-REDO_ROW = 22
-"""Pixels from there to the next row."""
-
 
 def rig() -> bpy.types.Object:
     """The rig, asked for anew each time: undo replaces it."""
@@ -63,7 +57,7 @@ def scenario(hand: Hand) -> Steps[None]:
     yield from hand.click(places.centre(redo))
     yield from hand.wait_until(lambda: redo.height > 100, "the redo panel unfolds")
     yield from hand.picture("own-keys")
-    yield from hand.hover((redo.x + 3 * redo.width // 4, redo.y + redo.height - REDO_ROWS))
+    yield from hand.hover(places.redo_row(redo, 1))
     yield from hand.press("RET")
     yield from hand.press("A", ctrl=True)
     yield from hand.type("0.02")
@@ -72,10 +66,21 @@ def scenario(hand: Hand) -> Steps[None]:
     own = keys()
     yield from hand.picture("redo-panel", places.box(view))
 
-    yield from hand.click((redo.x + redo.width // 2, redo.y + redo.height - REDO_ROWS - 4 * REDO_ROW))
+    yield from hand.click(places.redo_row(redo, 5, across=0.5))
     yield from hand.wait_until(lambda: len(set(keys())) == 1, "Key Poses gives all bones keys on the same frames")
     assert max(keys()) < len(FRAMES)
     yield from hand.picture("key-poses")
+
+    yield from hand.click(places.redo_row(redo, 0, across=0.85))
+    yield from hand.wait_until(lambda: set(keys()) == {12}, "Number leaves so many key poses")
+    yield from hand.hover(places.redo_row(redo, 1))
+    yield from hand.press("RET")
+    yield from hand.press("A", ctrl=True)
+    yield from hand.type("7")
+    yield from hand.press("RET")
+    yield from hand.wait_until(lambda: set(keys()) == {7}, "another number leaves as many")
+    yield from hand.picture("seven-key-poses", places.box(view))
+    assert animation.total_reduction(rig().pose.bones).rig.frames == 7
 
     yield from hand.hover(places.centre(places.region(view)))
     yield from hand.press("Z", ctrl=True)

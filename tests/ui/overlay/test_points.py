@@ -143,17 +143,6 @@ def test_the_world_is_where_the_parent_takes_the_path(scene, parenting):
     assert in_world(obj, on(path, path.wanted, WHOLE)) == pytest.approx(shown_origins(obj, WHOLE), abs=2e-5)
 
 
-def test_a_path_goes_along_with_a_parent_that_moves(scene):
-    parent, obj = key(new_object("Table"), seed=1), key(new_object())
-    obj.parent = parent
-    set_mode(obj, "dq_sclerp")
-    for frame in (1, 17, 30):
-        scene.frame_set(frame)
-        path = path_of(obj, scene)
-        wanted = in_world(obj, on(path, path.wanted, np.array([float(frame)])))
-        assert wanted[0] == pytest.approx(np.array(obj.matrix_world.translation), abs=2e-5)
-
-
 def test_own_delta_transforms_are_part_of_the_path(scene):
     obj = key(new_object())
     give_own_deltas(obj)

@@ -125,10 +125,12 @@ def fewer_keys(
     *,
     best_of: bool,
     more_frames: np.ndarray = NO_FRAMES,
+    count: int | None = None,
 ) -> FewerKeys:
     """The keys that one slot needs, which may be as many as it has. Lengths are the scene's units.
 
-    The tolerance holds on all whole frames, on those with keys, and on `more_frames`.
+    The tolerance holds on all whole frames, on those with keys, and on `more_frames`. With a count there are so many
+    keys instead, those with the smallest largest error that is found.
     """
     frames = samples_of(source)
     seen = np.union1d(seen_frames(frames, [source]), more_frames)
@@ -156,11 +158,14 @@ def fewer_keys(
                     "{name}: its scale passes zero between two keys: ease those in another way (Dope Sheet, T)"
                 ).format(name=transform.name)
             )
-    chosen = samples[reduce_keys(frames, poses[samples], mode, tolerance / unit, searched)]
+    wish = {"tolerance": tolerance / unit} if count is None else {"budget": count}
+    chosen = samples[reduce_keys(frames, poses[samples], mode, radius=searched, **wish)]
     values = values_on(transform, source, seen)
     while True:
         fewer = with_keys(source, seen[chosen], {row: column[chosen] for row, column in values.items()}, mode)
         error = error_of(fewer)
+        if count is not None:
+            allowed = float(error.max())
         if error.max() <= allowed:
             break
         more = _worst(chosen, error, samples, allowed)

@@ -7,6 +7,7 @@ these are reduced along with them. Poses are those that the channels give, witho
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
@@ -44,6 +45,7 @@ from .sizes import scale_in_scene
 NO_FEWER = n_(
     "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: allow a larger one"
 )
+NOT_SO_MANY = n_("{name}: its bones have keys on {frames} frames: ask for fewer key poses")
 NO_FEWER_POSES = n_(
     "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: "
     "allow a larger one, or give each bone keys of its own"
@@ -73,10 +75,11 @@ def fewer_keys_of_rigs(
     shared: bool,
     hold: bool,
     best_of: bool,
+    count: int | None = None,
 ) -> Plans:
     """Plans for all bones among the targets, those together that one slot of a rig moves, and the rig along with them.
 
-    Lengths are the scene's units.
+    Lengths are the scene's units. With a count there are so many key poses, whatever the tolerance.
     """
     together: dict[tuple[bpy.types.Object, bpy.types.Action, int], _Members] = {}
     for transform, reading in readings.items():
@@ -97,7 +100,9 @@ def fewer_keys_of_rigs(
         if not members:
             continue
         try:
-            rig = _Rig(obj, members, tolerance, radius, hold=hold)
+            rig = _Rig(obj, members, tolerance if count is None else math.inf, radius, hold=hold)
+            if count is not None:
+                rig.find_key_poses(mode, count, None if own is None else own[1])
             if own is not None:
                 of_object = plans.setdefault(transform_of(obj), [])
                 of_object.append(rig.reduce_own_keys(transform_of(obj), *own, mode, best_of=best_of))
@@ -142,6 +147,8 @@ class _Rig:
             number: values_on(self.targets[number], source, self.frames) for number, source in self.sources.items()
         }
         self.largest_own = 0.0
+        self.key_poses: np.ndarray | None = None
+        """The moments of the key poses, where so many of them were asked for."""
         self._stand(hold=hold)
         self._search_in()
 
@@ -183,7 +190,16 @@ class _Rig:
     def reduce_own_keys(
         self, transform: Transform, place: SlotTransform, source: Source, mode: str, *, best_of: bool
     ) -> FewerKeys:
-        """Fewer keys for the rig itself, within a share of the tolerance at the farthest point of any bone."""
+        """Fewer keys for the rig itself: on the key poses, or within a share of the tolerance at any bone."""
+        if self.key_poses is not None:
+            first, last = np.searchsorted(self.frames, distinct(source.keyed_frames)[[0, -1]] - SAME_FRAME)
+            keys = np.union1d(np.clip(self.key_poses, first, last), (first, last))
+            values = {row: column[keys] for row, column in values_on(transform, source, self.frames).items()}
+            fewer = with_keys(source, self.frames[keys], values, mode)
+            if len(distinct(fewer.keyed_frames)) >= len(distinct(source.keyed_frames)):
+                fewer = source
+            self.motion.carry(fewer)
+            return FewerKeys.planned(transform, place, source, fewer, self.frames[keys], values, 0.0)
         share = SHARE * self.tolerance / self.weights.max()
         reach = self.motion.extent * scale_in_scene(transform)
         plan = fewer_keys(transform, place, source, mode, share, reach, best_of=best_of, more_frames=self.frames)
@@ -192,11 +208,50 @@ class _Rig:
             self.largest_own = plan.largest_error
         return plan
 
+    def find_key_poses(self, mode: str, count: int, own: Source | None) -> None:
+        """Find the best moments for so many key poses of all bones, and of the rig itself where it has keys."""
+        samples, fixed = np.flatnonzero(self.sampled), self._fixed()
+        poses, parents, radii, weights = self.poses, self.skeleton.parents, self.motion.radii, self.weights
+        if own is not None:
+            # The bones hang on the rig as on one joint more, which counts by them alone.
+            moved, _ = shown(transform_of(self.rig), own, self.frames)
+            scale = float(moved.scales[0]) or 1.0
+            poses = Poses(
+                np.concatenate((moved.positions[None] / scale, poses.positions)),
+                np.concatenate((align_signs(moved.quaternions[None]), poses.quaternions)),
+                None if poses.scales is None else np.concatenate((np.ones((1, len(self.frames))), poses.scales)),
+            )
+            parents = np.append(-1, np.where(parents < 0, 0, parents + 1))
+            radii, weights, fixed = (
+                np.append(0.0, radii),
+                np.vstack((np.zeros(len(self.frames)), weights)),
+                [False, *fixed],
+            )
+        if not all(fixed):
+            keys = reduce_skeleton_keys(
+                self.frames[samples],
+                poses[:, samples],
+                parents,
+                mode,
+                budget=count,
+                radius=radii,
+                shared=True,
+                weights=weights[:, samples],
+                fixed=fixed,
+            )
+            self.key_poses = samples[keys[fixed.index(False)]]
+
+    def _fixed(self) -> list[bool]:
+        """Which bones keep the keys that they have."""
+        return [n not in self.targets or self._keeps_all(n) for n in range(len(self.motion.bones))]
+
     def fewer_keys(self, mode: str, *, shared: bool, best_of: bool) -> dict[Transform, FewerKeys]:
-        samples = np.flatnonzero(self.sampled)
-        able = {number for number in self.targets if not self._keeps_all(number)}
+        samples, fixed = np.flatnonzero(self.sampled), self._fixed()
+        able = [number for number, stays in enumerate(fixed) if not stays]
         chosen: dict[int, np.ndarray] = {}
-        if able:
+        if self.key_poses is not None:
+            chosen = {number: self._within_its_keys(self.key_poses, number) for number in able}
+        elif able:
             keys = reduce_skeleton_keys(
                 self.frames[samples],
                 self.poses[:, samples],
@@ -206,14 +261,17 @@ class _Rig:
                 radius=self.motion.radii,
                 shared=shared,
                 weights=self.weights[:, samples],
-                fixed=[number not in able for number in range(len(self.motion.bones))],
+                fixed=fixed,
             )
             chosen = {number: self._within_its_keys(samples[keys[number]], number) for number in able}
         fewer = self._proven(chosen, mode, shared=shared)
         if not fewer:
-            text = NO_FEWER_POSES if shared else NO_FEWER
+            text = NOT_SO_MANY if self.key_poses is not None else NO_FEWER_POSES if shared else NO_FEWER
             raise NeedsItsKeys(rpt_(text).format(name=self.rig.name, frames=len(samples)))
         if best_of:
+            if self.key_poses is not None:
+                # As far off as it is by now, and no farther.
+                self.tolerance = max((error for error, *_ in self.motion.over(0.0, self.weights)), default=0.0)
             self._mix(fewer)
         errors = [self.motion.largest_error(number) for number in range(len(self.motion.bones))]
         excepted = not_promised(self.rig)

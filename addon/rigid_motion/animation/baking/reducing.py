@@ -22,9 +22,10 @@ from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.refusals import refuse_modified
-from ..actions.slots import places_of, slots_of, transforms_in
+from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
 from ..compute.sources import MODE_NAMES, distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
+from ..edits.mode_keys import set_whole
 from ..live.segment_keys import set_mode_in
 from ..queries.keyed import segment_modes
 from ..transforms import Refused, Transform, shows_differences, transform_of
@@ -79,6 +80,9 @@ class Reduction:
     rig: WholeRig | None = None
     """What became of the rig, where it is a bone's."""
 
+    channel_keys: tuple[int, int] = (0, 0)
+    """The keys of all channels together, before and after. There may be more: a pose has all channels."""
+
 
 def reduce_keys_of(
     targets: Targets,
@@ -89,6 +93,7 @@ def reduce_keys_of(
     best_of: bool = False,
     shared: bool = False,
     hold: bool = True,
+    count: int | None = None,
     refused: list[Refused] | None = None,
 ) -> Reduction | None:
     """Leave only the keys that a mode needs to show the same motion.
@@ -114,6 +119,9 @@ def reduce_keys_of(
         Give all bones of a rig keys on the same frames: key poses.
     hold : bool
         Keep bones that stand on the ground to a quarter of the tolerance while they do.
+    count : int, optional
+        So many keys of an object, or key poses of a rig, at least 2: those with the smallest largest error that is
+        found, whatever the tolerance. Bones that have fewer keys keep these.
     refused : list, optional
         Takes the refusals, and all other targets are reduced.
 
@@ -135,10 +143,12 @@ def reduce_keys_of(
             rpt_("the tolerance has to be a number above zero, not {tolerance:g}").format(tolerance=tolerance)
         )
 
+    if count is not None and count < 2:
+        raise Refused(rpt_("a motion has 2 keys at least, not {count}").format(count=count))
     of_rigs: Plans = {}
 
     def survey(readings: Mapping[Transform, Readings]) -> None:
-        wishes = {"shared": shared, "hold": hold, "best_of": best_of}
+        wishes = {"shared": shared, "hold": hold, "best_of": best_of, "count": count}
         of_rigs.update(fewer_keys_of_rigs(readings, mode, tolerance, radius, **wishes))
 
     def plan(transform: Transform, readings: Readings) -> list[FewerKeys]:
@@ -154,16 +164,18 @@ def reduce_keys_of(
         if transform.is_part:
             if not found:
                 before = sum(len(distinct(source.keyed_frames)) for _, source in keyed)
-                raise _no_fewer(transform, before, keeps_scale=any(has_uneven_scale(source) for _, source in keyed))
+                keeps_scale = any(has_uneven_scale(source) for _, source in keyed)
+                raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
             return found
         size = radius or radius_of(transform.carrier)
         planned = {fewer.place for fewer in found}
         rest = [one for one in keyed if one[0] not in planned]
-        found = [*found, *(fewer_keys(transform, *one, mode, tolerance, size, best_of=best_of) for one in rest)]
+        wishes = {"best_of": best_of, "count": count}
+        found = [*found, *(fewer_keys(transform, *one, mode, tolerance, size, **wishes) for one in rest)]
         fewer = [reduced for reduced in found if len(reduced.key_frames) < reduced.before]
         if not fewer:
             before, keeps_scale = sum(kept.before for kept in found), any(kept.keeps_scale for kept in found)
-            raise _no_fewer(transform, before, keeps_scale=keeps_scale)
+            raise _no_fewer(transform, before, keeps_scale=keeps_scale, count=count)
         return fewer
 
     def act(transform: Transform, fewer: list[FewerKeys]) -> None:
@@ -204,6 +216,7 @@ def _summed(entries: _Entries, of_bones: _Entries, segments: dict[str, int]) -> 
         max(entry.largest_error for entry in entries),
         segments,
         rig,
+        (sum(entry.channel_keys_before for entry in entries), sum(entry.channel_keys_after for entry in entries)),
     )
 
 
@@ -275,6 +288,7 @@ def discard_dense_keys(targets: Targets, *, refused: list[Refused] | None = None
 
 
 def _write(transform: Transform, fewer: FewerKeys) -> None:
+    channel_keys = _channel_keys(fewer.place)
     copy = move_by_copy(transform, fewer.place, REDUCED)
     entry = transform.motion.bakes[-1]
     entry.keys_before, entry.keys_after = fewer.before, len(fewer.key_frames)
@@ -285,31 +299,41 @@ def _write(transform: Transform, fewer: FewerKeys) -> None:
         entry.largest_error_of_rig = fewer.rig.largest_error
         names = fewer.rig.not_promised
         entry.not_promised = json.dumps([names.followers, names.below]) if names else ""
-    fcurves = copy.channelbag.fcurves
     for channel, values in fewer.values.items():
         fcurve = copy.ensure_curve(channel)
         replace_keys(fcurve, fewer.frames, values, handle_type="AUTO_CLAMPED")
         fcurve.mute = False
     for channel in (transform.mode_channel, transform.turns_channel):
         if channel in copy.curves:
-            fcurves.remove(copy.curves.pop(channel))
-    for mode in np.unique(fewer.modes):
-        set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
+            copy.channelbag.fcurves.remove(copy.curves.pop(channel))
+    modes = np.unique(fewer.modes).tolist()
+    if len(modes) == 1:
+        set_whole(copy, MODE_NAMES[modes[0]])
+    else:
+        for mode in modes:
+            set_mode_in(copy, MODE_NAMES[mode], fewer.key_frames[fewer.modes == mode])
+    entry.channel_keys_before, entry.channel_keys_after = channel_keys, _channel_keys(copy)
 
 
-def _no_fewer(transform: Transform, count: int, *, keeps_scale: bool) -> Refused:
-    if count <= 2:
-        return Refused(_why_nothing_is_keyed(transform, count))
+def _channel_keys(place: SlotTransform) -> int:
+    return sum(len(fcurve.keyframe_points) for fcurve in place.curves.values())
+
+
+def _no_fewer(transform: Transform, before: int, *, keeps_scale: bool, count: int | None) -> Refused:
+    if before <= 2:
+        return Refused(_why_nothing_is_keyed(transform, before))
     if keeps_scale:
         return Refused(
             rpt_(
                 "{name} keeps its {count} keys: its scale changes differently along its axes, which is no "
                 "part of a pose; move that animation to a child, or remove keys of the scale by hand"
-            ).format(name=transform.name, count=count)
+            ).format(name=transform.name, count=before)
         )
+    if count is not None:
+        return NeedsItsKeys(rpt_("{name} has {count} keys: ask for fewer").format(name=transform.name, count=before))
     return NeedsItsKeys(
         rpt_("{name} needs its {count} keys to stay within the tolerance: allow a larger one").format(
-            name=transform.name, count=count
+            name=transform.name, count=before
         )
     )
 

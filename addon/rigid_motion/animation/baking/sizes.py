@@ -18,6 +18,9 @@ SAME_PLACE = 0.1
 OF_A_RIG = 0.003
 """The tolerance that the keys of a rig are reduced to at first, of its size: 5 mm for a grown-up."""
 
+OF_KEY_POSES = 0.02
+"""The same for key poses, which are to be few: 35 mm."""
+
 
 def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     """How far an object or a pose bone reaches from its origin, in the scene's units.
@@ -71,12 +74,15 @@ def rig_size(rig: bpy.types.Object) -> float:
     return extent if extent > SAME_PLACE * reach else reach
 
 
-def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform]) -> float:
-    """What to begin with: a millimetre, and of a rig a share of its size; in the scene's units."""
+def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform], *, shared: bool = False) -> float:
+    """The tolerance to begin with, in the scene's units: a millimetre, and of a rig a share of its size.
+
+    That is larger where its bones share key poses.
+    """
     sizes = [rig_size(rig) for rig in {target.animated for target in targets if target.is_part}]
     if not sizes or max(sizes) <= 0.0:
         return 0.001 / metres_per_unit(scene)
-    return float(f"{OF_A_RIG * max(sizes):.2g}")
+    return float(f"{(OF_KEY_POSES if shared else OF_A_RIG) * max(sizes):.2g}")
 
 
 def metres_per_unit(scene: bpy.types.Scene) -> float:

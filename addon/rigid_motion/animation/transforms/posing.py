@@ -54,14 +54,15 @@ class Hierarchy:
         for number in self.order:
             if number in changed or self.parents[number] in changed:
                 changed.add(number)
-                placed[number] = self._placed(number, channels[number], placed)
+                parent = self.parents[number]
+                placed[number] = self.placed(number, channels[number], placed[parent] if parent >= 0 else None)
 
-    def _placed(self, number: int, channels: AffineMaps, placed: AffineMaps) -> AffineMaps:
+    def placed(self, number: int, channels: AffineMaps, above: AffineMaps | None) -> AffineMaps:
+        """Where a bone with these channels (n,) is, its parent being at `above` (n,), None where it has none."""
         bone, offset, parent = self.bones[number], self.offsets[number], int(self.parents[number])
-        if parent < 0:
+        if above is None:
             along = offset.axes if bone.use_local_location else np.eye(3)
             return AffineMaps(offset.axes @ channels.axes, offset.origins + turned(along, channels.origins))
-        above = placed[parent]
         along = above.axes @ offset.axes if bone.use_local_location else above.axes
         origins = above.at(offset.origins)
         # Blender leaves a connected bone where its parent ends.

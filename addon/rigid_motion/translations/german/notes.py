@@ -3,6 +3,9 @@
 NOTES = {
     "No Bone Active": "Kein Knochen aktiv",
     "No keys of location, rotation or scale yet": ("Noch keine Schlüsselbilder von Position, Rotation oder Skalierung"),
+    "Its bones have keys. Choose their modes in Pose Mode": (
+        "Seine Knochen haben Schlüsselbilder. Ihre Modi im Posenmodus wählen"
+    ),
     "No segment on this frame": "Kein Segment auf diesem Einzelbild",
     "Moved by strips: enter one to see its segments (NLA Editor, Tab)": (
         "Von Streifen bewegt: einen öffnen, um seine Segmente zu sehen (NLA-Editor, Tab)"
@@ -62,6 +65,7 @@ NOTES = {
     # Rows
     "{angle} ({turns} turns)": "{angle} ({turns} Umdrehungen)",
     "{error} at most": "höchstens {error}",
+    "{before} to {after} keys": "{before} auf {after} Schlüsselbilder",
     "{frames} with keys": "{frames} mit Schlüsselbildern",
     "slide {distance}": "rutschen {distance}",
     "{after}, recorded {before}": "{after}, aufgenommen {before}",

@@ -228,6 +228,11 @@ REFUSALS = {
         "{name}: die Skalierung geht durch null, und mit ihr die Größe von allem, was daran hängt: "
         "die Knochen darüber und darunter getrennt voneinander reduzieren"
     ),
+    "{name} has {count} keys: ask for fewer": "{name} hat {count} Schlüsselbilder: weniger verlangen",
+    "{name}: its bones have keys on {frames} frames: ask for fewer key poses": (
+        "{name}: die Knochen haben Schlüsselbilder auf {frames} Einzelbildern: weniger Schlüsselposen verlangen"
+    ),
+    "a motion has 2 keys at least, not {count}": "eine Bewegung hat mindestens 2 Schlüsselbilder, nicht {count}",
     "{name}: its bones need their keys on all of {frames} frames to stay within the tolerance: allow a larger one": (
         "{name}: die Knochen brauchen ihre Schlüsselbilder auf allen {frames} Einzelbildern, um in der Toleranz zu "
         "bleiben: eine größere erlauben"

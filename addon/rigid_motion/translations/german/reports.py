@@ -27,6 +27,9 @@ REPORTS = {
     "{before} keys became {after}, largest error {error}": (
         "aus {before} Schlüsselbildern wurden {after}, größter Fehler {error}"
     ),
+    ", but channels have {after} keys together, and had {before}": (
+        ", aber die Kanäle haben zusammen {after} Schlüsselbilder und hatten {before}"
+    ),
     ", keys on {frames} frames": ", Schlüsselbilder auf {frames} Einzelbildern",
     ", feet that stand slide {distance}": ", stehende Füße rutschen {distance}",
     "; not promised for what follows constraints or drivers, and hangs on it: {bones}": (

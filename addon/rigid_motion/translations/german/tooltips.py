@@ -15,20 +15,34 @@ TOOLTIPS = {
     "Nearly the screw motion, slower at the keys and faster half-way": (
         "Fast die Schraubenbewegung, langsamer an den Schlüsselbildern und schneller auf halbem Weg"
     ),
-    "The screw motion, by the exponential of the motor's logarithm": (
-        "Die Schraubenbewegung, berechnet über den Logarithmus des Motors"
+    "The screw motion, by the exponential of the motor's logarithm. The same motion as Screw": (
+        "Die Schraubenbewegung, berechnet über den Logarithmus des Motors. Dieselbe Bewegung wie Schraube"
     ),
-    "The motor blend, with uniform scale blended along with it": (
-        "Die Motor-Mischung, bei der sich gleichmäßige Skalierung mitmischt"
+    "The motor blend, with uniform scale blended along with it. The same motion as Motor Blend where nothing grows": (
+        "Die Motor-Mischung, bei der sich gleichmäßige Skalierung mitmischt. Dieselbe Bewegung wie Motor-Mischung, wo "
+        "nichts wächst"
     ),
-    "Turns, slides and grows at even rates: a screw that widens as the object grows": (
-        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn das Objekt wächst"
+    "Turns, slides and grows at even rates: a screw that widens as the object grows. "
+    "The same motion as Screw where nothing grows": (
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn das Objekt wächst. Dieselbe "
+        "Bewegung wie Schraube, wo nichts wächst"
     ),
-    "Turns, slides and grows at even rates: a screw that widens as the bone grows": (
-        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn der Knochen wächst"
+    "Turns, slides and grows at even rates: a screw that widens as the bone grows. "
+    "The same motion as Screw where nothing grows": (
+        "Dreht sich, gleitet und wächst gleichmäßig: eine Schraube, die weiter wird, wenn der Knochen wächst. Dieselbe "
+        "Bewegung wie Schraube, wo nichts wächst"
     ),
-    "Screws that flow into one another: no corner at a key, neither in the path nor in the turning": (
-        "Schrauben, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung"
+    "Screws that flow into one another: no corner at a key, neither in the path nor in the turning. "
+    "The same motion as Screw where there are two keys alone": (
+        "Schrauben, die ineinander übergehen: kein Knick am Schlüsselbild, weder im Pfad noch in der Drehung. Dieselbe "
+        "Bewegung wie Schraube, wo es nur zwei Schlüsselbilder gibt"
+    ),
+    "Algebra: dual quaternions": "Algebra: duale Quaternionen",
+    "Algebra: motors of projective geometric algebra (PGA)": (
+        "Algebra: Motoren der projektiven geometrischen Algebra (PGA)"
+    ),
+    "Algebra: versors of conformal geometric algebra (CGA)": (
+        "Algebra: Versoren der konformen geometrischen Algebra (CGA)"
     ),
     # Poses in between
     "Key a pose on the current frame that is between the key before and the key after it, on the path of the mode": (
@@ -177,10 +191,22 @@ TOOLTIPS = {
         "„Schlüsselbilder wiederherstellen“ gibt alle zurück"
     ),
     "How far off any point may be on any frame, within the radius around what is moved. Of bones that counts "
-    "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size": (
+    "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size, "
+    "or 2 % for key poses": (
         "Wie weit irgendein Punkt im Radius um das Bewegte auf irgendeinem Einzelbild abweichen darf. Bei Knochen "
         "zählt der Ort, an den sie durch alles gelangen, woran sie hängen. Anfangs ein Millimeter, bei einem Rig 0,3 "
-        "% seiner Größe"
+        "% seiner Größe, für Schlüsselposen 2 %"
+    ),
+    "What decides how many keys are left": "Wovon abhängt, wie viele Schlüsselbilder bleiben",
+    "As few keys as keep the motion within the tolerance": (
+        "So wenige Schlüsselbilder, wie die Bewegung in der Toleranz halten"
+    ),
+    "So many keys, or of a rig key poses, with the smallest error that is found": (
+        "So viele Schlüsselbilder, bei einem Rig Schlüsselposen, mit dem kleinsten Fehler, der sich findet"
+    ),
+    "Keys left of each object, or key poses of each rig. Below is how far off the motion is then": (
+        "So viele Schlüsselbilder jedes Objekts oder Schlüsselposen jedes Rigs bleiben. Darunter steht, wie weit die "
+        "Bewegung dann abweicht"
     ),
     "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
     "At 0 each object has the size of its own bounding box, and each bone its length": (
@@ -246,11 +272,16 @@ TOOLTIPS = {
     # Paths
     "Draw the paths of the selected objects or bones: Blender's own, and beside it that of a rigid-motion mode. "
     "Of a bone it is the path of its head, or of its tail where the bone only turns. "
-    "Parents are taken as they are on the current frame": (
+    "Parents that move by keys are followed; by constraints they are taken as they are on the current frame": (
         "Die Pfade der ausgewählten Objekte oder Knochen zeichnen: Blenders eigenen und daneben den eines Modus von "
         "Rigid Motion. Bei einem Knochen ist es der Pfad seines Kopfes, oder seines Endes, wo er sich nur dreht. "
-        "Elternteile werden so genommen, wie sie auf dem aktuellen Einzelbild sind"
+        "Elternteilen, die sich durch Schlüsselbilder bewegen, folgt er; solche mit Beschränkungen werden so genommen, "
+        "wie sie auf dem aktuellen Einzelbild sind"
     ),
+    "Draw the selected objects or bones as they are every few frames, in the mode of the path": (
+        "Die ausgewählten Objekte oder Knochen zeichnen, wie sie alle paar Einzelbilder sind, im Modus des Pfads"
+    ),
+    "Frames from one ghost to the next": "Einzelbilder von einem Geist zum nächsten",
     "The mode that each segment has": "Der Modus, den jedes Segment hat",
     "The mode to draw. Another one than keyed shows what it would do, and changes nothing": (
         "Der Modus, der gezeichnet wird. Ein anderer als der gesetzte zeigt, was er täte, und ändert nichts"

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -21,7 +21,9 @@ from ...animation.compute.sources import Source
 from ...animation.handlers import append_handlers, remove_handlers
 from ...animation.queries.keyed import active_places_of, frames_in, sources_of
 from ...animation.transforms import Transform, transform_of
+from .ghosts import ghosts_of
 from .kinds import PATH_KINDS
+from .parents import Carried, Parents
 from .points import Path, trace
 
 SPARE = 64
@@ -43,6 +45,9 @@ class _Entry:
     selected: bytes = b""
     """Which keys of its channels were selected."""
 
+    above: frozenset[int] = frozenset()
+    """Session ids of what its parents move by, where it follows them."""
+
     stale: bool = False
 
 
@@ -63,18 +68,23 @@ def paths_of(
 ) -> list[Path | None]:
     """The paths of several targets. `turned` is what stands between the rotation of a bone and its location."""
     overlay = scene.rigid_motion_overlay
-    settings = (overlay.mode, overlay.tick_step, overlay.axes_size, scene.frame_start, scene.frame_end)
+    settings = (
+        *(overlay.mode, overlay.tick_step, overlay.axes_size, overlay.ghost_step if overlay.show_ghosts else 0),
+        *(scene.frame_start, scene.frame_end),
+    )
     stale: dict[Transform, np.ndarray | None] = {}
     for target in targets:
         entry, turn = _entries.get(_identity(target)), (turned or {}).get(target)
-        if entry is None or entry.stale or entry.settings != (*settings, _bytes(turn)):
+        if entry is None or entry.stale or entry.settings != (*settings, b"" if entry.above else _bytes(turn)):
             stale[target] = turn
     if stale:
         places = active_places_of(list(stale))
         sources = dict(zip(places, sources_of(list(places.values())), strict=True))
+        carried = Carried()
         for target, turn in stale.items():
             before = _entries.get(_identity(target))
-            _entries[_identity(target)] = _read(target, places.get(target), sources.get(target), settings, turn, before)
+            entry = _read(target, places.get(target), sources.get(target), settings, turn, before, carried)
+            _entries[_identity(target)] = entry
     for target in targets:
         _entries.move_to_end(_identity(target))
     return [_entries[_identity(target)].path for target in targets]
@@ -125,6 +135,7 @@ def _read(
     settings: tuple,
     turn: np.ndarray | None,
     before: _Entry | None,
+    carried: Carried,
 ) -> _Entry:
     data = target.animated.animation_data
     action = data.action if data else None
@@ -132,20 +143,31 @@ def _read(
     if place is None or source is None:
         # Where it was refused, the panel says why.
         return entry
-    mode, tick_step, axes_size, *_ = settings
+    parents = None if target.animated.animation_data.use_tweak_mode else Parents(target, carried)
+    if parents is not None and parents.move_by_keys:
+        entry.above, entry.settings = frozenset(parents.ids), (*settings, b"")
+    else:
+        parents = None
+    mode, tick_step, axes_size, ghost_step, *_ = settings
     kind = PATH_KINDS[target.kind]
     point, size = kind.point(target.carrier, source, turn), kind.axis_length(target.carrier, source)
     entry.selected = _selection(place)
     # What is not keyed moves the path and not its in-betweens, so it is no part of their digest.
     of_point = () if point is None else (point.moves, point.stays.tobytes(), point.tip.tobytes())
     selected = frames_in(place, selected=True)
-    entry.digest = (source.digest, tuple(source.rest.items()), of_point, selected.tobytes(), size, entry.settings)
+    stands = [getattr(target.carrier, prop)[:] for name, prop in target.properties.items() if name not in source.keyed]
+    entry.digest = (
+        *(source.digest, tuple(source.rest.items()), of_point, selected.tobytes(), size, entry.settings),
+        *(tuple(stands) if ghost_step else (), parents and parents.digest),
+    )
     if before is not None and before.digest == entry.digest:
         entry.path = before.path
     else:
         with suppress(ValueError):  # numbers that make no motion
             chosen = None if mode == "CHOSEN" else mode
-            entry.path = trace(source, chosen, tick_step, axes_size * size, selected, point)
+            entry.path = trace(source, chosen, tick_step, axes_size * size, selected, point, parents)
+            if ghost_step and entry.path is not None:
+                entry.path = replace(entry.path, ghosts=ghosts_of(target, source, chosen, ghost_step, turn, parents))
     return entry
 
 
@@ -154,7 +176,7 @@ def _on_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _entries:
         edited = {update.id.original.session_uid for update in depsgraph.updates}
         for (uid, _), entry in _entries.items():
-            entry.stale |= uid in edited or entry.action in edited
+            entry.stale |= uid in edited or entry.action in edited or not edited.isdisjoint(entry.above)
 
 
 @persistent

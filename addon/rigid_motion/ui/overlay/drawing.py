@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import bpy
 import gpu
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ...animation.queries.segments import frame_in_action
 from ...animation.transforms import transform_of
@@ -23,9 +23,10 @@ from ..look import DEFAULT_LOOK, Color
 from ..preferences import preferences
 from ..targets import selected_in_view
 from . import cache
+from .ghost_drawing import draw_ghosts
 from .kinds import PATH_KINDS
 from .points import TICKS, Path, thinned
-from .settings import RigidMotionOverlay, are_paths_shown
+from .settings import RigidMotionOverlay, is_shown
 from .spacing import Readable, readable
 
 log = logging.getLogger(__package__)
@@ -204,9 +205,9 @@ class _Pen:
 
 
 def draw_paths() -> None:
-    """Draw the paths of the selected objects or bones in the viewport that is being drawn. It never raises."""
+    """Draw paths and ghosts of the selected objects or bones in the viewport that is being drawn. It never raises."""
     try:
-        if are_paths_shown(bpy.context):
+        if is_shown(bpy.context):
             _draw(bpy.context)
     except Exception as problem:
         _complain(problem)
@@ -217,7 +218,7 @@ def follow_selection() -> None:
     context = bpy.context
     try:
         # While it plays the viewports are drawn anyway, as fast as they can be.
-        if not are_paths_shown(context) or context.screen.is_animation_playing:
+        if not is_shown(context) or context.screen.is_animation_playing:
             return
         if cache.notice_selection(selected_in_view(context)):
             for window in context.window_manager.windows:
@@ -252,11 +253,17 @@ def _draw(context: bpy.types.Context) -> None:
     gpu.state.program_point_size_set(True)
     try:
         for target, path in paths:
-            space, _ = spaces[target]
+            space = Matrix() if path.in_world else spaces[target][0]
+            frame = frame_in_action(target.animated, scene.frame_current_final)
             with gpu.matrix.push_pop():
                 gpu.matrix.multiply_matrix(space)
+                if path.ghosts is not None:
+                    color = pen.look.native_color if path.wanted is None else pen.look.mode_color
+                    draw_ghosts(target, path.ghosts, frame, color, pen.line, _batch)
+                if not settings.show_paths:
+                    continue
                 _draw_path(pen, path, settings)
-            native, wanted = path.at(frame_in_action(target.animated, scene.frame_current_final))
+            native, wanted = path.at(frame)
             if settings.show_native or wanted is None:
                 native_now.append(space @ Vector(native))
             if wanted is not None:

@@ -17,7 +17,10 @@ from mathutils import Matrix
 from ...animation.compute.differences import in_betweens
 from ...animation.compute.sources import Source
 from ...motion import Poses
+from ...motion.affine import AffineMaps, turned
 from ...motion.quaternions import rotate
+from .ghosts import Ghosts
+from .parents import Parents
 
 SMOOTH = 256
 """A path gets this many samples, or one on every frame where those are more: bends look round then."""
@@ -49,7 +52,7 @@ class Followed(NamedTuple):
     """The point on its own axes, shape (3,)."""
 
     turned: np.ndarray | None
-    """What its rotation, and the axes with it, are turned by in the space of its location, shape (3, 3)."""
+    """What its rotation, and the axes with it, are turned by in the space of its location: (3, 3), or (n, 3, 3)."""
 
     def points(self, poses: Poses) -> np.ndarray:
         """Where the point is at these poses, shape (n, 3)."""
@@ -59,8 +62,12 @@ class Followed(NamedTuple):
         return poses.positions * self.moves + self.stays + self.strokes(arms)
 
     def strokes(self, vectors: np.ndarray) -> np.ndarray:
-        """What vectors that turn with it are in the space of its location, shape (..., 3)."""
-        return vectors if self.turned is None else vectors @ self.turned.T
+        """What vectors (n, 3) that turn with it are in the space of its location."""
+        return vectors if self.turned is None else turned(self.turned, vectors)
+
+    def at(self, places: np.ndarray) -> Followed:
+        """The same for some of the poses."""
+        return self if self.turned is None or self.turned.ndim == 2 else self._replace(turned=self.turned[places])
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +104,12 @@ class Path:
     axes: np.ndarray
     """How it is turned on these, in the mode or else natively: the ends of its local axes, shape (a, 3, 2, 3)."""
 
+    in_world: bool = False
+    """Whether all of it is in the space of the world, and not in that of the channels."""
+
+    ghosts: Ghosts | None = None
+    """Where it is every few frames; None where that was not asked for."""
+
     def at(self, frame: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Where it is at a frame, natively and in the mode, each of shape (3,). The path holds its ends."""
         after = min(max(int(self.frames.searchsorted(frame)), 1), len(self.frames) - 1)
@@ -116,6 +129,7 @@ def trace(
     axis_length: float = 1.0,
     selected: np.ndarray | None = None,
     followed: Followed | None = None,
+    parents: Parents | None = None,
 ) -> Path | None:
     """The path of a source, None where it has fewer than two keys.
 
@@ -132,6 +146,8 @@ def trace(
         The frames of the keys that are selected.
     followed : Followed, optional
         The point that the path is of, where it is not the origin.
+    parents : Parents, optional
+        What carries it, for a path in the space of the world.
 
     Raises
     ------
@@ -153,9 +169,11 @@ def trace(
     )
     is_native = not source.is_live if mode is None else mode == "BLENDER"
     shown = motion.native if is_native else motion.wanted
-    native, wanted = (
-        poses.positions if followed is None else followed.points(poses) for poses in (motion.native, motion.wanted)
-    )
+    spaces = None
+    if parents is not None:
+        spaces, turns = parents.spaces(frames)
+        followed = None if followed is None else followed._replace(turned=turns)
+    native, wanted = (_points(poses, followed, spaces) for poses in (motion.native, motion.wanted))
     return Path(
         frames=samples,
         native=native[on_samples],
@@ -166,8 +184,21 @@ def trace(
         native_ticks=native[on_ticks],
         wanted_ticks=None if is_native else wanted[on_ticks],
         axis_frames=with_axes,
-        axes=_axes((native if is_native else wanted)[on_axes], shown[on_axes], axis_length, followed),
+        axes=_axes(
+            (native if is_native else wanted)[on_axes],
+            shown[on_axes],
+            axis_length,
+            None if followed is None else followed.at(on_axes),
+            None if spaces is None else spaces[on_axes],
+        ),
+        in_world=spaces is not None,
     )
+
+
+def _points(poses: Poses, followed: Followed | None, spaces: AffineMaps | None) -> np.ndarray:
+    """Where the point that a path is of is at poses (n,), in these spaces."""
+    points = poses.positions if followed is None else followed.points(poses)
+    return points if spaces is None else spaces.at(points)
 
 
 def sample_frames(first: int, last: int) -> np.ndarray:
@@ -205,12 +236,17 @@ def _round_step(length: int, most: int) -> int:
     )
 
 
-def _axes(points: np.ndarray, poses: Poses, length: float, followed: Followed | None) -> np.ndarray:
+def _axes(
+    points: np.ndarray, poses: Poses, length: float, followed: Followed | None, spaces: AffineMaps | None
+) -> np.ndarray:
     """Both ends of the local axes at each pose, from these points on, shape (n, 3, 2, 3)."""
     lengths = np.full(len(poses), length) if poses.scales is None else length * poses.scales
     strokes = lengths[:, None, None] * rotate(poses.quaternions[:, None], np.eye(3))
-    if followed is not None:
-        strokes = followed.strokes(strokes)
+    for axis in range(3):
+        if followed is not None:
+            strokes[:, axis] = followed.strokes(strokes[:, axis])
+        if spaces is not None:
+            strokes[:, axis] = turned(spaces.axes, strokes[:, axis])
     starts = np.broadcast_to(points[:, None], strokes.shape)
     return np.stack((starts, starts + strokes), axis=2)
 

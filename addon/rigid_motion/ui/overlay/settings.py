@@ -20,7 +20,7 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         name="Rigid Motion Paths",
         description="Draw the paths of the selected objects or bones: Blender's own, and beside it that of a "
         "rigid-motion mode. Of a bone it is the path of its head, or of its tail where the bone only turns. "
-        "Parents are taken as they are on the current frame",
+        "Parents that move by keys are followed; by constraints they are taken as they are on the current frame",
         options=set(),
     )
     mode: EnumProperty(
@@ -56,17 +56,36 @@ class RigidMotionOverlay(bpy.types.PropertyGroup):
         soft_max=100,
         options=set(),
     )
+    show_ghosts: BoolProperty(
+        name="Ghosts",
+        description="Draw the selected objects or bones as they are every few frames, in the mode of the path",
+        options=set(),
+    )
+    ghost_step: IntProperty(
+        name="Ghost Step",
+        description="Frames from one ghost to the next",
+        default=5,
+        min=1,
+        soft_max=50,
+        options=set(),
+    )
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """The settings of the overlay, for a panel."""
     settings = context.scene.rigid_motion_overlay
-    labelled(layout).prop(settings, "show_paths", text="Show")
-    if settings.show_paths and not are_paths_shown(context):
+    if (settings.show_paths or settings.show_ghosts) and not is_shown(context):
         draw_text(context, layout, HIDDEN, "INFO")
+    row = labelled(layout, iface_("Mode", OWN_WORDS))
+    row.active = settings.show_paths or settings.show_ghosts
+    row.prop(settings, "mode", text="")
+    ghosts = labelled(layout)
+    ghosts.prop(settings, "show_ghosts")
+    step = ghosts.row()
+    step.active = settings.show_ghosts
+    step.prop(settings, "ghost_step", text="")
     column = layout.column()
     column.active = settings.show_paths
-    labelled(column, iface_("Mode", OWN_WORDS)).prop(settings, "mode", text="")
     labelled(column, iface_("Step", OWN_WORDS)).prop(settings, "tick_step", text="")
     labelled(column).prop(settings, "show_native")
     axes = labelled(column)
@@ -81,10 +100,11 @@ def draw_toggle(panel: bpy.types.Panel, context: bpy.types.Context) -> None:
     column = panel.layout.column()
     column.active = context.space_data.overlay.show_overlays and context.space_data.overlay.show_motion_paths
     column.prop(context.scene.rigid_motion_overlay, "show_paths")
+    column.prop(context.scene.rigid_motion_overlay, "show_ghosts", text="Rigid Motion Ghosts")
 
 
-def are_paths_shown(context: bpy.types.Context) -> bool:
-    """Whether the scene, and the viewport if the context is in one, show paths."""
-    overlay = getattr(context.space_data, "overlay", None)
+def is_shown(context: bpy.types.Context) -> bool:
+    """Whether the scene, and the viewport if the context is in one, show paths or ghosts."""
+    overlay, settings = getattr(context.space_data, "overlay", None), context.scene.rigid_motion_overlay
     in_view = not isinstance(overlay, bpy.types.View3DOverlay) or (overlay.show_overlays and overlay.show_motion_paths)
-    return in_view and context.scene.rigid_motion_overlay.show_paths
+    return in_view and (settings.show_paths or settings.show_ghosts)

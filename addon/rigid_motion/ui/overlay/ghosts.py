@@ -1,0 +1,146 @@
+"""Ghosts: what moves, as it is every few frames, all at once. Where they are, as arrays, and what they look like.
+
+An object is shown by its own geometry as it is on the current frame, by its axes where it has none; a bone as an
+octahedron. No window and no graphics card is needed here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ...animation.baking.channel_maps import shown
+from ...animation.compute.sources import MODE_NUMBERS, Source
+from ...animation.transforms import Transform
+from ...motion.affine import AffineMaps
+from .parents import Parents
+
+MOST_GHOSTS = 120
+"""About the most ghosts of one path: where it has more, they are further apart."""
+
+MOST_EDGES = 4000
+"""What has more edges is shown without them: they would hide one another."""
+
+MOST_TRIANGLES = 200000
+"""What has more triangles is shown by its bounding box."""
+
+GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+"""Types of objects that have triangles."""
+
+RING = 0.1
+"""How far along a bone its octahedron is widest, and how wide it is there, of its length."""
+
+BOX = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+"""The edges of a bounding box, by Blender's order of its corners."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """What a ghost looks like, in its own space."""
+
+    lines: np.ndarray
+    """The ends of edges, one after the other, shape (2 e, 3)."""
+
+    triangles: np.ndarray
+    """The corners of triangles, one after the other, shape (3 t, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ghosts:
+    """Where something is every few frames, in the space of its path."""
+
+    frames: np.ndarray
+    """Shape (g,), rising."""
+
+    matrices: np.ndarray
+    """Shape (g, 4, 4), for columns of homogeneous coordinates."""
+
+
+def ghost_frames(first: int, last: int, step: int) -> np.ndarray:
+    """The multiples of a step from the first frame to the last."""
+    step = max(step, -(-(last - first) // MOST_GHOSTS))
+    return np.arange(-(-first // step), last // step + 1.0) * step
+
+
+def ghosts_of(
+    transform: Transform, source: Source, mode: str | None, step: int, turn: np.ndarray | None, parents: Parents | None
+) -> Ghosts:
+    """Where something is every few frames of a mode.
+
+    `turn` is what stands between the rotation of a bone and that space, where there are no `parents`. ValueError where
+    its numbers make no motion.
+    """
+    frames = ghost_frames(*source.seen_range, step)
+    if mode is not None:
+        source = replace(source, mode=MODE_NUMBERS[mode])
+    maps = shown(transform, source, frames)[1]
+    if parents is None:
+        maps = _in_space(transform, maps, turn)
+    else:
+        spaces, turns = parents.spaces(frames)
+        maps = spaces @ _in_space(transform, maps, turns)
+    matrices = np.tile(np.eye(4), (len(frames), 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = maps.axes, maps.origins
+    return Ghosts(frames, matrices)
+
+
+def _in_space(transform: Transform, maps: AffineMaps, turn: np.ndarray | None) -> AffineMaps:
+    origins = maps.origins
+    if transform.is_part and transform.carrier.bone.use_connect and transform.carrier.parent:
+        origins = np.zeros_like(origins)
+    return AffineMaps(maps.axes if turn is None else turn @ maps.axes, origins)
+
+
+def shape_of(transform: Transform, depsgraph: bpy.types.Depsgraph) -> Shape:
+    """What ghosts of something look like."""
+    if transform.is_part:
+        return octahedron(transform.carrier.bone.length)
+    obj = transform.carrier.evaluated_get(depsgraph)
+    shape = _geometry(obj) if obj.type in GEOMETRY else None
+    return shape or _plain(obj)
+
+
+def octahedron(length: float) -> Shape:
+    """A bone of a length along y, as Blender draws it."""
+    wide = RING * length
+    head, tail = np.zeros(3), np.array((0.0, length, 0.0))
+    ring = [np.array((x, wide, z)) for x, z in ((wide, wide), (-wide, wide), (-wide, -wide), (wide, -wide))]
+    edges, faces = [], []
+    for one, following in zip(ring, (*ring[1:], ring[0]), strict=True):
+        edges += [(head, one), (tail, one), (one, following)]
+        faces += [(head, one, following), (tail, following, one)]
+    return Shape(np.array(edges).reshape(-1, 3), np.array(faces).reshape(-1, 3))
+
+
+def _geometry(obj: bpy.types.Object) -> Shape | None:
+    """The triangles and edges of an evaluated object; None where there are none or too many."""
+    mesh = obj.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        count = len(mesh.loop_triangles)
+        if not 0 < count <= MOST_TRIANGLES:
+            return None
+        vertices = _read(mesh.vertices, "co", np.float32, 3)
+        corners = _read(mesh.loop_triangles, "vertices", np.int32, 3)
+        edges = _read(mesh.edges, "vertices", np.int32, 2) if len(mesh.edges) <= MOST_EDGES else corners[:0]
+        return Shape(vertices[edges.ravel()], vertices[corners.ravel()])
+    finally:
+        obj.to_mesh_clear()
+
+
+def _read(items: bpy.types.bpy_prop_collection, name: str, kind: type, width: int) -> np.ndarray:
+    found = np.empty(len(items) * width, kind)
+    items.foreach_get(name, found)
+    return found.reshape(-1, width)
+
+
+def _plain(obj: bpy.types.Object) -> Shape:
+    """The bounding box of an object, or a cross of its axes where it has no size."""
+    corners = np.array(obj.bound_box)
+    if np.ptp(corners) > 0.0:
+        return Shape(corners[np.ravel(BOX)], np.empty((0, 3)))
+    size = obj.empty_display_size if obj.type == "EMPTY" else 1.0
+    ends = size * np.concatenate((np.eye(3), -np.eye(3)))
+    return Shape(ends[[0, 3, 1, 4, 2, 5]], np.empty((0, 3)))

@@ -1,0 +1,213 @@
+"""Where parents carry what hangs on them, frame by frame: as their keys and modes have it, without playing the scene.
+
+That is known of parents that move by keys alone. Where a constraint, a driver, strips or a simulation has a part in it,
+the overlay takes parents as they are on the current frame. Frames are those of the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...animation.actions.slots import SlotTransform
+from ...animation.baking.channel_maps import shown
+from ...animation.baking.followers import MOVING, NotPromised, not_promised
+from ...animation.compute.sources import Source
+from ...animation.queries.keyed import active_places_of, sources_of
+from ...animation.transforms import WIDTHS, Transform, shows_differences, transform_of
+from ...animation.transforms.posing import Hierarchy
+from ...motion.affine import AffineMaps
+
+SAME = 1e-5
+"""Components of directions that differ by less are the same in single precision."""
+
+WHOLE_OBJECTS = ("OBJECT", "ARMATURE")
+"""Types of parents that carry an object by their own transform."""
+
+
+class Carried:
+    """What several targets hang on: read once, and worked out once for all that are looked at on the same frames."""
+
+    def __init__(self) -> None:
+        self._followers: dict[bpy.types.Object, NotPromised] = {}
+        self._hierarchies: dict[bpy.types.Object, tuple[Hierarchy, dict[str, int]]] = {}
+        self._read: dict[Transform, tuple[SlotTransform | None, Source | None]] = {}
+        self._channels: dict[tuple[Transform, bytes], AffineMaps] = {}
+        self._posed: dict[tuple[Transform, bytes], AffineMaps] = {}
+
+    def read(self, transforms: Iterable[Transform]) -> dict[Transform, tuple[SlotTransform | None, Source | None]]:
+        """The place that each moves by, and what is keyed there; None where there is none."""
+        transforms = list(transforms)
+        if missing := [one for one in transforms if one not in self._read]:
+            places = active_places_of(missing)
+            sources = dict(zip(places, sources_of(list(places.values())), strict=True))
+            self._read |= {one: (places.get(one), sources.get(one)) for one in missing}
+        return {one: self._read[one] for one in transforms}
+
+    def follows(self, bone: Transform) -> bool:
+        """Whether a bone follows constraints or drivers, or hangs on one that does."""
+        rig = bone.animated
+        if rig not in self._followers:
+            self._followers[rig] = not_promised(rig)
+        return bone.carrier.name in self._followers[rig]
+
+    def hierarchy(self, rig: bpy.types.Object) -> tuple[Hierarchy, dict[str, int]]:
+        """The bones of a rig, and their numbers by name."""
+        if rig not in self._hierarchies:
+            numbers = {bone.name: number for number, bone in enumerate(rig.pose.bones)}
+            self._hierarchies[rig] = Hierarchy(list(rig.pose.bones)), numbers
+        return self._hierarchies[rig]
+
+    def channels(self, transform: Transform, frames: np.ndarray) -> AffineMaps:
+        """What the channels of something say on frames (n,), with its mode."""
+        key = transform, frames.tobytes()
+        if key not in self._channels:
+            _, source = self._read[transform]
+            if source is None:
+                self._channels[key] = _identity(len(frames)) @ _maps(transform.carrier.matrix_basis)
+            else:
+                self._channels[key] = shown(transform, source, frames)[1]
+        return self._channels[key]
+
+    def posed(self, bone: bpy.types.PoseBone, frames: np.ndarray) -> AffineMaps:
+        """Where a bone is in the space of its rig on frames (n,)."""
+        transform = transform_of(bone)
+        key = transform, frames.tobytes()
+        if key not in self._posed:
+            hierarchy, numbers = self.hierarchy(bone.id_data)
+            above = None if bone.parent is None else self.posed(bone.parent, frames)
+            self._posed[key] = hierarchy.placed(numbers[bone.name], self.channels(transform, frames), above)
+        return self._posed[key]
+
+
+class Parents:
+    """What carries an object or a bone, read from keys.
+
+    Parameters
+    ----------
+    target : Transform
+    carried : Carried
+        That of all targets that are looked at together.
+    """
+
+    def __init__(self, target: Transform, carried: Carried) -> None:
+        self.target, self._carried = target, carried
+        self._read = carried.read(_above(target))
+        self.move_by_keys = any(source is not None for _, source in self._read.values()) and all(
+            _moves_by_keys(one, carried) and (source is not None or not _is_keyed(place))
+            for one, (place, source) in self._read.items()
+        )
+        """Whether they move, and by keys alone."""
+        self.ids = {one.animated.session_uid for one in self._read}
+        self.ids |= {place.slot.action.session_uid for place, _ in self._read.values() if place is not None}
+        """Session ids of the data-blocks that decide on it."""
+
+    @property
+    def digest(self) -> tuple:
+        """Differs wherever anything differs that decides where they carry the target."""
+        found: list[object] = [_hung(self.target)]
+        for one, (_, source) in self._read.items():
+            keyed = source.keyed if source is not None else ()
+            stands = [getattr(one.carrier, prop)[:] for name, prop in one.properties.items() if name not in keyed]
+            rest = None if source is None else (source.digest, tuple(source.rest.items()))
+            found.append((one.animated.session_uid, one.prefix, rest, tuple(stands), _hung(one)))
+        return tuple(found)
+
+    def spaces(self, frames: np.ndarray) -> tuple[AffineMaps, np.ndarray | None]:
+        """From the space of the target's location channels into the world.
+
+        Parameters
+        ----------
+        frames : array, shape (n,)
+
+        Returns
+        -------
+        maps : AffineMaps, shape (n,)
+        turned : array, shape (n, 3, 3), or None
+            What stands between the target's rotation and that space, see `space_of_bone`. None where nothing does.
+        """
+        if not self.target.is_part:
+            return self._carrying(self.target.carrier, frames), None
+        bone, stands = self.target.carrier, _identity(len(frames))
+        hierarchy, numbers = self._carried.hierarchy(self.target.animated)
+        number = numbers[bone.name]
+        above = None if bone.parent is None else self._carried.posed(bone.parent, frames)
+        placed, offset = hierarchy.placed(number, stands, above), hierarchy.offsets[number]
+        above = stands if above is None else above
+        along = above.axes @ offset.axes if bone.bone.use_local_location else above.axes
+        turned = np.linalg.inv(along) @ placed.axes
+        maps = self._world(self.target.animated, frames) @ AffineMaps(along, above.at(offset.origins))
+        return maps, None if np.abs(turned - np.eye(3)).max() < SAME else turned
+
+    def _world(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
+        return self._carrying(obj, frames) @ self._carried.channels(transform_of(obj), frames)
+
+    def _carrying(self, obj: bpy.types.Object, frames: np.ndarray) -> AffineMaps:
+        parent = obj.parent
+        if parent is None:
+            return _identity(len(frames))
+        carried = self._world(parent, frames)
+        if obj.parent_type == "BONE":
+            bone = parent.pose.bones[obj.parent_bone]
+            tail = _maps(Matrix.Translation((0.0, bone.bone.length, 0.0)))
+            carried = carried @ self._carried.posed(bone, frames) @ tail
+        return carried @ _maps(obj.matrix_parent_inverse)
+
+
+def _above(target: Transform) -> Iterator[Transform]:
+    """All that carries something: the bones that it hangs on, and the objects."""
+    obj = target.animated
+    if target.is_part:
+        yield from map(transform_of, target.carrier.parent_recursive)
+        yield transform_of(obj)
+    while (parent := obj.parent) is not None:
+        if obj.parent_type == "BONE" and (bone := parent.pose.bones.get(obj.parent_bone)) is not None:
+            yield from map(transform_of, (bone, *bone.parent_recursive))
+        yield transform_of(parent)
+        obj = parent
+
+
+def _moves_by_keys(transform: Transform, carried: Carried) -> bool:
+    """Whether nothing but keys of its Action has a part in where something is."""
+    obj = transform.animated
+    if transform.is_part:
+        return not carried.follows(transform)
+    data, body = obj.animation_data, obj.rigid_body
+    in_strips = data is not None and (data.use_tweak_mode or any(track.strips for track in data.nla_tracks))
+    driven = data is not None and any(driver.data_path.removeprefix("delta_") in MOVING for driver in data.drivers)
+    constrained = any(not one.mute and one.influence > 0.0 and not shows_differences(one) for one in obj.constraints)
+    return not (in_strips or driven or constrained or body is not None) and _hangs_on_a_whole(obj)
+
+
+def _hangs_on_a_whole(obj: bpy.types.Object) -> bool:
+    """Whether an object hangs on nothing, on an object or on a bone: on vertices it goes where these are deformed."""
+    if obj.parent is None or obj.parent_type in WHOLE_OBJECTS:
+        return True
+    bones = obj.parent.pose.bones if obj.parent_type == "BONE" and obj.parent.pose is not None else {}
+    return obj.parent_bone in bones and not bones[obj.parent_bone].bone.use_relative_parent
+
+
+def _is_keyed(place: SlotTransform | None) -> bool:
+    return place is not None and any(path.removeprefix(place.prefix) in WIDTHS for path, _ in place.curves)
+
+
+def _hung(transform: Transform) -> tuple:
+    """How something hangs on its parent."""
+    if not transform.is_part:
+        obj = transform.carrier
+        return obj.parent_type, obj.parent_bone, tuple(map(tuple, obj.matrix_parent_inverse))
+    bone = transform.carrier.bone
+    settings = bone.use_inherit_rotation, bone.inherit_scale, bone.use_local_location, bone.use_connect
+    return (*settings, bone.length, tuple(map(tuple, bone.matrix_local)))
+
+
+def _identity(count: int) -> AffineMaps:
+    return AffineMaps(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)))
+
+
+def _maps(matrix: Matrix) -> AffineMaps:
+    numbers = np.array(matrix, dtype=np.float64)
+    return AffineMaps(numbers[:3, :3], numbers[:3, 3])

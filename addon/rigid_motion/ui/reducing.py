@@ -1,0 +1,218 @@
+"""Reducing keys: *Reduce Keys to Poses*, *Restore Keys* and *Discard Dense Keys*, also of rigs in Object Mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import bpy
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_n as n_
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from .. import animation
+from ..animation import Refused
+from ..animation.baking.copies import REDUCED
+from ..animation.baking.sizes import first_tolerance
+from ..animation.properties import MODE_ITEMS, OWN_WORDS
+from ..animation.queries.polls import with_more_keys_than
+from ..animation.transforms import Transform
+from .on_targets import OnChanged, OnTargets
+from .rows import labelled
+from .targets import each_target, with_bones_of_rigs
+from .wording import counted_modes, reduced_to, reduction_rows, reduction_summary
+
+MOST_LISTED = 5
+"""Targets whose reductions are listed one by one."""
+
+
+class _OfRigsToo:
+    """Operators that act on all keyed bones of a rig where it is selected outside of Pose Mode: an import is."""
+
+    @classmethod
+    def each_target(cls, context: bpy.types.Context) -> Iterator[Transform]:
+        return with_bones_of_rigs(context, each_target(context))
+
+
+class RIGID_MOTION_OT_reduce_keys(_OfRigsToo, OnTargets, bpy.types.Operator):
+    bl_idname = "rigid_motion.reduce_keys"
+    bl_label = "Reduce Keys to Poses"
+    bl_description = (
+        "Leave only the keys that the motion needs, location and rotation together, in a copy of the Action: "
+        "for imported motion capture, baked simulations and solved cameras. Restore Keys gives all of them back"
+    )
+
+    nothing_to_do = n_(
+        "None of these objects has more than two keys. Constraints, drivers and simulations are turned into keys first "
+        "(Object > Animation > Bake Action, with Visual Keying)"
+    )
+
+    by: EnumProperty(
+        name="Reduce By",
+        description="What decides how many keys are left",
+        items=[
+            ("TOLERANCE", "Tolerance", "As few keys as keep the motion within the tolerance"),
+            ("NUMBER", "Number", "So many keys, or of a rig key poses, with the smallest error that is found"),
+        ],
+        translation_context=OWN_WORDS,
+    )
+    tolerance: FloatProperty(
+        name="Tolerance",
+        description=(
+            "How far off any point may be on any frame, within the radius around what is moved. Of bones that counts "
+            "where they get through all that they hang on. To begin with a millimetre, and of a rig 0.3 % of its size, "
+            "or 2 % for key poses"
+        ),
+        default=0.001,
+        min=1e-6,
+        soft_max=1.0,
+        step=0.1,
+        precision=4,
+        subtype="DISTANCE",
+    )
+    offered: FloatProperty(
+        description="The tolerance that was offered last, for as long as nobody sets another", options={"HIDDEN"}
+    )
+    count: IntProperty(
+        name="Number",
+        description="Keys left of each object, or key poses of each rig. Below is how far off the motion is then",
+        default=12,
+        min=2,
+        soft_max=100,
+    )
+    radius: FloatProperty(
+        name="Radius",
+        description=(
+            "How far out from the origin nothing may be off by more: the larger, the more a rotation counts. "
+            "At 0 each object has the size of its own bounding box, and each bone its length"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=10.0,
+        step=1.0,
+        precision=4,
+        subtype="DISTANCE",
+        options={"SKIP_SAVE"},
+    )
+    mode: EnumProperty(
+        name="Mode",
+        description="What fills in between the keys that are left, and which keys those are",
+        items=[item for item in MODE_ITEMS if item[0] != "BLENDER"],
+        default="motor_spline",
+    )
+    best_of: BoolProperty(
+        name="Best per Segment",
+        description=(
+            "Then key each segment with the mode that comes closest to the recording there, within the tolerance. "
+            "Where one mode meets another the path may turn a corner"
+        ),
+    )
+
+    shared: BoolProperty(
+        name="Key Poses",
+        description="Give all bones of a rig keys on the same frames. Otherwise each has its own: fewer keys in all",
+    )
+    hold: BoolProperty(
+        name="Hold Feet",
+        description="Keep bones that stand on the ground to a quarter of the tolerance while they do",
+        default=True,
+    )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        targets = list(self.each_target(context))
+        rigs = any(target.is_part for target in targets)
+        layout.row().prop(self, "by", expand=True)
+        if self.by == "NUMBER":
+            text = iface_("Key Poses") if rigs else iface_("Keys", OWN_WORDS)
+            layout.prop(self, "count", text=text, translate=False)
+        else:
+            layout.prop(self, "tolerance")
+        # So many key poses are shared as it is.
+        of_rigs = ("hold",) if self.by == "NUMBER" else ("shared", "hold")
+        for name in ("radius", "mode", "best_of", *(of_rigs if rigs else ())):
+            layout.prop(self, name)
+        if rigs:
+            self._draw_rigs(context.scene, targets)
+            return
+        for target in targets[:MOST_LISTED]:
+            if (reduction := animation.reduction_of(target)) is not None:
+                labelled(layout, target.name).label(text=reduced_to(context.scene, reduction), translate=False)
+                if self.best_of:
+                    column = layout.column(align=True)
+                    for line in counted_modes(reduction.segments):
+                        labelled(column).label(text=line, translate=False)
+
+    def _draw_rigs(self, scene: bpy.types.Scene, targets: list[Transform]) -> None:
+        reduction = animation.total_reduction(targets)
+        if reduction is None:
+            return
+        column = self.layout.column(align=True)
+        for label, text in reduction_rows(scene, reduction):
+            labelled(column, label).label(text=text, translate=False)
+
+    @classmethod
+    def with_work(cls, targets: Iterable[Transform]) -> Iterable[Transform]:
+        return with_more_keys_than(targets, 2)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        targets = list(self.each_target(context))
+        if not self.properties.is_property_set("tolerance") or self.tolerance == self.offered:
+            self.tolerance = self.offered = first_tolerance(context.scene, targets, shared=self.shared)
+        if not self.radius and len(targets) == 1:
+            self.radius = animation.radius_of(targets[0].carrier)
+        return self.act(targets, lambda refused: self._reduce(context.scene, targets, refused))
+
+    def _reduce(self, scene: bpy.types.Scene, targets: list[Transform], refused: list[Refused]) -> str:
+        before = [len(target.motion.bakes) for target in targets]
+        animation.reduce_keys_of(
+            targets,
+            self.mode,
+            self.tolerance,
+            self.radius or None,
+            best_of=self.best_of,
+            shared=self.shared,
+            hold=self.hold,
+            count=self.count if self.by == "NUMBER" else None,
+            refused=refused,
+        )
+        reduced = [target for target, count in zip(targets, before, strict=True) if len(target.motion.bakes) > count]
+        if not reduced:
+            return ""
+        if len(reduced) > MOST_LISTED or any(target.is_part for target in reduced):
+            return reduction_summary(scene, animation.total_reduction(reduced))
+        summaries = [reduction_summary(scene, animation.reduction_of(target)) for target in reduced]
+        if len(reduced) == len(targets) == 1:
+            return summaries[0]
+        return "; ".join(f"{target.name}: {summary}" for target, summary in zip(reduced, summaries, strict=True))
+
+
+class RIGID_MOTION_OT_restore_keys(_OfRigsToo, OnChanged, bpy.types.Operator):
+    bl_idname = "rigid_motion.restore_keys"
+    bl_label = "Restore Keys"
+    bl_description = "Give reduced objects all the keys back that they had before, to the last handle"
+    kind = REDUCED
+    nothing_to_do = n_("The keys of these objects are not reduced")
+    verb = staticmethod(animation.restore_keys)
+    summary = n_("back to the keys from before they were reduced")
+
+
+class RIGID_MOTION_OT_discard_dense_keys(_OfRigsToo, OnChanged, bpy.types.Operator):
+    bl_idname = "rigid_motion.discard_dense_keys"
+    bl_label = "Discard Dense Keys"
+    bl_description = (
+        "Remove the keys from the file that Restore Keys would give back, once the reduced ones are good. "
+        "The reduced keys stay as they are"
+    )
+    kind = REDUCED
+    nothing_to_do = n_("The keys of these objects are not reduced")
+    verb = staticmethod(animation.discard_dense_keys)
+    summary = n_("the keys from before they were reduced are removed from the file")
+
+
+CLASSES = (
+    RIGID_MOTION_OT_reduce_keys,
+    RIGID_MOTION_OT_restore_keys,
+    RIGID_MOTION_OT_discard_dense_keys,
+)
