@@ -53,6 +53,8 @@ def scenario(hand: Hand) -> Steps[None]:
     own = keys()
     assert len(set(own)) > 1, "each bone has keys of its own"
     assert np.linalg.norm(ends() - recorded, axis=-1).max() <= 0.003 * max(rig().dimensions)
+    # The last row of the panel is above the lower edge of the editor, as the workspace comes.
+    yield from hand.find_button(view, "UI", "show_paths", narrow=True)
     redo = places.region(view, "HUD")
     yield from hand.click(places.centre(redo))
     yield from hand.wait_until(lambda: redo.height > 100, "the redo panel unfolds")

@@ -106,7 +106,7 @@ def reduce_keys_of(
     ----------
     targets : bpy.types.Object or bpy.types.PoseBone, or several of them
     mode : str
-        What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is keyed with them.
+        What fills in between the keys, one of `rigid_motion.motion.KEYFRAME_MODES`. It is that of all segments.
     tolerance : float
         The largest shell error on any frame, in the scene's units. Of bones it is that in the rig's space, through all
         that they hang on, and holds for every bone that hangs on a target too.
