@@ -5,6 +5,7 @@ modes_in_use     which objects have to do with modes
 raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
 inserted_keys    a key inserted in between keeps the pose on the screen
+left_in_place    what nothing animates any more stays where it is seen
 dense_keys       keys inserted all along keep the motion
 separated_slots  what Separate Slots does to rigs
 edit_mode        rigs in Edit Mode

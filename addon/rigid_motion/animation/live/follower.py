@@ -25,6 +25,7 @@ from ..transforms import ObjectTransform, Refused, Transform, let_override_be_re
 from ..writers.table import release, writer_of
 from .depsgraphs import BlockKey, actions_to_evaluate, edited_actions, key_of, objects_of, objects_to_evaluate
 from .inserted_keys import InsertedKeys
+from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
 from .refreshing import refresh_places
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
@@ -78,6 +79,7 @@ class Follower:
         """The addresses of the dependency graphs that have been evaluated."""
         self.snapshots = Snapshots()
         self.inserted = InsertedKeys()
+        self.left = LeftInPlace()
         self.slot_names: SlotNames = {}
 
     def _handler(self, method: Callable) -> Callable:
@@ -117,7 +119,8 @@ class Follower:
             places = slot_transforms_of(transforms)
             moved = {user for place in places for user in place.users}
             unmoved = [transform for transform in transforms if transform not in moved]
-            release(unmoved)
+            with self.left.keep(unmoved):
+                release(unmoved)
             show_pending_modes(unmoved)
             forget_names(unmoved)
             count = self.refresh_places(places, again=again)
@@ -132,7 +135,8 @@ class Follower:
         *,
         again: bool = False,
     ) -> int:
-        return refresh_places(places, sources, self.inserted, self.frame, again=again)
+        with self.left.keep(places=places):
+            return refresh_places(places, sources, self.inserted, self.frame, again=again)
 
     def refresh_edited(self, actions: Collection[bpy.types.Action]) -> set[Transform]:
         """Refresh what these Actions, which were edited, move; and say what that is."""
@@ -189,6 +193,8 @@ class Follower:
             if not obj.is_editable:
                 continue
             choose_slots(obj)
+            if depsgraph is not None:
+                self.left.notice_assignments(obj, depsgraph)
             for place in filled_places_of(obj):
                 with self.turn() as is_first:
                     if is_first:
@@ -239,6 +245,7 @@ class Follower:
         self.followed, self.moved = set(), set()
         if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
             self.refresh_objects(depsgraph, seen)
+        self.left.forget_assignments()
 
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
         # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
@@ -253,6 +260,7 @@ class Follower:
             self.refresh(transforms_under(edited))
         self.waiting = []
         self.inserted.forget_poses()
+        self.left.forget_assignments()
         self.frame = scene.frame_current_final
 
     def after_undo(self, *_: object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from functools import cache
 from typing import ClassVar
 
@@ -164,6 +165,12 @@ class Transform(ABC):
         elif self.carrier.rotation_mode in ORDERS:
             found[3:6] = self.carrier.rotation_euler
         return found
+
+    def set_components(self, components: np.ndarray, parts: Collection[str]) -> None:
+        """Set its properties for these of location, rotation and scale to components (10,)."""
+        for part, prop in self.properties.items():
+            if part in parts:
+                setattr(self.carrier, prop, components[ROWS[part]][: WIDTHS[prop]])
 
     @property
     def differences(self) -> dict[int, Channel]:

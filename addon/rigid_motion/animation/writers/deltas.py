@@ -10,6 +10,7 @@ import numpy as np
 
 from ..actions.records import recorded_digest
 from ..actions.slots import SlotTransform, is_filled_in, is_replacing, slot_transforms_of
+from ..compute.components import PART_OF
 from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
 from .layout import Layout
@@ -57,6 +58,18 @@ class DeltaWriter(Writer):
             fcurve = filled.get(channel)
             difference[row] = user.animated.path_resolve(path)[index] if fcurve is None else fcurve.evaluate(frame)
         return difference
+
+    def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
+        noted = {row: channel for row, channel in user.differences.items() if user.is_noted([channel])}
+        if not noted:
+            return []
+        difference = np.zeros(10)
+        for row, (path, index) in user.differences.items():
+            difference[row] = getattr(user.carrier, path)[index]
+        return [(difference, {PART_OF[row] for row in noted})]
+
+    def hide(self, place: SlotTransform, user: Transform) -> None:
+        user.show_original()
 
     def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
         """While a strip plays whose Action lacks a channel that another strip's has, Blender puts it to its default:
