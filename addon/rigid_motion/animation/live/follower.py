@@ -23,7 +23,7 @@ from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from ..writers.table import release, writer_of
-from .depsgraphs import BlockKey, actions_to_evaluate, edited_actions, key_of, objects_of, objects_to_evaluate
+from .depsgraphs import BlockKey, actions_to_evaluate, add_actions, edited_actions, key_of, objects_of, objects_to_evaluate
 from .inserted_keys import InsertedKeys
 from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
@@ -77,6 +77,8 @@ class Follower:
         """The objects of which something was set before Blender evaluated them, by session id."""
         self.evaluated: set[int] = set()
         """The addresses of the dependency graphs that have been evaluated."""
+        self.added: set[tuple[int, int]] = set()
+        """See `add_actions`."""
         self.snapshots = Snapshots()
         self.inserted = InsertedKeys()
         self.left = LeftInPlace()
@@ -162,6 +164,8 @@ class Follower:
                     edited += transforms_under(filter(uses_modes, scene.objects))
                 self.ranges[scene.session_uid] = frames
             if isinstance(block, bpy.types.Object) and uses_modes(block):
+                if block.original.is_editable:
+                    add_actions(block.original, depsgraph, self.added)
                 for transform in self.edited_of(block.original):
                     if transform not in seen:
                         self.inserted.notice_pose(transform, self.frame)
