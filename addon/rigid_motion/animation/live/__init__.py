@@ -6,6 +6,7 @@ raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
 inserted_keys    a key inserted in between keeps the pose on the screen
 left_in_place    what nothing animates any more stays where it is seen
+seen_in_channels  the pose that is seen in the channels, for what of Blender reads these
 dense_keys       keys inserted all along keep the motion
 separated_slots  what Separate Slots does to rigs
 edit_mode        rigs in Edit Mode

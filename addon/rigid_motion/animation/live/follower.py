@@ -23,11 +23,20 @@ from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from ..writers.table import release, writer_of
-from .depsgraphs import BlockKey, actions_to_evaluate, add_actions, edited_actions, key_of, objects_of, objects_to_evaluate
+from .depsgraphs import (
+    BlockKey,
+    actions_to_evaluate,
+    add_actions,
+    edited_actions,
+    key_of,
+    objects_of,
+    objects_to_evaluate,
+)
 from .inserted_keys import InsertedKeys
 from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
 from .refreshing import refresh_places
+from .seen_in_channels import is_baking, show_in_channels
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
 from .snapshots import Snapshots
 
@@ -266,6 +275,10 @@ class Follower:
         self.inserted.forget_poses()
         self.left.forget_assignments()
         self.frame = scene.frame_current_final
+        if is_baking():
+            with self.turn() as is_first:
+                if is_first:
+                    show_in_channels(transforms_under(filter(uses_modes, scene.objects)))
 
     def after_undo(self, *_: object) -> None:
         self.snapshots.clear()
