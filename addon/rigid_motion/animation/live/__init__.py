@@ -4,6 +4,7 @@ depsgraphs       which data-blocks were edited, by Blender's dependency graphs
 modes_in_use     which objects have to do with modes
 raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
+operators        which operators have set properties, or a script
 inserted_keys    a key inserted in between keeps the pose on the screen
 left_in_place    what nothing animates any more stays where it is seen
 seen_in_channels  the pose that is seen in the channels, for what of Blender reads these

@@ -35,6 +35,7 @@ from .depsgraphs import (
 from .inserted_keys import InsertedKeys
 from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
+from .operators import OperatorWatch
 from .refreshing import refresh_places
 from .seen_in_channels import is_baking, show_in_channels
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
@@ -53,8 +54,7 @@ class Follower:
         """Whether edits are followed at once."""
         self.busy = False
         """Whether the edits that Blender tells of are the extension's."""
-        self.operator = (0, "")
-        """The operator that had ended last when edits were last seen."""
+        self.operators = OperatorWatch()
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
             "depsgraph_update_post": self._handler(self.after_update),
@@ -199,9 +199,7 @@ class Follower:
         """
         waiting = objects_to_evaluate(scene, self.evaluated)
         edited = {obj: depsgraph for obj, depsgraph in waiting if uses_modes(obj)}
-        operator = _last_operator()
-        name = operator[1] if operator != self.operator else ""
-        self.operator = operator
+        operators = self.operators.look()
         for obj, depsgraph in edited.items():
             if not obj.is_editable:
                 continue
@@ -215,7 +213,8 @@ class Follower:
                 if depsgraph is not None:
                     for transform in place.users:
                         with suppress(Refused):
-                            self.inserted.notice_assignment(transform, depsgraph, self.frame, operator=name)
+                            if self.inserted.notice_assignment(transform, depsgraph, self.frame, operators):
+                                writer_of(place).hide(place, transform)
         return list(edited)
 
     def look_through(self, *, again: bool = False) -> None:
@@ -299,13 +298,6 @@ class Follower:
         for obj in bpy.data.objects:
             if obj.rigid_motion.has_bones:
                 let_override_be_read(obj)
-
-
-def _last_operator() -> tuple[int, str]:
-    """The operator that has ended last, told from others of its kind, and its name."""
-    manager = bpy.context.window_manager
-    operators = manager.operators if manager is not None else ()
-    return (operators[-1].as_pointer(), operators[-1].bl_idname) if len(operators) else (0, "")
 
 
 follower = Follower()

@@ -13,8 +13,10 @@ which of the two its value is:
   *Align*, *Move*), or more than one of location, rotation and scale of an object have changed, then a pose was computed
   for the world, and Blender has taken the difference off: `matrix_world = M` sets all three of them. The key gets that
   pose. A single property (`location = v`, a value typed with Auto Key) is the value that somebody wanted, and stays as
-  it is; so does a pose that is set on a bone (`matrix = M`), which knows nothing of constraints.
-- A pose from elsewhere was put on a bone (*Paste Pose*, a pose asset): it is meant as it is, and so keyed later, too.
+  it is.
+- A whole pose was put on a bone (*Paste Pose*, a pose asset, *Apply Visual Transform to Pose*, `matrix = M`, and so
+  Rigify's switches): whoever did it knows nothing of constraints, and means it as it is. So it is shown, without the
+  difference, for as long as it is not keyed and the frame does not change; and so it is keyed, at once or later.
 
 Where a key gets a pose, so do all keyed channels of the transform.
 """
@@ -32,9 +34,10 @@ from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
-from ..queries.visible_pose import visible_components
+from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Channel, Transform
 from ..writers.table import writer_of
+from .operators import Operators
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -56,8 +59,8 @@ class _Posed:
     on_top: bool
     """Whether the pose is that with the difference on top."""
 
-    is_stored: bool = False
-    """Whether a pose from elsewhere was put on it, which is meant as it is, whatever the difference makes of it."""
+    is_whole: bool = False
+    """Whether a whole pose was put on it, which is meant as it is, and shown so."""
 
 
 class InsertedKeys:
@@ -71,31 +74,44 @@ class InsertedKeys:
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
-        components, before = transform.components(), self._posed.get(_identity(transform))
-        if before is not None and before.is_stored and np.array_equal(before.components, components):
-            return
-        self._posed[_identity(transform)] = _Posed(frame, components, True)
+        is_whole = self._is_shown_whole(transform)
+        self._posed[_identity(transform)] = _Posed(frame, transform.components(), not is_whole, is_whole)
+
+    def _is_shown_whole(self, transform: Transform) -> bool:
+        """Whether a whole pose was put on a transform, and it has been shown without the difference since."""
+        before = self._posed.get(_identity(transform))
+        if before is None or not before.is_whole:
+            return False
+        seen = shown_components(transform)
+        return seen is None or np.allclose(seen, transform.components(), rtol=TOLERANCE, atol=TOLERANCE)
 
     def posed_of(self, animated: bpy.types.ID) -> set[str]:
         """The prefixes of what was posed of a data-block, and has no key yet."""
         return {prefix for uid, prefix in self._posed if uid == animated.session_uid}
 
     def notice_assignment(
-        self, transform: Transform, depsgraph: bpy.types.Depsgraph, frame: float, *, operator: str = ""
-    ) -> None:
+        self, transform: Transform, depsgraph: bpy.types.Depsgraph, frame: float, operators: Operators
+    ) -> bool:
         """Keep what the properties of a transform were set to, where they have not been evaluated so yet.
 
-        `operator` is the name of the one that did it, if any did.
+        Returns
+        -------
+        bool
+            Whether they are to be shown without the difference.
         """
         carrier, evaluated = transform.carrier, transform.evaluated(depsgraph)
         changed = sum(
             evaluated is not None and tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
             for prop in ("location", transform.rotation, "scale")
         )
-        if changed:
-            on_top = operator.startswith(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
-            is_stored = operator.startswith(transform.stored_by)
-            self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_stored)
+        if not changed:
+            return False
+        is_whole = self._is_shown_whole(transform) or operators.are_any(transform.stored_by)
+        if not is_whole and not transform.matrix_lacks_difference and operators.is_script:
+            is_whole = changed > 1 or transform.is_as_seen(evaluated)
+        on_top = operators.are_any(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
+        self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top and not is_whole, is_whole)
+        return is_whole
 
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
         """Forget how these were posed, or all: their Actions have moved them again."""

@@ -74,7 +74,7 @@ class Transform(ABC):
     """How the names of operators begin that set its properties to bring what is on the screen to a certain place."""
 
     stored_by: ClassVar[tuple[str, ...]]
-    """How the names of operators begin that set its properties to a pose that was kept elsewhere."""
+    """How the names of operators begin that set its properties to a whole pose, whatever they had before."""
 
     matrix_lacks_difference: ClassVar[bool]
     """Whether Blender takes the difference off where the properties are set from a matrix."""
@@ -117,6 +117,10 @@ class Transform(ABC):
     @abstractmethod
     def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | bpy.types.PoseBone | None:
         """The carrier as it was evaluated last, None where it was not there yet."""
+
+    def is_as_seen(self, _evaluated: bpy.types.Object | bpy.types.PoseBone) -> bool:
+        """Whether its properties were set to what was seen when its carrier was evaluated, difference and all."""
+        return False
 
     @property
     def kind(self) -> type[Transform]:
