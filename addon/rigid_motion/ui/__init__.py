@@ -1,7 +1,8 @@
 """What an animator sees: operators, menus, panels, the overlay and the preferences. No mathematics.
 
 targets      the transforms and keys an editor means    operators    what can be done to them
-on_targets   what these operators have in common        keymap       the pies' shortcut
+on_targets   what these operators have in common        keymap       shortcuts
+pose_operators  Blender's operators, with the pose that is seen
 menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
@@ -13,9 +14,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import keymap, manual, menus, operators, overlay, panels, preferences, shown
+from . import keymap, manual, menus, operators, overlay, panels, pose_operators, preferences, shown
 
-CLASSES = (*preferences.CLASSES, *operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
+CLASSES = (*preferences.CLASSES, *operators.CLASSES, *pose_operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:

@@ -340,6 +340,12 @@ def follow_original(transform: ObjectTransform) -> None:
             follower.refresh_places(slot_transforms_of([transform]))
 
 
+def show_seen_in_channels(transforms: Iterable[Transform]) -> None:
+    """Give the properties of these the pose that is seen, until the frame changes: for what reads them."""
+    for transform in show_in_channels(transforms):
+        follower.inserted.notice_whole(transform, follower.frame)
+
+
 @contextmanager
 def paused() -> Iterator[None]:
     """Do several things, and refresh after them."""

@@ -77,6 +77,10 @@ class InsertedKeys:
         is_whole = self._is_shown_whole(transform)
         self._posed[_identity(transform)] = _Posed(frame, transform.components(), not is_whole, is_whole)
 
+    def notice_whole(self, transform: Transform, frame: float) -> None:
+        """Keep that the properties of a transform have all of its pose, with no difference on top."""
+        self._posed[_identity(transform)] = _Posed(frame, transform.components(), False, True)
+
     def _is_shown_whole(self, transform: Transform) -> bool:
         """Whether a whole pose was put on a transform, and it has been shown without the difference since."""
         before = self._posed.get(_identity(transform))

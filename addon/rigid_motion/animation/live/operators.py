@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 import bpy
 
-BLENDING = ("TRANSFORM_OT_", "POSE_OT_push", "POSE_OT_relax", "POSE_OT_breakdown", "POSE_OT_blend")
+BLENDING = (
+    "TRANSFORM_OT_",
+    *(f"POSE_OT_{name}" for name in ("push", "relax", "breakdown", "blend", "user_transforms_clear")),
+)
 """How the names of operators begin that go on from what properties have, also when they are adjusted afterwards."""
 
 
@@ -18,7 +21,7 @@ class Operators:
     """Of those that run, and of the one that has ended last if it did since edits were last seen."""
 
     is_script: bool = True
-    """Whether what is set is set as a script does it: none runs, nor is one adjusted that goes on from what there was."""
+    """Whether what is set is set as a script does it: none runs, nor is one adjusted that goes on from what was."""
 
     def are_any(self, beginnings: tuple[str, ...]) -> bool:
         """Whether the name of any begins so."""

@@ -20,8 +20,8 @@ from ..transforms import Refused, Transform
 from ..writers.table import shown_differences, writer_of
 
 
-def show_in_channels(transforms: Iterable[Transform]) -> None:
-    """Give the properties of these the pose that is seen, with no difference on top."""
+def show_in_channels(transforms: Iterable[Transform]) -> list[Transform]:
+    """Give the properties of these the pose that is seen, with no difference on top; and say which had one."""
     seen = {}
     for transform in transforms:
         with suppress(Refused):
@@ -34,6 +34,7 @@ def show_in_channels(transforms: Iterable[Transform]) -> None:
                 writer_of(place).hide(place, user)
     for transform, (components, parts) in seen.items():
         transform.set_components(components, parts)
+    return list(seen)
 
 
 def is_baking() -> bool:

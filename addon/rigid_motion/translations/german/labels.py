@@ -80,6 +80,8 @@ OF_OPERATORS = {
     "Discard Dense Keys": "Dichte Schlüsselbilder verwerfen",
     "Restore Constraint": "Beschränkung wiederherstellen",
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
+    "Copy Pose on Screen": "Sichtbare Pose kopieren",
+    "Create Pose Asset on Screen": "Posen-Asset der sichtbaren Pose erstellen",
     "Pie Menu": "Kreismenü",
     "Documentation": "Dokumentation",
     "Website": "Website",
