@@ -153,3 +153,14 @@ def test_a_pose_that_is_pasted_is_seen_as_it_was_copied(rig, live_file):
     insert_keys(rig)
     assert np.abs(placed(rig) - copied).max() < 2e-5
     assert len(curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points) == 5
+
+
+def test_where_one_property_of_a_whole_pose_is_keyed_so_is_the_rest(rig):
+    seen = placed(rig)
+    apply_visual_transform(rig)
+    placed(rig)
+    for bone in rig.pose.bones:
+        bone.keyframe_insert("location")
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    bone = rig.pose.bones["Body"]
+    assert len(curves_of(bone)[rotation_path(bone), 0].keyframe_points) == 5

@@ -16,7 +16,7 @@ which of the two its value is:
   it is.
 - A whole pose was put on a bone (*Paste Pose*, a pose asset, *Apply Visual Transform to Pose*, `matrix = M`, and so
   Rigify's switches): whoever did it knows nothing of constraints, and means it as it is. So it is shown, without the
-  difference, for as long as it is not keyed and the frame does not change; and so it is keyed, at once or later.
+  difference, until it is keyed or the frame changes; and so it is keyed, at once or later.
 
 Where a key gets a pose, so do all keyed channels of the transform.
 """
@@ -35,7 +35,7 @@ from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
 from ..queries.visible_pose import shown_components, visible_components
-from ..transforms import Channel, Transform
+from ..transforms import Transform
 from ..writers.table import writer_of
 from .operators import Operators
 
@@ -62,15 +62,18 @@ class _Posed:
     is_whole: bool = False
     """Whether a whole pose was put on it, which is meant as it is, and shown so."""
 
+    is_shown: bool = True
+    """Whether it has been evaluated so."""
+
 
 class InsertedKeys:
     """How transforms of a file were posed, for the keys that may be inserted of it."""
 
     def __init__(self) -> None:
         self._posed: dict[tuple[int, str], _Posed] = {}
-        self._inserted: OrderedDict[tuple[str, str], np.ndarray] = OrderedDict()
-        """What undo and redo bring back is decided as it was: the components on the screen, by the digests before and
-        after."""
+        self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool]] = OrderedDict()
+        """What undo and redo bring back is decided as it was: the components that there were, and whether they were
+        all of the pose, by the digests before and after."""
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
@@ -114,7 +117,8 @@ class InsertedKeys:
         if not is_whole and not transform.matrix_lacks_difference and operators.is_script:
             is_whole = changed > 1 or transform.is_as_seen(evaluated)
         on_top = operators.are_any(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
-        self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top and not is_whole, is_whole)
+        on_top = on_top and not is_whole
+        self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_whole, is_shown=False)
         return is_whole
 
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
@@ -169,15 +173,18 @@ class InsertedKeys:
         if not _is_inserted(old, source, frame):
             return False
         change = old.digest, source.digest
-        shown = self._inserted.get(change) if again else None
-        if shown is None:
+        decided = self._inserted.get(change) if again else None
+        if decided is None:
             shown = old.values_at(np.array([frame]))[:, 0] if posed is None else posed.components
-            if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
+            if not _has_values(source, frame, shown) or (posed is not None and not (posed.on_top or posed.is_shown)):
                 return False
-            self._inserted[change] = shown
+            decided = self._inserted[change] = shown, posed is not None and posed.is_whole
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
-        for channel, value in _visible_values(user, place, old, shown, frame).items():
+        shown, is_whole = decided
+        if not is_whole:
+            shown = _seen_components(user, place, old, shown, frame)
+        for channel, value in ((channel, shown[row]) for row, channel in user.channels.items()):
             if (fcurve := place.curves.get(channel)) is not None:
                 _set_key(fcurve, frame, value)
         return True
@@ -210,14 +217,11 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
     return True
 
 
-def _visible_values(
-    user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
-) -> dict[Channel, float]:
-    """The values of the channels that, with the original difference alone, look as the screen does."""
+def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float) -> np.ndarray:
+    """The components that, with the original difference alone, look as the screen does."""
     filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
-    seen = visible_components(shown, old.original, difference, old.order, parts)
-    return {channel: seen[row] for row, channel in user.channels.items()}
+    return visible_components(shown, old.original, difference, old.order, parts)
 
 
 def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
