@@ -164,3 +164,21 @@ def test_where_one_property_of_a_whole_pose_is_keyed_so_is_the_rest(rig):
     assert np.abs(placed(rig) - seen).max() < 2e-5
     bone = rig.pose.bones["Body"]
     assert len(curves_of(bone)[rotation_path(bone), 0].keyframe_points) == 5
+
+
+def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file):
+    live_file.scene.frame_set(24)
+    copied = placed(rig)
+    as_an_animator(bpy.ops.pose.copy)
+    live_file.scene.frame_set(BETWEEN)
+    bpy.ops.ed.undo_push(message="Begin")
+    as_an_animator(bpy.ops.pose.paste)
+    assert np.abs(placed(rig) - copied).max() < 2e-5
+    as_an_animator(bpy.ops.pose.transforms_clear)
+    assert np.abs(placed(rig) - np.array([bone.bone.matrix_local for bone in rig.pose.bones])).max() < 1e-6
+    with bpy.context.temp_override(mode="OBJECT"):
+        assert bpy.ops.ed.undo() == {"FINISHED"}
+    rig = bpy.data.objects["Rig"]
+    assert np.abs(placed(rig) - copied).max() < 2e-5
+    insert_keys(rig)
+    assert np.abs(placed(rig) - copied).max() < 2e-5

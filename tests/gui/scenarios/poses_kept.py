@@ -72,6 +72,9 @@ def _copy(hand: Hand) -> Steps[None]:
     yield from _go(BETWEEN)
     yield from hand.press("V", ctrl=True)
     _assert_seen(seen)
+    yield from hand.press("G", alt=True)
+    yield from hand.press("Z", ctrl=True)
+    _assert_seen(seen)
     yield from hand.press("Z", ctrl=True)
 
 
