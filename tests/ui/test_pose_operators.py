@@ -122,3 +122,22 @@ def test_on_a_key_and_without_a_mode_blender_s_own_operator_acts(rig, extension,
     assert operator.poll()
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not operator.poll()
+
+
+@pytest.mark.parametrize("then", ["the frame changes", "it is keyed"])
+def test_a_channel_without_keys_has_its_value_back(rig, extension, then):
+    bone = rig.pose.bones["Hand.L"]
+    channelbag = rig.animation_data.action.layers[0].strips[0].channelbag(rig.animation_data.action_slot)
+    channelbag.fcurves.remove(channelbag.fcurves.find('pose.bones["Hand.L"].location', index=1))
+    bone.location.y = 0.25
+    extension.scene.frame_set(BETWEEN + 1)
+    extension.scene.frame_set(BETWEEN)
+    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
+    assert abs(bone.location.y - 0.25) > 1e-3
+    extension.view_layer.update()
+    if then == "it is keyed":
+        bone.keyframe_insert("location", index=0)
+        extension.view_layer.update()
+    else:
+        extension.scene.frame_set(OTHER)
+    assert bone.location.y == 0.25

@@ -37,7 +37,7 @@ from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
 from .operators import OperatorWatch
 from .refreshing import refresh_places
-from .seen_in_channels import is_baking, show_in_channels
+from .seen_in_channels import SeenInChannels, is_baking
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
 from .snapshots import Snapshots
 
@@ -91,6 +91,7 @@ class Follower:
         self.snapshots = Snapshots()
         self.inserted = InsertedKeys()
         self.left = LeftInPlace()
+        self.channels = SeenInChannels()
         self.slot_names: SlotNames = {}
 
     def _handler(self, method: Callable) -> Callable:
@@ -243,6 +244,7 @@ class Follower:
         self.followed = {action.session_uid for action in edited}
         self.moved = self.refresh_edited(edited)
         self.inserted.forget_poses(self.moved)
+        self.channels.put_back(edited)
 
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.frame = scene.frame_current_final
@@ -260,6 +262,7 @@ class Follower:
         self.left.forget_assignments()
 
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
+        self.channels.put_back()
         # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
         self.waiting = [key_of(obj) for obj in self.before_evaluation(scene)]
         self.refresh_edited(actions_to_evaluate(scene))
@@ -277,11 +280,18 @@ class Follower:
         if is_baking():
             with self.turn() as is_first:
                 if is_first:
-                    show_in_channels(transforms_under(filter(uses_modes, scene.objects)))
+                    self.channels.show(transforms_under(filter(uses_modes, scene.objects)))
 
     def after_undo(self, *_: object) -> None:
         self.snapshots.clear()
+        self.inserted.forget_poses()
+        self.channels.forget()
         self.look_again(again=True)
+        for obj in filter(uses_modes, bpy.data.objects):
+            for place in filled_places_of(obj) if obj.is_editable else ():
+                for transform in place.users:
+                    if self.inserted.is_whole_again(transform, self.frame):
+                        writer_of(place).hide(place, transform)
 
     def after_load(self, *_: object) -> None:
         source_cache.clear()
@@ -342,7 +352,7 @@ def follow_original(transform: ObjectTransform) -> None:
 
 def show_seen_in_channels(transforms: Iterable[Transform]) -> None:
     """Give the properties of these the pose that is seen, until the frame changes: for what reads them."""
-    for transform in show_in_channels(transforms):
+    for transform in follower.channels.show(transforms):
         follower.inserted.notice_whole(transform, follower.frame)
 
 

@@ -42,6 +42,9 @@ from .operators import Operators
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
 
+MOST_WHOLE = 4096
+"""Poses of single transforms that undo and redo can bring back as they were seen."""
+
 TOLERANCE = 1e-5
 """Differences of single precision, relative to the value or absolute below 1."""
 
@@ -71,18 +74,37 @@ class InsertedKeys:
 
     def __init__(self) -> None:
         self._posed: dict[tuple[int, str], _Posed] = {}
+        self._whole: OrderedDict[tuple[tuple[int, str], bytes], _Posed] = OrderedDict()
+        """The whole poses that undo and redo can bring back, by the transform and the components."""
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool]] = OrderedDict()
         """What undo and redo bring back is decided as it was: the components that there were, and whether they were
         all of the pose, by the digests before and after."""
 
+    def _keep(self, transform: Transform, posed: _Posed) -> None:
+        identity = _identity(transform)
+        self._posed[identity] = posed
+        if posed.is_whole:
+            self._whole[identity, posed.components.tobytes()] = posed
+            self._whole.move_to_end((identity, posed.components.tobytes()))
+            if len(self._whole) > MOST_WHOLE:
+                self._whole.popitem(last=False)
+
+    def is_whole_again(self, transform: Transform, frame: float) -> bool:
+        """Whether undo or redo brought a whole pose back that was put on a transform on this frame."""
+        posed = self._whole.get((_identity(transform), transform.components().tobytes()))
+        if posed is None or posed.frame != frame:
+            return False
+        self._posed[_identity(transform)] = posed
+        return True
+
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
         is_whole = self._is_shown_whole(transform)
-        self._posed[_identity(transform)] = _Posed(frame, transform.components(), not is_whole, is_whole)
+        self._keep(transform, _Posed(frame, transform.components(), not is_whole, is_whole))
 
     def notice_whole(self, transform: Transform, frame: float) -> None:
         """Keep that the properties of a transform have all of its pose, with no difference on top."""
-        self._posed[_identity(transform)] = _Posed(frame, transform.components(), False, True)
+        self._keep(transform, _Posed(frame, transform.components(), False, True))
 
     def _is_shown_whole(self, transform: Transform) -> bool:
         """Whether a whole pose was put on a transform, and it has been shown without the difference since."""
@@ -118,7 +140,7 @@ class InsertedKeys:
             is_whole = changed > 1 or transform.is_as_seen(evaluated)
         on_top = operators.are_any(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
         on_top = on_top and not is_whole
-        self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_whole, is_shown=False)
+        self._keep(transform, _Posed(frame, transform.components(), on_top, is_whole, is_shown=False))
         return is_whole
 
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
