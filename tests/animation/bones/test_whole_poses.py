@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 
 import bpy
@@ -12,6 +13,7 @@ from mathutils import Matrix
 from rigid_motion.animation import key_frames, set_mode
 from tests.animation.bones.rigs import key_all, key_bone, new_rig, select_only
 from tests.animation.oracle import curves_of, rotation_path
+from tests.animation.scenes import enabled
 
 BETWEEN = 15
 ORDERS = ("QUATERNION", "XYZ")
@@ -130,16 +132,25 @@ def test_a_single_property_is_moved_on_from_what_is_seen(rig):
     assert 0.001 < np.abs(moved).max() < 0.011
 
 
-def test_rigify_s_way_to_keep_a_transform_does(rig):
-    """As its *Switch Parent* does: the matrix is set in the space of the parent, channel by channel."""
-    seen, hand = placed(rig), rig.pose.bones["Hand"]
-    matrix = hand.matrix.copy()
-    hand.parent.constraints.new("LIMIT_ROTATION").use_limit_x = True
-    bpy.context.view_layer.update()
-    local = rig.convert_space(pose_bone=hand, matrix=matrix, from_space="POSE", to_space="LOCAL")
-    hand.matrix_basis = local
+@pytest.mark.parametrize("keyed", ["at once", "later"])
+def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig, live_file, keyed):
+    """What its *Switch Parent* does: matrices as they are, the switch, and each matrix set again."""
+    with enabled("rigify"):
+        tools = importlib.import_module("rigify.utils.animation")
+        seen, hand = placed(rig), rig.pose.bones["Hand"]
+        matrix = tools.get_transform_matrix(rig, "Hand")
+        # The switch: what the hand hangs on is elsewhere from now on.
+        switch = hand.parent.constraints.new("COPY_ROTATION")
+        switch.target, switch.subtarget = rig, "Body"
+        switch.owner_space = switch.target_space = "POSE"
+        assert np.abs(placed(rig)[3] - seen[3]).max() > 0.1
+        flags = set() if keyed == "at once" else None
+        tools.set_transform_from_matrix(rig, "Hand", matrix, keyflags=flags)
     assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
     insert_keys(rig)
+    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
+    live_file.scene.frame_set(BETWEEN + 1)
+    live_file.scene.frame_set(BETWEEN)
     assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
 
 
