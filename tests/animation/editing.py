@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from rigid_motion import animation
-from tests.animation.edit_steps import Complaints, Edit
+from tests.animation.edit_steps import LAST, Complaints, Edit, frames_in, shares
 from tests.animation.oracle import (
     MODE_IDS,
     WIDTHS,
@@ -33,17 +33,14 @@ from tests.blank import blank
 Name = Hashable
 """What the carriers of keys are told apart by, in a machine."""
 
-LAST = 40
 ORDERS = ("QUATERNION", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 INTERPOLATIONS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items]
 EASINGS = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["easing"].enum_items]
 HANDLES = [item.identifier for item in bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items]
 
 seeds = st.integers(0, 2**16)
-frames_in = st.integers(-4, 4 * (LAST + 5)).map(lambda quarter: quarter / 4)
 SAME_FRAME = 0.005
 
-shares = st.floats(0.0, 1.0, exclude_max=True)
 periods = st.just(0.0) | st.floats(0.1, 10.0)
 """Of ELASTIC, in frames. Of many thousand swings in a segment, single precision makes noise, also in Blender itself."""
 

@@ -50,10 +50,30 @@ def test_the_shortcut_is_free(name):
 
 def test_the_shortcut_is_in_both_modes_of_the_viewport_and_in_both_key_editors(extension):
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
-    for name, space, menu in keymap.PLACES:
-        items = keymaps.find(name, space_type=space).keymap_items
-        ours = [item for item in items if item.idname == keymap.OPERATOR and item.properties.name == menu]
-        assert [(item.type, bool(item.alt), bool(item.ctrl), bool(item.shift)) for item in ours] == [
+    pies = [shortcut for shortcut in keymap.SHORTCUTS if shortcut.menu]
+    assert len(pies) == 4
+    for shortcut in pies:
+        items = keymaps.find(shortcut.keymap, space_type=shortcut.space).keymap_items
+        found = [item for item in items if item.idname == keymap.PIE and item.properties.name == shortcut.menu]
+        assert [(item.type, bool(item.alt), bool(item.ctrl), bool(item.shift)) for item in found] == [
             ("T", True, False, False)
         ]
-        assert hasattr(bpy.types, menu)
+        assert hasattr(bpy.types, shortcut.menu)
+
+
+@pytest.mark.parametrize("name", ["blender_default", "industry_compatible_data"])
+def test_a_pose_is_copied_by_the_key_that_blender_has_for_it(extension, name):
+    path = Path(bpy.utils.system_resource("SCRIPTS")) / "presets/keyconfig/keymap_data" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    (of_blender,) = [
+        event
+        for keymap_name, _, content in module.generate_keymaps(module.Params())
+        for operator, event, _ in content["items"]
+        if keymap_name == "Pose" and operator == "pose.copy"
+    ]
+    items = bpy.context.window_manager.keyconfigs.addon.keymaps.find("Pose", space_type="EMPTY").keymap_items
+    (item,) = [item for item in items if item.idname == "rigid_motion.copy_pose"]
+    assert of_blender == {"type": item.type, "value": item.value, keymap.COMMAND: True}
+    assert bool(getattr(item, keymap.COMMAND))

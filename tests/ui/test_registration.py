@@ -12,7 +12,8 @@ from rigid_motion.ui import keymap, menus
 def footprint():
     """Whatever of Blender the extension adds to: classes, properties, menus, keymaps, handlers."""
     keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
-    found = [keymaps.find(name, space_type=space) for name, space, _ in keymap.PLACES]
+    places = dict.fromkeys((shortcut.keymap, shortcut.space) for shortcut in keymap.SHORTCUTS)
+    found = [keymaps.find(name, space_type=space) for name, space in places]
     lists = (getattr(bpy.app.handlers, name) for name in dir(bpy.app.handlers) if not name.startswith("_"))
     return {
         "classes": {name for name in dir(bpy.types) if "rigid_motion" in name.lower() or "RigidMotion" in name},
@@ -20,7 +21,7 @@ def footprint():
         "of scenes": hasattr(bpy.types.Scene, "rigid_motion_overlay"),
         "operators": dir(bpy.ops.rigid_motion),
         "menus": [len(getattr(bpy.types, menu)._dyn_ui_initialize()) for menu in menus.ENTRIES],
-        "keymaps": [len(one.keymap_items) if one else 0 for one in found],
+        "keymaps": sum(len(one.keymap_items) if one else 0 for one in found),
         "handlers": [list(one) for one in lists if isinstance(one, list)],
     }
 
@@ -31,7 +32,7 @@ def test_switched_off_it_leaves_nothing_behind_however_often(empty_file):
         rigid_motion.register()
         on = footprint()
         assert on["operators"]
-        assert on["keymaps"] == [count + 1 for count in before["keymaps"]]
+        assert on["keymaps"] == before["keymaps"] + len(keymap.SHORTCUTS)
         assert on["menus"] == [count + 1 for count in before["menus"]]
         assert on["handlers"] != before["handlers"]
         rigid_motion.unregister()

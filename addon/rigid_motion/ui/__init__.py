@@ -2,7 +2,8 @@
 
 targets      the transforms and keys an editor means    operators    what can be done to them
 on_targets   what these operators have in common        reducing     fewer keys, and all of them again
-keymap       the pies' shortcut
+keymap       shortcuts
+pose_operators  Blender's operators, with the pose that is seen
 menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
@@ -17,13 +18,27 @@ from __future__ import annotations
 
 import bpy
 
-from . import breakdown, keymap, manual, menus, operators, overlay, panels, preferences, reducing, shown, turn_operator
+from . import (
+    breakdown,
+    keymap,
+    manual,
+    menus,
+    operators,
+    overlay,
+    panels,
+    pose_operators,
+    preferences,
+    reducing,
+    shown,
+    turn_operator,
+)
 
 CLASSES = (
     *preferences.CLASSES,
     *operators.CLASSES,
     *turn_operator.CLASSES,
     *breakdown.CLASSES,
+    *pose_operators.CLASSES,
     *reducing.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,

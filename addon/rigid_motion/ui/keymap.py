@@ -1,22 +1,42 @@
-"""The shortcut of the pie menus: Alt T, beside T, by which Blender chooses the interpolation of keys."""
+"""Shortcuts: Alt T for the pie menus, beside T, by which Blender chooses the interpolation of keys; and Ctrl C in Pose
+Mode, which is Blender's own again where its poll fails."""
 
 from __future__ import annotations
+
+import sys
+from typing import NamedTuple
 
 import bpy
 import rna_keymap_ui
 from bpy.app.translations import contexts
 
 from .menus import RIGID_MOTION_MT_pie_keys, RIGID_MOTION_MT_pie_object, RIGID_MOTION_MT_pie_pose
+from .pose_operators import RIGID_MOTION_OT_copy_pose
 
-OPERATOR = "wm.call_menu_pie"
+PIE = "wm.call_menu_pie"
+COMMAND = "oskey" if sys.platform == "darwin" else "ctrl"
+"""The modifier that Blender has for copying."""
 
-PLACES = (
-    ("Object Mode", "EMPTY", RIGID_MOTION_MT_pie_object.__name__),
-    ("Pose", "EMPTY", RIGID_MOTION_MT_pie_pose.__name__),
-    ("Dopesheet", "DOPESHEET_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
-    ("Graph Editor", "GRAPH_EDITOR", RIGID_MOTION_MT_pie_keys.__name__),
+
+class Shortcut(NamedTuple):
+    keymap: str
+    space: str
+    """Of the keymap."""
+
+    operator: str
+    key: str
+    modifier: str
+    menu: str = ""
+    """What the operator calls."""
+
+
+SHORTCUTS = (
+    Shortcut("Object Mode", "EMPTY", PIE, "T", "alt", RIGID_MOTION_MT_pie_object.__name__),
+    Shortcut("Pose", "EMPTY", PIE, "T", "alt", RIGID_MOTION_MT_pie_pose.__name__),
+    Shortcut("Dopesheet", "DOPESHEET_EDITOR", PIE, "T", "alt", RIGID_MOTION_MT_pie_keys.__name__),
+    Shortcut("Graph Editor", "GRAPH_EDITOR", PIE, "T", "alt", RIGID_MOTION_MT_pie_keys.__name__),
+    Shortcut("Pose", "EMPTY", RIGID_MOTION_OT_copy_pose.bl_idname, "C", COMMAND),
 )
-"""Keymap, its space, and the pie menu that is called there."""
 
 _items: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
@@ -25,10 +45,11 @@ def register() -> None:
     configuration = bpy.context.window_manager.keyconfigs.addon
     if configuration is None:
         return
-    for name, space, menu in PLACES:
-        keymap = configuration.keymaps.new(name=name, space_type=space)
-        item = keymap.keymap_items.new(OPERATOR, "T", "PRESS", alt=True)
-        item.properties.name = menu
+    for shortcut in SHORTCUTS:
+        keymap = configuration.keymaps.new(name=shortcut.keymap, space_type=shortcut.space)
+        item = keymap.keymap_items.new(shortcut.operator, shortcut.key, "PRESS", **{shortcut.modifier: True})
+        if shortcut.menu:
+            item.properties.name = shortcut.menu
         _items.append((keymap, item))
 
 
@@ -41,11 +62,11 @@ def unregister() -> None:
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     """The shortcuts as the user has them, to be changed."""
     configuration = context.window_manager.keyconfigs.user
-    for name, space, menu in PLACES:
-        keymap = configuration.keymaps.find(name, space_type=space)
+    for shortcut in SHORTCUTS:
+        keymap = configuration.keymaps.find(shortcut.keymap, space_type=shortcut.space)
         for item in keymap.keymap_items if keymap else ():
-            if item.idname == OPERATOR and item.properties.name == menu:
+            if item.idname == shortcut.operator and (not shortcut.menu or item.properties.name == shortcut.menu):
                 row = layout.column()
                 row.context_pointer_set("keymap", keymap)
-                row.label(text=name, text_ctxt=contexts.id_windowmanager)
+                row.label(text=shortcut.keymap, text_ctxt=contexts.id_windowmanager)
                 rna_keymap_ui.draw_kmi([], configuration, keymap, item, row, 0)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS, SHORT_LABELS
 
@@ -184,6 +185,17 @@ def _draw_in_betweens(self: bpy.types.Menu, _context: bpy.types.Context) -> None
     _draw_breakdowns(self.layout)
 
 
+def _draw_copy(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    self.layout.separator()
+    self.layout.operator(RIGID_MOTION_OT_copy_pose.bl_idname, icon="COPYDOWN")
+    self.layout.operator(RIGID_MOTION_OT_create_pose_asset.bl_idname)
+
+
+def _draw_copy_and_view(self: bpy.types.Menu, context: bpy.types.Context) -> None:
+    _draw_copy(self, context)
+    _draw_in_view(self, context)
+
+
 ENTRIES = {
     "DOPESHEET_MT_key": _draw_keys,
     "DOPESHEET_MT_context_menu": _draw_keys,
@@ -191,7 +203,8 @@ ENTRIES = {
     "GRAPH_MT_context_menu": _draw_keys,
     "VIEW3D_MT_object_animation": _draw_in_view,
     "VIEW3D_MT_object_context_menu": _draw_in_view,
-    "VIEW3D_MT_pose_context_menu": _draw_in_view,
+    "VIEW3D_MT_pose": _draw_copy,
+    "VIEW3D_MT_pose_context_menu": _draw_copy_and_view,
     "VIEW3D_MT_pose_slide": _draw_in_betweens,
 }
 """Blender's menus, and what is appended to each. That of Object > Animation is the one of Pose > Animation too."""

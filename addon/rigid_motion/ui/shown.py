@@ -12,7 +12,7 @@ import bpy
 from bpy.props import FloatVectorProperty, PointerProperty
 
 from ..animation.compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
-from ..animation.queries.segments import shown_components
+from ..animation.queries.visible_pose import shown_components
 from ..animation.transforms import Refused
 from .targets import active_target
 

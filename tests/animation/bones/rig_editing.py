@@ -12,6 +12,7 @@ from hypothesis.stateful import invariant, precondition
 from rigid_motion import animation
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rigs import CONSTRAINT, Rest
+from tests.animation.edit_steps import TakenAway
 from tests.animation.editing import Editing, goes_on
 from tests.animation.oracle import (
     WIDTHS,
@@ -94,7 +95,7 @@ class Motion(NamedTuple):
     """
 
 
-class RigEditing(Editing):
+class RigEditing(TakenAway, Editing):
     """An animator at work on the bones of rigs: what every edit is checked by."""
 
     KEPT: ClassVar = (*Editing.KEPT, "taken_off")
@@ -107,6 +108,14 @@ class RigEditing(Editing):
     def _found(self, name: Name) -> bpy.types.PoseBone:
         rig, bone = name
         return bpy.data.objects[rig].pose.bones[bone]
+
+    def _animated(self, name: Name) -> bpy.types.Object:
+        return bpy.data.objects[name[0]]
+
+    def _is_exact(self, name: Name) -> bool:
+        frames = np.array([bpy.context.scene.frame_current_final])
+        chain = (self._found(name), *self._found(name).parent_recursive)
+        return all(self._motion(bone, frames).precision[0] > 0.2 for bone in chain)
 
     def _basis(self, bone: bpy.types.PoseBone) -> np.ndarray:
         evaluated = bone.id_data.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[bone.name]

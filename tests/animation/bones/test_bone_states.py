@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable
 from contextlib import suppress
 
 import bpy
@@ -11,6 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import initialize, precondition, rule
 
 from rigid_motion import animation
+from rigid_motion.animation.live.follower import show_seen_in_channels
+from rigid_motion.animation.transforms import transform_of
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rig_editing import (
     BONES,
@@ -21,7 +25,7 @@ from tests.animation.bones.rig_editing import (
     has_live_segments,
     own_constraints,
 )
-from tests.animation.bones.rigs import new_rig, with_edit_bones, write_bone
+from tests.animation.bones.rigs import new_rig, select_only, with_edit_bones, write_bone
 from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, mode_channel, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
@@ -142,6 +146,48 @@ class EditingBones(RigEditing):
         finally:
             animation.set_enabled(True)
         self._edit(lambda: animation.refresh() and None)
+
+    @precondition(lambda self: self.on)
+    @rule(who=shares, to=frames_in, keyed=st.booleans())
+    def copy_a_pose_and_paste_it(self, who, to, keyed):
+        name = self._named(who)
+        rig, frame = bpy.data.objects[name[0]], round(to + self.shift)
+        if self._sharing(name) != {name} or not self._is_exact(name):
+            return
+        bone = self._found(name)
+        bpy.context.view_layer.update()
+        seen = {name: self._basis(bone)}
+        show_seen_in_channels([transform_of(bone)])
+        self._assert_seen(rig, seen)
+        copied = [getattr(bone, path).copy() for path in transform_paths(bone)]
+        self._in_pose_mode(name, bpy.ops.pose.copy)
+        bpy.context.scene.frame_set(frame)
+        bone = self._found(name)
+        # With undo Blender would tell that it is the operator; a script is known by setting several properties.
+        if sum(map(operator.ne, copied, [getattr(bone, path) for path in transform_paths(bone)])) < 2:
+            return
+        self._in_pose_mode(name, bpy.ops.pose.paste)
+        self._assert_seen(rig, seen)
+        settable = self._has_keys_for_any_pose(bone) and not any(one.mute for one in own_constraints(bone))
+
+        def insert() -> None:
+            for path in transform_paths(bone):
+                self._found(name).keyframe_insert(path, frame=frame)
+
+        if keyed and name not in self.before_bake:
+            self._edit(insert)
+            if settable:
+                self._assert_seen(rig, seen)
+
+    def _in_pose_mode(self, name: Name, act: Callable[[], set[str]]) -> None:
+        rig = bpy.data.objects[name[0]]
+        select_only(rig)
+        bpy.ops.object.mode_set(mode="POSE")
+        for bone in rig.pose.bones:
+            (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name == name[1]
+        rig.data.bones.active = rig.data.bones[name[1]]
+        assert act() == {"FINISHED"}
+        bpy.ops.object.mode_set(mode="OBJECT")
 
     # Baking and reducing
 

@@ -12,6 +12,7 @@ from hypothesis.stateful import initialize, invariant, precondition, rule
 from mathutils import Euler, Matrix
 
 from rigid_motion import animation
+from tests.animation.edit_steps import TakenAway
 from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
@@ -35,7 +36,7 @@ from tests.animation.tool_steps import WithTools
 from tests.thoroughness import THOROUGH
 
 
-class EditingObjects(WithTools):
+class EditingObjects(TakenAway, WithTools):
     """An animator at work on a few objects, by their names."""
 
     KEPT = (*WithTools.KEPT, "turned")
@@ -73,6 +74,14 @@ class EditingObjects(WithTools):
 
     def _found(self, name: str) -> bpy.types.Object:
         return bpy.data.objects[name]
+
+    def _animated(self, name: str) -> bpy.types.Object:
+        return self._found(name)
+
+    def _is_exact(self, name: str) -> bool:
+        # Blender itself bakes the delta transforms of Euler angles wrongly.
+        is_turned = np.abs(np.abs(self.owns[name].quaternion) - (1.0, 0.0, 0.0, 0.0)).max() > 1e-6
+        return self._found(name).rotation_mode == "QUATERNION" or not is_turned
 
     def _object(self, share: float) -> bpy.types.Object:
         return self._found(self._named(share))

@@ -373,6 +373,30 @@ def is_replacing(obj: bpy.types.Object, slot: Slot) -> bool:
     return all(strip.blend_type == "REPLACE" for strip in strips_of(obj) if strip.action in (None, slot.action))
 
 
+def is_above(obj: bpy.types.Object, slot: Slot, other: Slot) -> bool:
+    """Whether a slot plays above another one in the NLA of an object, on some frame."""
+    return any(
+        level > below and start < end_below and start_below < end
+        for level, start, end in _spans(obj, slot)
+        for below, start_below, end_below in _spans(obj, other)
+    )
+
+
+def _spans(obj: bpy.types.Object, slot: Slot) -> list[tuple[int, float, float]]:
+    """Where in the NLA of an object a slot plays: the number of the track, that of its Action behind all of them, and
+    the frames of the scene."""
+    data, own = obj.animation_data, (slot.action, slot.handle)
+    spans = [
+        (level, strip.frame_start, strip.frame_end)
+        for level, track in enumerate(data.nla_tracks)
+        for strip in _strips(track.strips)
+        if (strip.action, strip.action_slot_handle) == own
+    ]
+    if not data.use_tweak_mode and (data.action, data.action_slot_handle) == own:
+        spans.append((len(data.nla_tracks), -math.inf, math.inf))
+    return spans
+
+
 def is_filled_in(fcurve: bpy.types.FCurve) -> bool:
     """Whether an F-curve is one that in-betweens of an object are in: without keys, and in the group of them."""
     group = fcurve.group

@@ -27,7 +27,8 @@ from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
 from ..live import follower
 from ..live.inserted_keys import set_key
 from ..queries.keyed import active_place
-from ..queries.segments import frame_in_action, shown_components
+from ..queries.segments import frame_in_action
+from ..queries.visible_pose import shown_components
 from ..transforms import Channel, Refused, Transform
 from ..writers.channel_values import components_near
 from .apply import Readings, Targets, apply_edit, readable

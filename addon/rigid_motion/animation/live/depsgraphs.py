@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator
 
 import bpy
 
+from ..actions.slots import actions_of
+
 BlockKey = tuple[str, str | None]
 """What a data-block is found by in the file: its name, and the file that it is linked from."""
 
@@ -20,6 +22,20 @@ def key_of(block: bpy.types.ID) -> BlockKey:
 def objects_of(keys: Iterable[BlockKey]) -> list[bpy.types.Object]:
     """The objects with these keys that are still there."""
     return [obj for obj in map(bpy.data.objects.get, keys) if obj is not None]
+
+
+def add_actions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, added: set[tuple[int, int]]) -> None:
+    """Have the Actions of an object be in the dependency graph, which otherwise tells nobody of their edits.
+
+    Blender leaves them out that *Make Single User > Object Animation* has made. `added` has the session ids of objects
+    and Actions that this was tried for.
+    """
+    for action in actions_of(obj):
+        key = obj.session_uid, action.session_uid
+        if key not in added and not action.evaluated_get(depsgraph).is_evaluated:
+            added.add(key)
+            # No edit, but Blender finds out anew what depends on what.
+            obj.instance_type = obj.instance_type
 
 
 def edited_actions(depsgraph: bpy.types.Depsgraph | None) -> list[bpy.types.Action]:

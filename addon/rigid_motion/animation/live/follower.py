@@ -23,10 +23,21 @@ from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
 from ..writers.table import release, writer_of
-from .depsgraphs import BlockKey, actions_to_evaluate, edited_actions, key_of, objects_of, objects_to_evaluate
+from .depsgraphs import (
+    BlockKey,
+    actions_to_evaluate,
+    add_actions,
+    edited_actions,
+    key_of,
+    objects_of,
+    objects_to_evaluate,
+)
 from .inserted_keys import InsertedKeys
+from .left_in_place import LeftInPlace
 from .modes_in_use import has_bones, has_mode, transforms_under, uses_modes
+from .operators import OperatorWatch
 from .refreshing import refresh_places
+from .seen_in_channels import SeenInChannels, is_baking
 from .separated_slots import SlotNames, are_separated, discard, give_keys_back, notice_slots
 from .snapshots import Snapshots
 
@@ -43,8 +54,7 @@ class Follower:
         """Whether edits are followed at once."""
         self.busy = False
         """Whether the edits that Blender tells of are the extension's."""
-        self.operator = (0, "")
-        """The operator that had ended last when edits were last seen."""
+        self.operators = OperatorWatch()
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
             "depsgraph_update_post": self._handler(self.after_update),
@@ -76,8 +86,12 @@ class Follower:
         """The objects of which something was set before Blender evaluated them, by session id."""
         self.evaluated: set[int] = set()
         """The addresses of the dependency graphs that have been evaluated."""
+        self.added: set[tuple[int, int]] = set()
+        """See `add_actions`."""
         self.snapshots = Snapshots()
         self.inserted = InsertedKeys()
+        self.left = LeftInPlace()
+        self.channels = SeenInChannels()
         self.slot_names: SlotNames = {}
 
     def _handler(self, method: Callable) -> Callable:
@@ -117,7 +131,8 @@ class Follower:
             places = slot_transforms_of(transforms)
             moved = {user for place in places for user in place.users}
             unmoved = [transform for transform in transforms if transform not in moved]
-            release(unmoved)
+            with self.left.keep(unmoved):
+                release(unmoved)
             show_pending_modes(unmoved)
             forget_names(unmoved)
             count = self.refresh_places(places, again=again)
@@ -132,7 +147,8 @@ class Follower:
         *,
         again: bool = False,
     ) -> int:
-        return refresh_places(places, sources, self.inserted, self.frame, again=again)
+        with self.left.keep(places=places):
+            return refresh_places(places, sources, self.inserted, self.frame, again=again)
 
     def refresh_edited(self, actions: Collection[bpy.types.Action]) -> set[Transform]:
         """Refresh what these Actions, which were edited, move; and say what that is."""
@@ -158,6 +174,8 @@ class Follower:
                     edited += transforms_under(filter(uses_modes, scene.objects))
                 self.ranges[scene.session_uid] = frames
             if isinstance(block, bpy.types.Object) and uses_modes(block):
+                if block.original.is_editable:
+                    add_actions(block.original, depsgraph, self.added)
                 for transform in self.edited_of(block.original):
                     if transform not in seen:
                         self.inserted.notice_pose(transform, self.frame)
@@ -182,13 +200,13 @@ class Follower:
         """
         waiting = objects_to_evaluate(scene, self.evaluated)
         edited = {obj: depsgraph for obj, depsgraph in waiting if uses_modes(obj)}
-        operator = _last_operator()
-        name = operator[1] if operator != self.operator else ""
-        self.operator = operator
+        operators = self.operators.look()
         for obj, depsgraph in edited.items():
             if not obj.is_editable:
                 continue
             choose_slots(obj)
+            if depsgraph is not None:
+                self.left.notice_assignments(obj, depsgraph)
             for place in filled_places_of(obj):
                 with self.turn() as is_first:
                     if is_first:
@@ -196,7 +214,8 @@ class Follower:
                 if depsgraph is not None:
                     for transform in place.users:
                         with suppress(Refused):
-                            self.inserted.notice_assignment(transform, depsgraph, self.frame, operator=name)
+                            if self.inserted.notice_assignment(transform, depsgraph, self.frame, operators):
+                                writer_of(place).hide(place, transform)
         return list(edited)
 
     def look_through(self, *, again: bool = False) -> None:
@@ -225,6 +244,7 @@ class Follower:
         self.followed = {action.session_uid for action in edited}
         self.moved = self.refresh_edited(edited)
         self.inserted.forget_poses(self.moved)
+        self.channels.put_back(edited)
 
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         self.frame = scene.frame_current_final
@@ -239,8 +259,10 @@ class Follower:
         self.followed, self.moved = set(), set()
         if depsgraph.id_type_updated("OBJECT") or depsgraph.id_type_updated("SCENE"):
             self.refresh_objects(depsgraph, seen)
+        self.left.forget_assignments()
 
     def before_frame(self, scene: bpy.types.Scene, *_: object) -> None:
+        self.channels.put_back()
         # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
         self.waiting = [key_of(obj) for obj in self.before_evaluation(scene)]
         self.refresh_edited(actions_to_evaluate(scene))
@@ -253,11 +275,23 @@ class Follower:
             self.refresh(transforms_under(edited))
         self.waiting = []
         self.inserted.forget_poses()
+        self.left.forget_assignments()
         self.frame = scene.frame_current_final
+        if is_baking():
+            with self.turn() as is_first:
+                if is_first:
+                    self.channels.show(transforms_under(filter(uses_modes, scene.objects)))
 
     def after_undo(self, *_: object) -> None:
         self.snapshots.clear()
+        self.inserted.forget_poses()
+        self.channels.forget()
         self.look_again(again=True)
+        for obj in filter(uses_modes, bpy.data.objects):
+            for place in filled_places_of(obj) if obj.is_editable else ():
+                for transform in place.users:
+                    if self.inserted.is_whole_again(transform, self.frame):
+                        writer_of(place).hide(place, transform)
 
     def after_load(self, *_: object) -> None:
         source_cache.clear()
@@ -274,13 +308,6 @@ class Follower:
         for obj in bpy.data.objects:
             if obj.rigid_motion.has_bones:
                 let_override_be_read(obj)
-
-
-def _last_operator() -> tuple[int, str]:
-    """The operator that has ended last, told from others of its kind, and its name."""
-    manager = bpy.context.window_manager
-    operators = manager.operators if manager is not None else ()
-    return (operators[-1].as_pointer(), operators[-1].bl_idname) if len(operators) else (0, "")
 
 
 follower = Follower()
@@ -321,6 +348,12 @@ def follow_original(transform: ObjectTransform) -> None:
         if is_first:
             transform.follow_original()
             follower.refresh_places(slot_transforms_of([transform]))
+
+
+def show_seen_in_channels(transforms: Iterable[Transform]) -> None:
+    """Give the properties of these the pose that is seen, until the frame changes: for what reads them."""
+    for transform in follower.channels.show(transforms):
+        follower.inserted.notice_whole(transform, follower.frame)
 
 
 @contextmanager

@@ -13,8 +13,10 @@ which of the two its value is:
   *Align*, *Move*), or more than one of location, rotation and scale of an object have changed, then a pose was computed
   for the world, and Blender has taken the difference off: `matrix_world = M` sets all three of them. The key gets that
   pose. A single property (`location = v`, a value typed with Auto Key) is the value that somebody wanted, and stays as
-  it is; so does a pose that is set on a bone (`matrix = M`), which knows nothing of constraints.
-- A pose from elsewhere was put on a bone (*Paste Pose*, a pose asset): it is meant as it is, and so keyed later, too.
+  it is.
+- A whole pose was put on a bone (*Paste Pose*, a pose asset, *Apply Visual Transform to Pose*, `matrix = M`, and so
+  Rigify's switches): whoever did it knows nothing of constraints, and means it as it is. So it is shown, without the
+  difference, until it is keyed or the frame changes; and so it is keyed, at once or later.
 
 Where a key gets a pose, so do all keyed channels of the transform.
 """
@@ -33,12 +35,16 @@ from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
 from ..compute.sources import SAME_FRAME, Source
-from ..queries.visible_pose import visible_components
+from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Transform
 from ..writers.table import writer_of
+from .operators import Operators
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
+
+MOST_WHOLE = 4096
+"""Poses of single transforms that undo and redo can bring back as they were seen."""
 
 TOLERANCE = 1e-5
 """Differences of single precision, relative to the value or absolute below 1."""
@@ -57,8 +63,11 @@ class _Posed:
     on_top: bool
     """Whether the pose is that with the difference on top."""
 
-    is_stored: bool = False
-    """Whether a pose from elsewhere was put on it, which is meant as it is, whatever the difference makes of it."""
+    is_whole: bool = False
+    """Whether a whole pose was put on it, which is meant as it is, and shown so."""
+
+    is_shown: bool = True
+    """Whether it has been evaluated so."""
 
 
 class InsertedKeys:
@@ -66,41 +75,78 @@ class InsertedKeys:
 
     def __init__(self) -> None:
         self._posed: dict[tuple[int, str], _Posed] = {}
-        self._inserted: OrderedDict[tuple[str, str], np.ndarray] = OrderedDict()
-        """What undo and redo bring back is decided as it was: the components on the screen, by the digests before and
-        after."""
+        self._whole: OrderedDict[tuple[tuple[int, str], bytes], _Posed] = OrderedDict()
+        """The whole poses that undo and redo can bring back, by the transform and the components."""
+        self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool]] = OrderedDict()
+        """What undo and redo bring back is decided as it was: the components that there were, and whether they were
+        all of the pose, by the digests before and after."""
+
+    def _keep(self, transform: Transform, posed: _Posed) -> None:
+        identity = _identity(transform)
+        self._posed[identity] = posed
+        if posed.is_whole:
+            self._whole[identity, posed.components.tobytes()] = posed
+            self._whole.move_to_end((identity, posed.components.tobytes()))
+            if len(self._whole) > MOST_WHOLE:
+                self._whole.popitem(last=False)
+
+    def is_whole_again(self, transform: Transform, frame: float) -> bool:
+        """Whether undo or redo brought a whole pose back that was put on a transform on this frame."""
+        posed = self._whole.get((_identity(transform), transform.components().tobytes()))
+        if posed is None or posed.frame != frame:
+            return False
+        self._posed[_identity(transform)] = posed
+        return True
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
-        components, before = transform.components(), self._posed.get(_identity(transform))
-        if before is not None and before.is_stored and np.array_equal(before.components, components):
-            return
-        self._posed[_identity(transform)] = _Posed(frame, components, True)
+        is_whole = self._is_shown_whole(transform)
+        self._keep(transform, _Posed(frame, transform.components(), not is_whole, is_whole))
+
+    def notice_whole(self, transform: Transform, frame: float) -> None:
+        """Keep that the properties of a transform have all of its pose, with no difference on top."""
+        self._keep(transform, _Posed(frame, transform.components(), False, True))
+
+    def _is_shown_whole(self, transform: Transform) -> bool:
+        """Whether a whole pose was put on a transform, and it has been shown without the difference since."""
+        before = self._posed.get(_identity(transform))
+        if before is None or not before.is_whole:
+            return False
+        seen = shown_components(transform)
+        return seen is None or np.allclose(seen, transform.components(), rtol=TOLERANCE, atol=TOLERANCE)
 
     def posed_of(self, animated: bpy.types.ID) -> set[str]:
         """The prefixes of what was posed of a data-block, and has no key yet."""
         return {prefix for uid, prefix in self._posed if uid == animated.session_uid}
 
     def notice_assignment(
-        self, transform: Transform, depsgraph: bpy.types.Depsgraph, frame: float, *, operator: str = ""
-    ) -> None:
+        self, transform: Transform, depsgraph: bpy.types.Depsgraph, frame: float, operators: Operators
+    ) -> bool:
         """Keep what the properties of a transform were set to, where they have not been evaluated so yet.
 
-        `operator` is the name of the one that did it, if any did.
+        Returns
+        -------
+        bool
+            Whether they are to be shown without the difference.
         """
         carrier, evaluated = transform.carrier, transform.evaluated(depsgraph)
         changed = sum(
             evaluated is not None and tuple(getattr(carrier, prop)) != tuple(getattr(evaluated, prop))
             for prop in ("location", transform.rotation, "scale")
         )
-        if changed:
-            on_top = operator.startswith(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
-            is_stored = operator.startswith(transform.stored_by)
-            self._posed[_identity(transform)] = _Posed(frame, transform.components(), on_top, is_stored)
+        if not changed:
+            return False
+        is_whole = self._is_shown_whole(transform) or operators.are_any(transform.stored_by)
+        if not is_whole and not transform.matrix_lacks_difference and operators.is_script:
+            is_whole = changed > 1 or transform.is_as_seen(evaluated)
+        on_top = operators.are_any(transform.placed_by) or (transform.matrix_lacks_difference and changed > 1)
+        on_top = on_top and not is_whole
+        self._keep(transform, _Posed(frame, transform.components(), on_top, is_whole, is_shown=False))
+        return is_whole
 
     def notice_values(self, transform: Transform, frame: float) -> None:
         """Keys of a transform that are set on the frame that is shown are meant as they are."""
-        self._posed[_identity(transform)] = _Posed(frame, transform.components(), False)
+        self._keep(transform, _Posed(frame, transform.components(), False, is_shown=False))
 
     def forget_poses(self, transforms: Iterable[Transform] | None = None) -> None:
         """Forget how these were posed, or all: their Actions have moved them again."""
@@ -154,19 +200,20 @@ class InsertedKeys:
         if not _is_inserted(old, source, frame):
             return False
         change = old.digest, source.digest
-        shown, frames = self._inserted.get(change) if again else None, np.array([frame])
+        decided, frames = self._inserted.get(change) if again else None, np.array([frame])
         added = added_values(place, user, source, frames)[:, 0]
-        if shown is None:
+        if decided is None:
             shown = old.values_at(old.held(frames))[:, 0] + added if posed is None else posed.components
-            if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
+            if not _has_values(source, frame, shown) or (posed is not None and not (posed.on_top or posed.is_shown)):
                 return False
-            self._inserted[change] = shown
+            decided = self._inserted[change] = shown, posed is not None and posed.is_whole
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
-        visible = _visible_components(user, place, old, shown, frame) - added
+        shown, is_whole = decided
+        seen = (shown if is_whole else _seen_components(user, place, old, shown, frame)) - added
         for row, channel in user.channels.items():
             if (fcurve := place.curves.get(channel)) is not None:
-                set_key(fcurve, frame, visible[row])
+                set_key(fcurve, frame, seen[row])
         return True
 
 
@@ -197,9 +244,7 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
     return True
 
 
-def _visible_components(
-    user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
-) -> np.ndarray:
+def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float) -> np.ndarray:
     """The components (10,) that, with the original difference alone, look as the screen does."""
     filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}

@@ -1,8 +1,8 @@
 """What the user interface and scripts ask of motions. Nothing is changed.
 
-visible_pose  what is seen, as properties
+visible_pose  how something is seen, as properties
 keyed         keys in the slot that the editors show, and their modes
-segments      one segment in numbers, and where something is seen
+segments      one segment in numbers
 problems      why something does not move as its mode says
 polls         what is asked of many at every redraw
 

@@ -17,9 +17,7 @@ from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
 from ..compute.turning import turning_in
 from ..curves import cycled
 from ..transforms import Transform, transform_of
-from ..writers.table import writer_of
 from .keyed import active_place
-from .visible_pose import visible_components
 
 HALF_TURN = np.pi + 1e-3
 """Half a turn, and what single precision makes of it."""
@@ -117,36 +115,6 @@ def is_up_to_date(target: bpy.types.Object | Transform, source: Source) -> bool:
     transform = transform_of(target)
     place = active_place(transform, places_of(transform))
     return place is not None and recorded_digest(place) == (source.digest if source.is_live else "")
-
-
-def shown_components(transform: Transform) -> np.ndarray | None:
-    """Where something is seen on the frame that is shown, in its own channels.
-
-    Returns
-    -------
-    array, shape (10,), or None
-        What its properties would have to be for it to look as it does with its original difference alone: location,
-        rotation as it turns (quaternion or Euler angles), scale. None where no in-betweens are filled in.
-
-    Raises
-    ------
-    Refused
-        Where it turns by axis and angle.
-    """
-    places = [place for place in places_of(transform) if place.filled]
-    if not places:
-        return None
-    seen = transform.components()
-    order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
-    rows = transform.differences.items()
-    parts = [{PART_OF[row] for row, channel in rows if channel in place.filled} for place in places]
-    if not transform.has_difference_slot:
-        # What is beside the keys is one for all slots; what is in a slot of its own is so for each of them.
-        places, parts = places[:1], [set().union(*parts)]
-    for place, own in zip(places, parts, strict=True):
-        difference = writer_of(place).difference(place, transform, None)
-        seen = visible_components(seen, transform.original(), difference, order, own)
-    return seen
 
 
 def parts_with_in_betweens(transform: Transform) -> set[str]:

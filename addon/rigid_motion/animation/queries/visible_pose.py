@@ -8,6 +8,32 @@ import numpy as np
 from mathutils import Euler, Quaternion
 
 from ..compute.components import LOCATION, ROTATION, ROWS, SCALE
+from ..transforms import Transform
+from ..writers.table import shown_differences
+
+
+def shown_components(transform: Transform) -> np.ndarray | None:
+    """How a transform is seen now, in the terms of what an animator keys.
+
+    Returns
+    -------
+    array, shape (10,), or None
+        What its properties would have to be for it to look as it does with its original difference alone: location,
+        rotation as it turns (quaternion or Euler angles), scale. None where nothing is on top of them.
+
+    Raises
+    ------
+    Refused
+        Where it turns by axis and angle.
+    """
+    differences = shown_differences(transform)
+    if not differences:
+        return None
+    seen = transform.components()
+    order = None if transform.rotation == "rotation_quaternion" else transform.carrier.rotation_mode
+    for difference, parts in differences:
+        seen = visible_components(seen, transform.original(), difference, order, parts)
+    return seen
 
 
 def visible_components(

@@ -19,6 +19,9 @@ from .transform import OWN_WORDS, Channel, Transform, channels_under
 CONSTRAINT = "Rigid Motion"
 """What the constraint is called, and what its name begins with where Actions of one rig need one each."""
 
+NEAR = 1e-4
+"""What matrices of bones differ by that are the same, having been through the space of the rig in single precision."""
+
 _BONE = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.')
 
 
@@ -38,7 +41,13 @@ class BoneTransform(Transform):
         "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
     )
     placed_by = ("TRANSFORM_OT_",)
-    stored_by = ("POSE_OT_paste", "POSELIB_OT_")
+    stored_by = (
+        "POSE_OT_paste",
+        "POSELIB_OT_",
+        "POSE_OT_visual_transform_apply",
+        "POSE_OT_transforms_clear",
+        "POSE_OT_rigify_",
+    )
     matrix_lacks_difference = False
 
     def __init__(self, bone: bpy.types.PoseBone) -> None:
@@ -83,6 +92,11 @@ class BoneTransform(Transform):
 
     def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.PoseBone | None:
         return self.animated.evaluated_get(depsgraph).pose.bones.get(self.carrier.name)
+
+    def is_as_seen(self, evaluated: bpy.types.PoseBone) -> bool:
+        bone = self.carrier
+        seen = self.animated.convert_space(pose_bone=bone, matrix=evaluated.matrix, from_space="POSE", to_space="LOCAL")
+        return np.allclose(seen, bone.matrix_basis, rtol=NEAR, atol=NEAR)
 
 
 def shows_differences(constraint: bpy.types.Constraint) -> bool:

@@ -136,6 +136,11 @@ class ObjectTransform(Transform):
             values = [now[i] if _BITS[path, i] & noted else value for i, value in enumerate(then)]
             _set_if_other(self.carrier, path, values)
 
+    def show_original(self) -> None:
+        """Set the delta transforms to what is written down, for as long as Blender leaves them so."""
+        for path in _paths_in(self._noted):
+            _set_if_other(self.carrier, path, self.original_values(path))
+
     def restore_original(self, filled: Iterable[Channel]) -> None:
         """Give the original values back, but for these channels, which are animated still."""
         noted = self._noted

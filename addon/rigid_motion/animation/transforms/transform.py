@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from functools import cache
 from typing import ClassVar
 
@@ -76,7 +77,7 @@ class Transform(ABC):
     """How the names of operators begin that set its properties to bring what is on the screen to a certain place."""
 
     stored_by: ClassVar[tuple[str, ...]]
-    """How the names of operators begin that set its properties to a pose that was kept elsewhere."""
+    """How the names of operators begin that set its properties to a whole pose, whatever they had before."""
 
     matrix_lacks_difference: ClassVar[bool]
     """Whether Blender takes the difference off where the properties are set from a matrix."""
@@ -119,6 +120,10 @@ class Transform(ABC):
     @abstractmethod
     def evaluated(self, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | bpy.types.PoseBone | None:
         """The carrier as it was evaluated last, None where it was not there yet."""
+
+    def is_as_seen(self, _evaluated: bpy.types.Object | bpy.types.PoseBone) -> bool:
+        """Whether its properties were set to what was seen when its carrier was evaluated, difference and all."""
+        return False
 
     @property
     def kind(self) -> type[Transform]:
@@ -171,6 +176,12 @@ class Transform(ABC):
         elif self.carrier.rotation_mode in ORDERS:
             found[3:6] = self.carrier.rotation_euler
         return found
+
+    def set_components(self, components: np.ndarray, parts: Collection[str]) -> None:
+        """Set its properties for these of location, rotation and scale to components (10,)."""
+        for part, prop in self.properties.items():
+            if part in parts:
+                setattr(self.carrier, prop, components[ROWS[part]][: WIDTHS[prop]])
 
     @property
     def differences(self) -> dict[int, Channel]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import bpy
+from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-from ..actions.slots import SlotTransform, uses_of
+from ..actions.slots import Curves, SlotTransform, uses_of
 from ..transforms import BoneTransform, Transform, shows_differences
 from .times import constraint_path, name_of, span_of
 
@@ -31,6 +32,15 @@ def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action |
     if not handle and constraint.id_data.mode == "EDIT" and (slot := _last_slot(constraint)) is not None:
         handle = slot.handle
     return constraint.action, handle
+
+
+def curves_shown_by(constraint: bpy.types.ActionConstraint, user: Transform) -> Curves:
+    """The F-curves that a constraint shows on a bone."""
+    action, handle = constraint.action, constraint.action_slot_handle
+    slot = None if action is None else next((slot for slot in action.slots if slot.handle == handle), None)
+    channelbag = None if slot is None else action_get_channelbag_for_slot(action, slot)
+    group = None if channelbag is None else channelbag.groups.get(user.difference_group(user.prefix))
+    return {} if group is None else {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels}
 
 
 def detach_slots(rig: bpy.types.Object) -> None:

@@ -14,8 +14,8 @@ import numpy as np
 from mathutils import Euler, Quaternion
 
 from ..actions.records import record_constraint, recorded_digest
-from ..actions.slots import Slot, SlotTransform, places_of, slot_transforms_of, uses_of
-from ..compute.components import LOCATION, REST, ROTATION, ROWS, SCALE
+from ..actions.slots import Curves, Slot, SlotTransform, places_of, slot_transforms_of, uses_of
+from ..compute.components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from ..compute.sources import Source
 from ..transforms import (
     CONSTRAINT,
@@ -31,6 +31,7 @@ from ..transforms import (
 from . import constraint_repair
 from .bone_constraints import (
     constraint_of,
+    curves_shown_by,
     ensure_constraint,
     has_constraint,
     has_stale_constraint,
@@ -91,20 +92,28 @@ class ConstraintWriter(Writer):
                     self.release([user])
 
     def difference(self, place: SlotTransform, user: Transform, frame: float | None) -> np.ndarray:
-        difference = REST.copy()
-        if user.rotation == "rotation_euler":
-            difference[ROWS[ROTATION]] = 0.0
         filled, constraint = place.filled, constraint_of(user, place)
         if not filled or constraint is None or not constraint.enabled:
-            return difference
+            return _no_difference(user)
         time = constraint.eval_time
         if frame is not None and (fcurve := time_of(place)) is not None:
             time = min(max(fcurve.evaluate(frame), 0.0), 1.0)
-        at = constraint.frame_start + time * (constraint.frame_end - constraint.frame_start)
-        for row, channel in user.differences.items():
-            if (fcurve := filled.get(channel)) is not None:
-                difference[row] = fcurve.evaluate(at)
-        return _weighted(difference, constraint.influence, user)
+        return _difference_at(constraint, time, filled, user)
+
+    def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
+        found = []
+        for constraint in user.carrier.constraints:
+            if shows_differences(constraint) and constraint.enabled:
+                shown = curves_shown_by(constraint, user)
+                parts = {PART_OF[row] for row, channel in user.differences.items() if channel in shown}
+                if parts:
+                    found.append((_difference_at(constraint, constraint.eval_time, shown, user), parts))
+        return found
+
+    def hide(self, place: SlotTransform, user: Transform) -> None:
+        constraint, time = constraint_of(user, place), time_of(place)
+        if constraint is not None and time is not None:
+            constraint.eval_time = min(max(time.evaluate(_frame_of_a_key(place)), 0.0), 1.0)
 
     def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
         held = held_by(place, beside)
@@ -223,6 +232,34 @@ def _remove_slot_if_empty(slot: Slot) -> None:
         number, pair = next((number, pair) for number, pair in enumerate(pairs) if pair.handle == slot.handle)
         slot.action.slots.remove(next(one for one in slot.action.slots if one.handle == pair.differences))
         pairs.remove(number)
+
+
+def _no_difference(user: Transform) -> np.ndarray:
+    difference = REST.copy()
+    if user.rotation == "rotation_euler":
+        difference[ROWS[ROTATION]] = 0.0
+    return difference
+
+
+def _difference_at(constraint: bpy.types.ActionConstraint, time: float, filled: Curves, user: Transform) -> np.ndarray:
+    """What a constraint adds to a bone at an evaluation time, as components (10,)."""
+    difference = _no_difference(user)
+    at = constraint.frame_start + time * (constraint.frame_end - constraint.frame_start)
+    for row, channel in user.differences.items():
+        if (fcurve := filled.get(channel)) is not None:
+            difference[row] = fcurve.evaluate(at)
+    return _weighted(difference, constraint.influence, user)
+
+
+def _frame_of_a_key(place: SlotTransform) -> float:
+    """A frame on which there is no difference: that of a key, and a whole one if there is any."""
+    frames = [
+        key.co.x
+        for (path, _), fcurve in place.curves.items()
+        if path.removeprefix(place.prefix) in WIDTHS and not fcurve.mute
+        for key in fcurve.keyframe_points
+    ]
+    return min(frames, key=lambda frame: (abs(frame - round(frame)), frame), default=0.0)
 
 
 def _weighted(difference: np.ndarray, influence: float, user: Transform) -> np.ndarray:

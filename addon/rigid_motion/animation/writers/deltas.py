@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 
 from ..actions.records import recorded_digest
-from ..actions.slots import SlotTransform, is_filled_in, is_replacing, slot_transforms_of
+from ..actions.slots import SlotTransform, is_above, is_filled_in, is_replacing, slot_transforms_of
+from ..compute.components import PART_OF
 from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
 from .layout import Layout
@@ -58,9 +59,21 @@ class DeltaWriter(Writer):
             difference[row] = user.animated.path_resolve(path)[index] if fcurve is None else fcurve.evaluate(frame)
         return difference
 
+    def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
+        noted = {row: channel for row, channel in user.differences.items() if user.is_noted([channel])}
+        if not noted:
+            return []
+        difference = np.zeros(10)
+        for row, (path, index) in user.differences.items():
+            difference[row] = getattr(user.carrier, path)[index]
+        return [(difference, {PART_OF[row] for row in noted})]
+
+    def hide(self, place: SlotTransform, user: Transform) -> None:
+        user.show_original()
+
     def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
-        """While a strip plays whose Action lacks a channel that another strip's has, Blender puts it to its default:
-        a slot without in-betweens holds its users' original differences for them."""
+        """While a strip plays whose Action lacks a channel that another strip's has, Blender puts it to its default, or
+        leaves what is below: a slot without in-betweens holds its users' original differences for them."""
         if recorded_digest(place):
             return False
         held, before = _held(place, beside), place.filled
@@ -112,17 +125,15 @@ def _held(place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel
 
 def _held_for(user: ObjectTransform, place: SlotTransform, beside: Sequence[SlotTransform]) -> dict[Channel, float]:
     originals = {path: getattr(user.motion, original)[:] for path, (original, _) in ORIGINALS.items()}
-    originals = {
-        path: values
-        for path, values in originals.items()
-        if all(map(math.isfinite, values)) and values != default_of(path)
-    }
-    if not (originals and is_replacing(user.animated, place.slot)):
+    originals = {path: values for path, values in originals.items() if all(map(math.isfinite, values))}
+    if not is_replacing(user.animated, place.slot):
         return {}
-    filled = {path for other in beside if user in other.users and recorded_digest(other) for path, _ in other.filled}
+    others = [other for other in beside if user in other.users and recorded_digest(other)]
+    filled = {path for other in others for path, _ in other.filled}
+    below = {path for other in others if is_above(user.animated, place.slot, other.slot) for path, _ in other.filled}
     return {
         (path, index): value
         for path, values in originals.items()
-        if path in filled
+        if path in below or (path in filled and values != default_of(path))
         for index, value in enumerate(values)
     }

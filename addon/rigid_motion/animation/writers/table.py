@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable
 
+import numpy as np
+
 from ..actions.slots import Slot, SlotTransform
 from ..transforms import BoneTransform, ObjectTransform, Transform
 from .constraints import ConstraintWriter
@@ -27,6 +29,11 @@ def release(transforms: Iterable[Transform]) -> None:
         by_kind[transform.kind].append(transform)
     for kind, same in by_kind.items():
         WRITERS[kind].release(same)
+
+
+def shown_differences(user: Transform) -> list[tuple[np.ndarray, set[str]]]:
+    """What is on top of a transform as it is shown now: see `Writer.shown_differences`."""
+    return WRITERS[user.kind].shown_differences(user)
 
 
 def remove_orphans(places: Iterable[SlotTransform]) -> None:

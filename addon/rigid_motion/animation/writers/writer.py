@@ -51,6 +51,17 @@ class Writer(ABC):
         """
 
     @abstractmethod
+    def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
+        """What is on top of a user as it is shown now, one behind the other, even where nothing moves it any more.
+
+        Each as components (10,), and which of location, rotation and scale it is in.
+        """
+
+    @abstractmethod
+    def hide(self, place: SlotTransform, user: Transform) -> None:
+        """Show a user as its properties have it, until Blender evaluates its animation again."""
+
+    @abstractmethod
     def hold(self, place: SlotTransform, beside: Sequence[SlotTransform]) -> bool:
         """Have a slot hold what the NLA needs of it beside others that are filled in. Whether that was new to it.
 

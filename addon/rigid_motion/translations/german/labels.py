@@ -109,6 +109,8 @@ OF_OPERATORS = {
     "Relax to In-Between of Mode": "Zum Zwischenbild des Modus entspannen",
     "Restore Constraint": "Beschränkung wiederherstellen",
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
+    "Copy Pose on Screen": "Sichtbare Pose kopieren",
+    "Create Pose Asset on Screen": "Posen-Asset der sichtbaren Pose erstellen",
     "Pie Menu": "Kreismenü",
     "Documentation": "Dokumentation",
     "Website": "Website",

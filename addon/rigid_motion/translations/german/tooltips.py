@@ -348,6 +348,19 @@ TOOLTIPS = {
         "Diese Objekte und Knochen haben Blenders eigene Zwischenbilder: zuerst einen Modus wählen, oder Blenders "
         "Pose > In-Betweens"
     ),
+    "Copy the pose of the selected bones as you see it, with the in-betweens. "
+    "Until the frame changes their channels have it, too": (
+        "Die Pose der ausgewählten Knochen kopieren, wie sie zu sehen ist, mit den Zwischenbildern. "
+        "Bis zum nächsten Bildwechsel haben sie auch ihre Kanäle"
+    ),
+    "Create a pose asset of the selected bones as you see them, with the in-betweens. "
+    "Until the frame changes their channels have that pose, too": (
+        "Ein Posen-Asset der ausgewählten Knochen erstellen, wie sie zu sehen sind, mit den Zwischenbildern. "
+        "Bis zum nächsten Bildwechsel haben ihre Kanäle diese Pose"
+    ),
+    "No selected bone is on an in-between: Blender's own operator does the same": (
+        "Kein ausgewählter Knochen ist auf einem Zwischenbild: Blenders eigener Befehl tut dasselbe"
+    ),
     "None of these objects is baked": "Keines dieser Objekte ist gebacken",
     "None of these bones is baked": "Keiner dieser Knochen ist gebacken",
     "None of these objects and bones is baked": "Keines dieser Objekte und keiner dieser Knochen ist gebacken",

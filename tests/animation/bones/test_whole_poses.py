@@ -1,0 +1,195 @@
+"""Poses that are put on bones as a whole between two keys: what was put there is seen, and what is keyed."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from rigid_motion.animation import key_frames, set_mode
+from tests.animation.bones.rigs import key_all, key_bone, new_rig, select_only
+from tests.animation.oracle import curves_of, rotation_path
+from tests.animation.scenes import enabled
+
+BETWEEN = 15
+ORDERS = ("QUATERNION", "XYZ")
+
+
+def placed(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones of a rig are seen, shape (bones, 4, 4)."""
+    bpy.context.view_layer.update()
+    bones = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    return np.array([bone.matrix for bone in bones])
+
+
+def posing(rig: bpy.types.Object, *selected: str) -> bpy.types.Object:
+    """Go into Pose Mode, with these bones selected or all."""
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="POSE")
+    for bone in rig.pose.bones:
+        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in selected or not selected
+    return rig
+
+
+@pytest.fixture(params=ORDERS)
+def rig(request, live_file) -> bpy.types.Object:
+    """A rig in Pose Mode with a mode on each of its bones, in the middle of a segment."""
+    rig = key_all(new_rig(rotation_mode=request.param))
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    return posing(rig)
+
+
+def insert_keys(rig: bpy.types.Object) -> None:
+    for bone in rig.pose.bones:
+        for path in ("location", rotation_path(bone)):
+            bone.keyframe_insert(path)
+
+
+def apply_visual_transform(rig: bpy.types.Object) -> None:
+    assert bpy.ops.pose.visual_transform_apply() == {"FINISHED"}
+
+
+def as_an_animator(operator: Callable, **settings: object) -> None:
+    """With undo, and so as Blender keeps in mind which operator it was."""
+    assert operator("EXEC_DEFAULT", True, **settings) == {"FINISHED"}
+
+
+@pytest.mark.parametrize("by", ["animator", "script"])
+def test_the_visual_transform_applied_leaves_bones_where_they_are(rig, live_file, by):
+    seen = placed(rig)
+    if by == "script":
+        apply_visual_transform(rig)
+    else:
+        as_an_animator(bpy.ops.pose.visual_transform_apply)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    insert_keys(rig)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    for bone in rig.pose.bones:
+        assert float(BETWEEN) in key_frames(bone)
+    live_file.scene.frame_set(BETWEEN + 1)
+    live_file.scene.frame_set(BETWEEN)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+
+
+def test_the_visual_transform_applied_is_given_up_with_the_frame(rig, live_file):
+    seen = placed(rig)
+    apply_visual_transform(rig)
+    live_file.scene.frame_set(BETWEEN + 1)
+    live_file.scene.frame_set(BETWEEN)
+    assert np.abs(placed(rig) - seen).max() < 1e-6
+
+
+def test_of_bones_that_only_turn_the_visual_transform_leaves_them_where_they_are(live_file):
+    rig = new_rig(rotation_mode="XYZ")
+    for bone in rig.pose.bones:
+        key_bone(bone, location=False)
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = placed(posing(rig))
+    apply_visual_transform(rig)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+
+
+def test_the_visual_transform_below_another_constraint_is_kept_when_that_is_removed(rig):
+    hand = rig.pose.bones["Hand"]
+    limit = hand.constraints.new("LIMIT_LOCATION")
+    limit.use_min_x = limit.use_max_x = True
+    limit.owner_space = "LOCAL"
+    limit.min_x = limit.max_x = 0.25
+    seen = placed(rig)
+    apply_visual_transform(rig)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    hand.constraints.remove(limit)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+
+
+def test_a_matrix_is_where_a_script_has_put_it_and_is_keyed_there_later(rig):
+    matrix = Matrix.LocRotScale((0.3, 0.2, 0.9), None, None) @ rig.pose.bones["Body"].matrix.to_3x3().to_4x4()
+    rig.pose.bones["Body"].matrix = matrix
+    assert np.abs(placed(rig)[0] - np.array(matrix)).max() < 2e-5
+    insert_keys(rig)
+    assert np.abs(placed(rig)[0] - np.array(matrix)).max() < 2e-5
+
+
+def test_a_bone_that_is_moved_on_by_hand_is_keyed_where_it_is(rig):
+    apply_visual_transform(rig)
+    placed(rig)
+    as_an_animator(bpy.ops.transform.translate, value=(0.2, 0.1, 0.0))
+    seen = placed(rig)
+    insert_keys(rig)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+
+
+def test_a_single_property_is_moved_on_from_what_is_seen(rig):
+    before = placed(rig)
+    rig.pose.bones["Body"].location.y += 0.01
+    moved = placed(rig)[0] - before[0]
+    assert 0.001 < np.abs(moved).max() < 0.011
+
+
+@pytest.mark.parametrize("keyed", ["at once", "later"])
+def test_rigify_keeps_a_transform_where_it_is_seen_when_a_parent_is_switched(rig, live_file, keyed):
+    """What its *Switch Parent* does: matrices as they are, the switch, and each matrix set again."""
+    with enabled("rigify"):
+        tools = importlib.import_module("rigify.utils.animation")
+        seen, hand = placed(rig), rig.pose.bones["Hand"]
+        matrix = tools.get_transform_matrix(rig, "Hand")
+        # The switch: what the hand hangs on is elsewhere from now on.
+        switch = hand.parent.constraints.new("COPY_ROTATION")
+        switch.target, switch.subtarget = rig, "Body"
+        switch.owner_space = switch.target_space = "POSE"
+        assert np.abs(placed(rig)[3] - seen[3]).max() > 0.1
+        flags = set() if keyed == "at once" else None
+        tools.set_transform_from_matrix(rig, "Hand", matrix, keyflags=flags)
+    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
+    insert_keys(rig)
+    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
+    live_file.scene.frame_set(BETWEEN + 1)
+    live_file.scene.frame_set(BETWEEN)
+    assert np.abs(placed(rig)[3] - seen[3]).max() < 2e-5
+
+
+def test_a_pose_that_is_pasted_is_seen_as_it_was_copied(rig, live_file):
+    live_file.scene.frame_set(24)
+    copied = placed(rig)
+    as_an_animator(bpy.ops.pose.copy)
+    live_file.scene.frame_set(BETWEEN)
+    as_an_animator(bpy.ops.pose.paste)
+    assert np.abs(placed(rig) - copied).max() < 2e-5
+    insert_keys(rig)
+    assert np.abs(placed(rig) - copied).max() < 2e-5
+    assert len(curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points) == 5
+
+
+def test_where_one_property_of_a_whole_pose_is_keyed_so_is_the_rest(rig):
+    seen = placed(rig)
+    apply_visual_transform(rig)
+    placed(rig)
+    for bone in rig.pose.bones:
+        bone.keyframe_insert("location")
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    bone = rig.pose.bones["Body"]
+    assert len(curves_of(bone)[rotation_path(bone), 0].keyframe_points) == 5
+
+
+def test_undo_brings_back_a_whole_pose_as_it_was_seen(rig, live_file):
+    live_file.scene.frame_set(24)
+    copied = placed(rig)
+    as_an_animator(bpy.ops.pose.copy)
+    live_file.scene.frame_set(BETWEEN)
+    bpy.ops.ed.undo_push(message="Begin")
+    as_an_animator(bpy.ops.pose.paste)
+    assert np.abs(placed(rig) - copied).max() < 2e-5
+    as_an_animator(bpy.ops.pose.transforms_clear)
+    assert np.abs(placed(rig) - np.array([bone.bone.matrix_local for bone in rig.pose.bones])).max() < 1e-6
+    with bpy.context.temp_override(mode="OBJECT"):
+        assert bpy.ops.ed.undo() == {"FINISHED"}
+    rig = bpy.data.objects["Rig"]
+    assert np.abs(placed(rig) - copied).max() < 2e-5
+    insert_keys(rig)
+    assert np.abs(placed(rig) - copied).max() < 2e-5

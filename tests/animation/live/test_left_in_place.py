@@ -1,0 +1,224 @@
+"""What takes the animation away between two keys leaves an object or a bone where it is seen, as Blender does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Euler, Matrix
+
+from rigid_motion import animation
+from rigid_motion.animation import set_mode
+from tests.animation.bones.rig_editing import own_constraints
+from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import editor, give_own_deltas, key, new_object, own_deltas, push_down
+
+BETWEEN = 15
+ORDERS = ("QUATERNION", "XYZ", "ZXY")
+
+
+def world(name: str = "Tool") -> np.ndarray:
+    bpy.context.view_layer.update()
+    return np.array(bpy.data.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+
+
+def placed(rig: bpy.types.Object) -> np.ndarray:
+    """Where the bones of a rig are seen, shape (bones, 4, 4)."""
+    bpy.context.view_layer.update()
+    bones = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    return np.array([bone.matrix for bone in bones])
+
+
+def unlink(obj: bpy.types.Object) -> None:
+    obj.animation_data.action = None
+
+
+def clear_animation_data(obj: bpy.types.Object) -> None:
+    obj.animation_data_clear()
+
+
+def clear_keyframes(obj: bpy.types.Object) -> None:
+    select_only(obj)
+    with editor("VIEW_3D"):
+        assert bpy.ops.anim.keyframe_clear_v3d() == {"FINISHED"}
+
+
+def unlink_in_the_editor(obj: bpy.types.Object) -> None:
+    select_only(obj)
+    with editor("DOPESHEET_EDITOR", "ACTION"):
+        assert bpy.ops.action.unlink() == {"FINISHED"}
+
+
+def delete_channels(obj: bpy.types.Object) -> None:
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    channelbag = action.layers[0].strips[0].channelbag(slot)
+    for fcurve in [fcurve for fcurve in channelbag.fcurves if fcurve.keyframe_points]:
+        channelbag.fcurves.remove(fcurve)
+
+
+ENDS: dict[str, Callable[[bpy.types.Object], None]] = {
+    "unlinked": unlink,
+    "unlinked in the editor": unlink_in_the_editor,
+    "animation data cleared": clear_animation_data,
+    "keyframes cleared": clear_keyframes,
+    "channels deleted": delete_channels,
+}
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["", "own deltas"])
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("end", ENDS)
+def test_an_object_stays_where_it_is_seen(live_file, end, order, own):
+    obj = new_object("Tool", order)
+    before = give_own_deltas(obj) if own else own_deltas(obj)
+    key(obj, scale="even")
+    set_mode(obj, "cga_lerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = world()
+    ENDS[end](obj)
+    assert np.abs(world() - seen).max() < 1e-5
+    for frame in (BETWEEN + 5, BETWEEN):
+        live_file.scene.frame_set(frame)
+        assert np.abs(world() - seen).max() < 1e-5
+    assert not any(obj.rigid_motion.filled)
+    assert own_deltas(obj) == before
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("end", ENDS)
+def test_the_bones_of_a_rig_stay_where_they_are_seen(live_file, end, order):
+    rig = key_all(new_rig(rotation_mode=order))
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = placed(rig)
+    ENDS[end](rig)
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    for frame in (BETWEEN + 5, BETWEEN):
+        live_file.scene.frame_set(frame)
+        assert np.abs(placed(rig) - seen).max() < 2e-5
+    assert not any(own_constraints(bone) for bone in rig.pose.bones)
+
+
+def test_keyframes_cleared_of_the_selected_bones_leave_these_in_place(live_file):
+    rig = key_all(new_rig())
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="POSE")
+    for bone in rig.pose.bones:
+        select = bone if bpy.app.version >= (5, 0) else bone.bone
+        select.select = bone.name in ("Upper", "Hand")
+    seen = placed(rig)
+    with editor("VIEW_3D"):
+        assert bpy.ops.anim.keyframe_clear_v3d() == {"FINISHED"}
+    assert np.abs(placed(rig) - seen).max() < 2e-5
+    assert [bone.name for bone in rig.pose.bones if own_constraints(bone)] == ["Body", "Lower"]
+
+
+@pytest.mark.parametrize("path", ["location", "rotation_quaternion"])
+def test_channels_of_one_property_deleted_leave_that_in_place(live_file, path):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = world()
+    channelbag = obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot)
+    for channel in [channel for channel in channelbag.fcurves if channel.data_path == path]:
+        channelbag.fcurves.remove(channel)
+    now = world()
+    own = np.s_[:3, 3:] if path == "location" else np.s_[:3, :3]
+    assert np.abs(now[own] - seen[own]).max() < 1e-5
+
+
+def test_undone_and_done_again_it_is_where_it_was(live_file):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = world()
+    bpy.ops.ed.undo_push(message="Begin")
+    unlink(obj)
+    bpy.ops.ed.undo_push(message="Unlink")
+    assert np.abs(world() - seen).max() < 1e-5
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["Tool"].animation_data.action is not None
+    assert np.abs(world() - seen).max() < 1e-5
+    bpy.ops.ed.redo()
+    assert bpy.data.objects["Tool"].animation_data.action is None
+    assert np.abs(world() - seen).max() < 1e-5
+
+
+def test_a_strip_that_is_removed_leaves_its_object_in_place(live_file):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "dq_sclerp")
+    push_down(obj, 11)
+    live_file.scene.frame_set(11 + BETWEEN)
+    seen = world()
+    obj.animation_data.nla_tracks.remove(obj.animation_data.nla_tracks[0])
+    assert np.abs(world() - seen).max() < 1e-5
+
+
+def test_the_action_chosen_again_moves_it_as_before(live_file):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen, action, slot = world(), obj.animation_data.action, obj.animation_data.action_slot
+    unlink(obj)
+    world()
+    obj.animation_data.action, obj.animation_data.action_slot = action, slot
+    assert np.abs(world() - seen).max() < 1e-5
+
+
+# -- set in the same go -----------------------------------------------------------------------------------------------
+
+
+def test_a_matrix_that_is_set_in_the_same_go_is_where_it_lands(live_file):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    matrix = Matrix.LocRotScale((1.0, 5.0, -2.0), Euler((0.3, 0.2, 0.1)), (1.0, 1.0, 1.0))
+    obj.animation_data_clear()
+    obj.matrix_world = matrix
+    assert np.abs(world() - np.array(matrix)).max() < 1e-5
+
+
+def test_properties_that_are_set_in_the_same_go_are_as_they_were_set(live_file):
+    obj = key(new_object("Tool", "XYZ"))
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = world()
+    obj.animation_data_clear()
+    obj.location = (1.0, 2.0, 3.0)
+    now = world()
+    np.testing.assert_array_equal(obj.location, (1.0, 2.0, 3.0))
+    assert np.abs(now[:3, :3] - seen[:3, :3]).max() < 1e-5
+    obj.location = (0.0, 0.0, 0.0)
+    np.testing.assert_array_equal(world()[:3, 3], (0.0, 0.0, 0.0))
+
+
+def test_a_bone_that_is_reset_in_the_same_go_is_at_rest(live_file):
+    rig = key_all(new_rig())
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    placed(rig)
+    rig.animation_data_clear()
+    for bone in rig.pose.bones:
+        bone.matrix_basis = Matrix.Identity(4)
+    now = placed(rig)
+    assert np.abs(now - np.array([bone.bone.matrix_local for bone in rig.pose.bones])).max() < 1e-6
+
+
+def test_where_edits_are_followed_later_it_is_left_as_it_is_seen_then(live_file):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "dq_sclerp")
+    live_file.scene.frame_set(BETWEEN)
+    seen = world()
+    animation.set_enabled(False)
+    unlink(obj)
+    assert np.abs(world() - seen).max() < 1e-6
+    animation.set_enabled(True)
+    animation.refresh()
+    assert np.abs(world() - seen).max() < 1e-5
+    assert not any(obj.rigid_motion.filled)
+    assert not len(curves_of(obj))

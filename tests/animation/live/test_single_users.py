@@ -1,0 +1,71 @@
+"""Actions that *Make Single User* has made: their edits are followed as those of all others."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import set_mode
+from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.oracle import curves_of, expected_bases
+from tests.animation.scenes import FRAMES, key, new_object
+
+BETWEEN = 15
+
+
+def make_single_user(obj: bpy.types.Object) -> None:
+    """As *Object > Relations > Make Single User > Object Animation* does."""
+    shared = obj.animation_data.action
+    select_only(obj)
+    bpy.ops.object.make_single_user(
+        type="SELECTED_OBJECTS", animation=True, obdata_animation=False, object=False, obdata=False
+    )
+    assert obj.animation_data.action not in (shared, None)
+
+
+def copy_of(obj: bpy.types.Object) -> bpy.types.Object:
+    copy = obj.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    bpy.context.view_layer.update()
+    return copy
+
+
+def raise_keys(carrier: bpy.types.Object | bpy.types.PoseBone) -> None:
+    """As a script does that edits keys where they are."""
+    for index in range(3):
+        curves_of(carrier)["location", index].keyframe_points[1].co.y += 1.5
+
+
+@pytest.mark.parametrize("to", ["this frame", "another frame"])
+def test_keys_that_a_script_sets_are_followed(live_file, to):
+    obj = key(new_object("Tool"), FRAMES)
+    set_mode(obj, "dq_sclerp")
+    single = copy_of(obj)
+    live_file.scene.frame_set(BETWEEN)
+    make_single_user(single)
+    raise_keys(single)
+    live_file.view_layer.update()
+    if to == "another frame":
+        live_file.scene.frame_set(BETWEEN + 1)
+    frame = live_file.scene.frame_current
+    for one in (obj, single):
+        shown = np.array(one.evaluated_get(live_file.evaluated_depsgraph_get()).matrix_world)
+        assert np.abs(shown - expected_bases(one, [float(frame)])[0]).max() < 2e-5
+    assert np.abs(expected_bases(single, [float(frame)]) - expected_bases(obj, [float(frame)])).max() > 0.5
+
+
+def test_keys_of_a_rig_that_a_script_sets_are_followed(live_file):
+    rig = key_all(new_rig(), FRAMES)
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    single = copy_of(rig)
+    live_file.scene.frame_set(BETWEEN)
+    make_single_user(single)
+    raise_keys(single.pose.bones["Body"])
+    live_file.view_layer.update()
+    bone = single.evaluated_get(live_file.evaluated_depsgraph_get()).pose.bones["Body"]
+    wanted = (
+        np.array(single.data.bones["Body"].matrix_local)
+        @ expected_bases(single.pose.bones["Body"], [float(BETWEEN)])[0]
+    )
+    assert np.abs(np.array(bone.matrix) - wanted).max() < 5e-5

@@ -1,0 +1,154 @@
+"""Blender's own *Bake Action*, with its defaults and without: the motion that was seen is what it keys."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import set_mode
+from tests.animation.bones.poses import shown_poses
+from tests.animation.bones.rig_editing import own_constraints
+from tests.animation.bones.rigs import key_all, new_rig, select_only
+from tests.animation.oracle import curves_of, shown_worlds
+from tests.animation.scenes import give_own_deltas, key, new_object, push_down, tweak
+
+PLAYED = np.arange(1.0, 41.0)
+ORDERS = ("QUATERNION", "XYZ")
+CASES = [("QUATERNION", False), ("QUATERNION", True), ("XYZ", False)]
+"""How an object turns, and whether it has delta transforms: Blender itself bakes those of Euler angles wrongly."""
+
+ELSEWHERE = 15
+"""A frame between two keys, which is shown while all is baked."""
+
+DEFAULTS: dict[str, object] = {"frame_start": 1, "frame_end": 40}
+"""What an animator sees who presses the button: Blender fills in the frames, and Pose Mode the type."""
+
+
+def moving(order: str = "QUATERNION", *, own: bool = False) -> bpy.types.Object:
+    obj = new_object("Tool", order)
+    if own:
+        give_own_deltas(obj)
+    key(obj, scale="even")
+    set_mode(obj, "cga_lerp")
+    return obj
+
+
+def bake_object(obj: bpy.types.Object, **settings: object) -> None:
+    select_only(obj)
+    bpy.context.scene.frame_set(ELSEWHERE)
+    assert bpy.ops.nla.bake(**DEFAULTS | {"bake_types": {"OBJECT"}} | settings) == {"FINISHED"}
+
+
+def assert_as_before(obj: bpy.types.Object, before: np.ndarray, frames: np.ndarray = PLAYED) -> None:
+    # Without a frame change first: what is on the screen now.
+    bpy.context.view_layer.update()
+    now = np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    assert np.abs(now - shown_worlds([obj], [float(ELSEWHERE)])[0][0]).max() < 1e-5
+    error = np.abs(shown_worlds([obj], frames)[0] - before).max()
+    assert error < 1e-5 * max(1.0, np.abs(before).max()), f"off by {error}"
+
+
+@pytest.mark.parametrize("settings", [{}, {"use_current_action": True}, {"visual_keying": True}], ids=str)
+@pytest.mark.parametrize(("order", "own"), CASES)
+def test_a_baked_object_moves_as_before(live_file, order, own, settings):
+    obj = moving(order, own=own)
+    before = shown_worlds([obj], PLAYED)[0]
+    bake_object(obj, **settings)
+    assert_as_before(obj, before)
+
+
+@pytest.mark.parametrize(("order", "own"), CASES)
+def test_an_object_baked_above_its_strip_moves_as_before(live_file, order, own):
+    obj = moving(order, own=own)
+    push_down(obj, 1)
+    before = shown_worlds([obj], PLAYED)[0]
+    bake_object(obj)
+    assert len(obj.animation_data.nla_tracks) == 1
+    assert_as_before(obj, before)
+
+
+def test_an_object_baked_in_a_strip_that_is_edited_moves_as_before(live_file):
+    obj = moving()
+    tweak(obj, push_down(obj, 1))
+    before = shown_worlds([obj], PLAYED)[0]
+    bake_object(obj, use_current_action=True)
+    obj.animation_data.use_tweak_mode = False
+    assert_as_before(obj, before)
+
+
+def test_a_bake_with_a_step_has_the_poses_that_were_seen(live_file):
+    obj = moving()
+    frames = np.arange(1.0, 41.0, 3.0)
+    before = shown_worlds([obj], frames)[0]
+    bake_object(obj, step=3)
+    assert [key.co.x for key in curves_of(obj)["location", 0].keyframe_points] == frames.tolist()
+    assert np.abs(shown_worlds([obj], frames)[0] - before).max() < 1e-5
+
+
+# -- bones ------------------------------------------------------------------------------------------------------------
+
+
+def moving_rig(order: str = "QUATERNION") -> bpy.types.Object:
+    rig = key_all(new_rig(rotation_mode=order))
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    return rig
+
+
+def bake_rig(rig: bpy.types.Object, *selected: str, **settings: object) -> None:
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="POSE")
+    for bone in rig.pose.bones:
+        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in selected or not selected
+    bpy.context.scene.frame_set(ELSEWHERE)
+    assert bpy.ops.nla.bake(**DEFAULTS | {"bake_types": {"POSE"}} | settings) == {"FINISHED"}
+
+
+def assert_posed_as_before(rig: bpy.types.Object, before: dict[str, np.ndarray], *bones: str) -> None:
+    after = shown_poses([rig], PLAYED)[0]
+    for bone in bones or before:
+        error = np.abs(after[bone] - before[bone]).max()
+        assert error < 2e-5, f"{bone} is off by {error}"
+
+
+@pytest.mark.parametrize("settings", [{}, {"use_current_action": True}, {"visual_keying": True}], ids=str)
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_baked_rig_moves_as_before(live_file, order, settings):
+    rig = moving_rig(order)
+    before = shown_poses([rig], PLAYED)[0]
+    bake_rig(rig, **settings)
+    assert_posed_as_before(rig, before)
+    if not settings:
+        assert not any(own_constraints(bone) for bone in rig.pose.bones)
+
+
+def test_a_rig_baked_above_its_strip_moves_as_before(live_file):
+    rig = moving_rig()
+    push_down(rig, 1)
+    before = shown_poses([rig], PLAYED)[0]
+    bake_rig(rig)
+    assert_posed_as_before(rig, before)
+
+
+def test_of_a_rig_the_selected_bones_are_baked(live_file):
+    rig = moving_rig()
+    before = shown_poses([rig], PLAYED)[0]
+    bake_rig(rig, "Body", use_current_action=True)
+    assert len(curves_of(rig.pose.bones["Body"])["location", 0].keyframe_points) == 40
+    assert len(curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points) == 4
+    assert_posed_as_before(rig, before)
+
+
+def test_undone_a_bake_leaves_all_as_it_was(live_file):
+    rig = moving_rig()
+    before = shown_poses([rig], PLAYED)[0]
+    bpy.ops.ed.undo_push(message="Begin")
+    bake_rig(rig)
+    assert len(curves_of(rig.pose.bones["Body"])["location", 0].keyframe_points) == 40
+    bpy.ops.ed.undo_push(message="Bake")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.ed.undo()
+    rig = bpy.data.objects["Rig"]
+    assert len(curves_of(rig.pose.bones["Body"])["location", 0].keyframe_points) == 4
+    assert_posed_as_before(rig, before)
+    assert all(own_constraints(bone) for bone in rig.pose.bones)

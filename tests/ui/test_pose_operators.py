@@ -1,0 +1,143 @@
+"""Copies and assets of poses on an in-between: what is seen is what they have."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.animation.live.follower import show_seen_in_channels
+from rigid_motion.animation.queries.visible_pose import shown_components
+from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.rigs import Rest, key_all, new_rig, select_only
+from tests.animation.oracle import rotation_path
+
+BETWEEN, OTHER = 15, 33
+SIDES = [Rest(f"Hand.{side}", (x, 0.0, 1.0), (2 * x, 0.1, 1.2)) for side, x in (("L", 0.3), ("R", -0.3))]
+FLIP = np.diag((-1.0, 1.0, 1.0, 1.0))
+"""The mirror that bones have their other side in."""
+
+
+@pytest.fixture(params=["QUATERNION", "XYZ"])
+def rig(request, extension) -> bpy.types.Object:
+    """A rig with a hand on each side and modes on both, on an in-between of the left one, which is selected."""
+    rig = key_all(new_rig("Rig", SIDES, request.param))
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    select_only(rig)
+    bpy.ops.object.mode_set(mode="POSE")
+    choose(rig, "Hand.L")
+    extension.scene.frame_set(BETWEEN)
+    return rig
+
+
+def choose(rig: bpy.types.Object, *names: str) -> None:
+    for bone in rig.pose.bones:
+        (bone if bpy.app.version >= (5, 0) else bone.bone).select = bone.name in names
+    rig.data.bones.active = rig.data.bones[names[0]]
+
+
+def seen(rig: bpy.types.Object, name: str = "Hand.L") -> np.ndarray:
+    bpy.context.view_layer.update()
+    return np.array(rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[name].matrix)
+
+
+def key_pose(rig: bpy.types.Object, name: str = "Hand.L") -> None:
+    bone = rig.pose.bones[name]
+    for path in ("location", rotation_path(bone)):
+        bone.keyframe_insert(path)
+
+
+def test_a_copied_pose_is_pasted_as_it_was_seen(rig, extension):
+    copied = seen(rig)
+    assert bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert np.abs(seen(rig) - copied).max() < 1e-5
+    extension.scene.frame_set(OTHER)
+    assert np.abs(seen(rig) - copied).max() > 0.1
+    bpy.ops.pose.paste("EXEC_DEFAULT", True)
+    assert np.abs(seen(rig) - copied).max() < 2e-5
+    key_pose(rig)
+    assert OTHER in key_frames(rig.pose.bones["Hand.L"])
+    assert np.abs(seen(rig) - copied).max() < 2e-5
+    extension.scene.frame_set(BETWEEN)
+    assert BETWEEN not in key_frames(rig.pose.bones["Hand.L"])
+
+
+def test_a_copied_pose_is_pasted_flipped_as_it_was_seen(rig, extension):
+    copied = seen(rig)
+    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
+    extension.scene.frame_set(OTHER)
+    bpy.ops.pose.paste("EXEC_DEFAULT", True, flipped=True)
+    flipped = FLIP @ copied @ FLIP
+    assert np.abs(seen(rig, "Hand.R") - flipped).max() < 2e-5
+    key_pose(rig, "Hand.R")
+    assert np.abs(seen(rig, "Hand.R") - flipped).max() < 2e-5
+
+
+def test_a_key_inserted_after_a_copy_has_what_is_seen(rig):
+    copied = seen(rig)
+    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
+    key_pose(rig)
+    assert np.abs(seen(rig) - copied).max() < 2e-5
+
+
+def test_the_channels_have_what_is_seen_until_the_frame_changes(rig, extension):
+    bone = transform_of(rig.pose.bones["Hand.L"])
+    before, shown = bone.components(), shown_components(bone)
+    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
+    assert np.abs(bone.components() - shown).max() < 1e-6
+    assert np.abs(shown_components(bone) - shown).max() < 1e-5
+    extension.scene.frame_set(OTHER)
+    extension.scene.frame_set(BETWEEN)
+    assert np.abs(bone.components() - before).max() < 1e-6
+    assert np.abs(shown_components(bone) - shown).max() < 1e-6
+
+
+def test_an_asset_has_the_pose_that_was_seen(rig, extension):
+    wanted = seen(rig)
+    made = set(bpy.data.actions)
+    # What the operator does, whose dialog asks for a name and a library.
+    show_seen_in_channels([transform_of(rig.pose.bones["Hand.L"])])
+    settings = {"pose_name": "Reach", "asset_library_reference": "LOCAL"}
+    assert bpy.ops.poselib.create_pose_asset("EXEC_DEFAULT", True, **settings) == {"FINISHED"}
+    (asset,) = set(bpy.data.actions) - made
+    assert asset.asset_data is not None
+    assert np.abs(seen(rig) - wanted).max() < 1e-5
+    extension.scene.frame_set(OTHER)
+    rig.pose.apply_pose_from_action(asset)
+    assert np.abs(seen(rig) - wanted).max() < 2e-5
+
+
+@pytest.mark.parametrize("name", ["copy_pose", "create_pose_asset"])
+def test_on_a_key_and_without_a_mode_blender_s_own_operator_acts(rig, extension, name):
+    operator = getattr(bpy.ops.rigid_motion, name)
+    assert operator.poll()
+    extension.scene.frame_set(24)
+    assert not operator.poll()
+    extension.scene.frame_set(BETWEEN)
+    set_mode(rig.pose.bones["Hand.L"], "BLENDER")
+    extension.view_layer.update()
+    assert not operator.poll()
+    choose(rig, "Hand.R")
+    assert operator.poll()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert not operator.poll()
+
+
+@pytest.mark.parametrize("then", ["the frame changes", "it is keyed"])
+def test_a_channel_without_keys_has_its_value_back(rig, extension, then):
+    bone = rig.pose.bones["Hand.L"]
+    channelbag = rig.animation_data.action.layers[0].strips[0].channelbag(rig.animation_data.action_slot)
+    channelbag.fcurves.remove(channelbag.fcurves.find('pose.bones["Hand.L"].location', index=1))
+    bone.location.y = 0.25
+    extension.scene.frame_set(BETWEEN + 1)
+    extension.scene.frame_set(BETWEEN)
+    bpy.ops.rigid_motion.copy_pose("EXEC_DEFAULT", True)
+    assert abs(bone.location.y - 0.25) > 1e-3
+    extension.view_layer.update()
+    if then == "it is keyed":
+        bone.keyframe_insert("location", index=0)
+        extension.view_layer.update()
+    else:
+        extension.scene.frame_set(OTHER)
+    assert bone.location.y == 0.25
