@@ -6,6 +6,8 @@ source_cache  the sources of earlier edits, and what has changed since
 bodies        channels as poses of a body
 key_speeds    how fast a smooth motion with handles passes its keys
 neighbours    the keys beside a segment, for modes that look at them
+samples       which differences vary from frame to frame
+breakdowns    keys that lie on a path instead of shaping it
 differences   from sources to differences
 
 Each module imports only those above it.

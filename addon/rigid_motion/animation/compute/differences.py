@@ -24,9 +24,11 @@ from ...motion.quaternions import multiply
 from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
-from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
+from .breakdowns import Passages, moved_by
+from .components import LOCATION, REST, ROTATION, ROWS, SCALE
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
-from .neighbours import meeting, with_neighbours
+from .neighbours import meeting, packed, with_neighbours
+from .samples import NOTHING, align, held_rows, range_of_each
 from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
 
 AT_ONCE = 131072
@@ -34,10 +36,6 @@ AT_ONCE = 131072
 
 BLOCK = 24576
 """Samples worked on at once: few enough for the processor's caches."""
-
-NOTHING = 1e-9
-"""What a component varies by that is always the same but for rounding errors."""
-
 
 SMOOTH = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
 """The numbers of modes for which the keys around a segment count."""
@@ -84,7 +82,7 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     native, delta = np.empty((2, _height([source]), len(frames)))
     delta = delta[: _filled_height([source])]
     if len(source.key_frames) > 1:
-        _move([source], [frames], native, delta, None if mode is None else MODE_NUMBERS[mode])
+        _move([source if mode is None else replace(source, mode=MODE_NUMBERS[mode])], [frames], native, delta)
     else:
         # Without a segment there is nothing to fill in.
         _sampled([(source, slice(len(frames)))], [frames], out=native)
@@ -100,6 +98,12 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
         )
 
     return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
+
+
+def progress_at(source: Source, frames: np.ndarray) -> np.ndarray:
+    """How far along its segment of the path, from 0 to 1, a source has come on rising frames (m,)."""
+    native, delta = np.empty((2, _height([source]), len(frames)))
+    return _move([source], [frames], native, delta[: _filled_height([source])])
 
 
 def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | None = None) -> list[Samples]:
@@ -130,56 +134,17 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
         else:
-            _align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
+            align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]
-        first, differs = delta[:, starts], _range_of_each(delta, starts) > NOTHING
+        first, differs = delta[:, starts], range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
         for number, (source, place) in enumerate(samples):
             changing = {row for row in source.filled_rows if differs[row, number] or ranges is not None}
-            held = _held_rows(source, changing, first[:, number])
+            held = held_rows(source, changing, first[:, number])
             found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
     return [found[id(source)] for source in sources]
-
-
-def _align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
-    """Take quaternions (4, m) with that sign in which they are nearer to the one before, from each of the starts on.
-
-    On a key the difference is the same rotation as between keys, but where the channels have gone the long way round
-    not the same quaternion: straight from one to the other it would pass zero.
-    """
-    turned = np.einsum("km,km->m", quaternions[:, 1:], quaternions[:, :-1]) < 0.0
-    turned[[start - 1 for start in starts if start]] = False
-    if turned.any():
-        flips = np.concatenate(((0,), np.cumsum(turned)))
-        lengths = np.diff((*starts, quaternions.shape[1]))
-        odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
-        np.negative(quaternions, out=quaternions, where=odd)
-
-
-def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:
-    """The rows that never change, and have to be held all the same, of what is constant (.,) in them.
-
-    The components of a quaternion are one by one only where they are zero. In the NLA Blender puts what a strip has no
-    channel of to its default.
-    """
-    turning = source.order is None and any(PART_OF[row] == ROTATION for row in changing)
-    default = REST if source.order is None else np.where((REST == 1.0) & (np.arange(10) == 3), 0.0, REST)
-    return {
-        row
-        for row in source.filled_rows
-        if row not in changing
-        and (
-            (turning and PART_OF[row] == ROTATION and abs(constant[row]) > NOTHING)
-            or (source.in_nla and abs(constant[row] - default[row]) > NOTHING)
-        )
-    }
-
-
-def _range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
-    """By how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
-    return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)
 
 
 def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -> Iterator[list[Source]]:
@@ -206,30 +171,67 @@ def _each(sources: Sequence[Source], counts: Iterator[int]) -> list[tuple[Source
     return [(source, slice(*place)) for source, place in zip(sources, itertools.pairwise(bounds), strict=True)]
 
 
-def _move(
-    sources: Sequence[Source],
-    frames: Sequence[np.ndarray],
-    native: np.ndarray,
-    delta: np.ndarray,
-    mode: int | None = None,
-) -> None:
+def _move(sources: Sequence[Source], frames: Sequence[np.ndarray], native: np.ndarray, delta: np.ndarray) -> np.ndarray:
     """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
     `native` is of `_height`, `delta` of `_filled_height`. They may be in the same place: then the deltas are there.
+    Returns how far along its segment of the path each of the samples has come.
     """
     order = sources[0].order
     samples = _each(sources, map(len, frames))
-    segments = _each(sources, (len(source.key_frames) - 1 for source in sources))
     timing = _sampled(samples, frames, out=native)
-    start, end = bounds = _ends(segments)
     if any(source.is_elastic for source in sources):
         timing = _sampled(samples, frames, unit_elastic=True)
-        bounds = _ends(segments, unit_elastic=True)
-    weights, offsets = _weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
-    modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
     original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
+    modes, ends, lacks, (weights, offsets) = _prepared([source.path for source in sources])
+    on_paths, passages, along = counts, None, np.empty(timing.shape[1])
+    if any(source.passed.any() for source in sources):
+        passages, (weights, offsets) = _passages(sources, modes, ends)
+        on_paths = np.add.reduceat(counts, passages.first[:-1])
+        if lacks is not None:
+            lacks[:, np.diff(passages.first) > 1] = 0.0
+
+    every_frame = np.concatenate(frames)
+    for some, place in blocks(np.concatenate(((0,), np.cumsum(on_paths))), BLOCK):
+        parts = some if passages is None else slice(*passages.first[[some.start, some.stop]])
+        progress = np.empty((1, place.stop - place.start))
+        combine(weights[None, :, parts], timing[:, place], counts[parts], progress)
+        progress = progress[0] - offsets[parts].repeat(counts[parts])
+        turn_into_quaternions(native[:, place], order)
+        default = original[:, ends.owners[some]]
+        if lacks is not None:
+            first, last = (rows.repeat(on_paths[some]) for rows in ends.times[some].T)
+            elapsed = (every_frame[place] - first) / np.where(last > first, last - first, np.inf)
+            progress = corrected(progress, elapsed, lacks[:, some].repeat(on_paths[some], axis=1))
+        off = None
+        if passages is not None:
+            progress, off = passages.along(parts, counts[parts], progress)
+        along[place] = progress
+        _fill(delta[:, place], native[:, place], default, modes[some], ends, some, on_paths[some], progress, off)
+    # A key is the animator's: nothing is added to it, not even a rounding error.
+    delta[:, on_keys] = original[:, owners]
+    for number, (source, place) in enumerate(samples):
+        if source.cyclic is not None:
+            before, after = source.used_up
+            outside = (frames[number] < before) | (frames[number] > after)
+            delta[:, place][:, outside] = original[:, number, None]
+    return along
+
+
+def _segments(sources: Sequence[Source]) -> list[tuple[Source, slice]]:
+    return _each(sources, (len(source.key_frames) - 1 for source in sources))
+
+
+def _prepared(sources: Sequence[Source]) -> tuple[np.ndarray, _Ends, np.ndarray | None, tuple[np.ndarray, np.ndarray]]:
+    """Return modes and ends of all segments, what their progress lacks at both ends, and `_weights`."""
+    segments = _segments(sources)
+    start, end = bounds = _ends(segments)
+    if any(source.is_elastic for source in sources):
+        bounds = _ends(segments, unit_elastic=True)
+    weights, offsets = _weights(*bounds, sources[0].order)
+    modes = np.concatenate([source.modes for source in sources])
     smooth = np.isin(modes, SMOOTH)
     ends, lacks = _Ends.of(start, end, segments, smooth), None
     has_handles = smooth & np.concatenate([source.has_handles for source in sources])
@@ -239,26 +241,30 @@ def _move(
         tangents, lacks = ends.at_keys(progress, measured, sources[0])
         ends = replace(ends, tangents=np.where(has_handles, tangents, 1.0))
         lacks = np.where(has_handles, lacks, 0.0)
+    return modes, ends, lacks, (weights, offsets)
 
-    every_frame = np.concatenate(frames)
-    for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
-        progress = np.empty((1, place.stop - place.start))
-        combine(weights[None, :, some], timing[:, place], counts[some], progress)
-        progress = progress[0] - offsets[some].repeat(counts[some])
-        turn_into_quaternions(native[:, place], order)
-        default = original[:, ends.owners[some]]
-        if lacks is not None:
-            first, last = (rows.repeat(counts[some]) for rows in ends.times[some].T)
-            elapsed = (every_frame[place] - first) / np.where(last > first, last - first, np.inf)
-            progress = corrected(progress, elapsed, lacks[:, some].repeat(counts[some], axis=1))
-        _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
-    # A key is the animator's: nothing is added to it, not even a rounding error.
-    delta[:, on_keys] = original[:, owners]
-    for number, (source, place) in enumerate(samples):
-        if source.cyclic is not None:
-            before, after = source.used_up
-            outside = (frames[number] < before) | (frames[number] > after)
-            delta[:, place][:, outside] = original[:, number, None]
+
+def _passages(
+    sources: Sequence[Source], modes: np.ndarray, ends: _Ends
+) -> tuple[Passages, tuple[np.ndarray, np.ndarray]]:
+    """Return how keys lie on paths, whose segments have these modes and ends, and the `_weights` from key to key."""
+    segments = _segments(sources)
+    bounds = _ends(segments)
+    passed = np.concatenate([source.passed[:-1] for source in sources])
+    keys = _Ends.of(*bounds, segments, np.zeros(len(passed), dtype=bool)).keys
+
+    def poses_at(counts: np.ndarray, progress: np.ndarray) -> Poses:
+        rows = np.empty((len(progress), 7 if keys.scales is None else 8))
+        for mode in np.unique(modes[counts > 0]):
+            chosen = modes == mode
+            some = np.repeat(chosen, counts)
+            poses = ends.on_paths(slice(0, len(modes)), np.where(chosen, counts, 0), progress[some], MODE_NAMES[mode])
+            rows[some] = packed(poses)
+        return Poses(rows[:, :3], rows[:, 3:7], None if keys.scales is None else rows[:, 7])
+
+    if any(source.is_elastic for source in sources):
+        bounds = _ends(segments, unit_elastic=True)
+    return Passages.of(passed, keys, poses_at, np.isin(modes, SMOOTH)), _weights(*bounds, sources[0].order)
 
 
 def _fill(
@@ -270,8 +276,12 @@ def _fill(
     segment: slice,
     counts: np.ndarray,
     progress: np.ndarray,
+    off: Poses | None,
 ) -> None:
-    """Fill in the deltas (., m) of some segments, each with its own modes and deltas, (s,) and (., s)."""
+    """Fill in the deltas (., m) of some segments, each with its own modes and deltas, (s,) and (., s).
+
+    `off` is how far off their paths samples (m,) are.
+    """
     for mode in np.unique(modes[counts > 0]):
         chosen = modes == mode
         every = bool(chosen.all())
@@ -280,7 +290,7 @@ def _fill(
         if not mode:
             delta[:, some] = own.repeat(here, axis=1)
             continue
-        wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode])
+        wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode], None if off is None else off[some])
         part = delta if every else np.empty((len(delta), int(here.sum())))
         differ(wanted, native[:, some], part)
         if wanted.scales is not None:
@@ -342,20 +352,25 @@ class _Ends:
         native = native_twists(self.keys, body_poses(measured, self.own[..., None], self.axes, source))
         return tangents_and_lacks(progress_slopes(progress), native, screws, self.times, self.pairs)
 
-    def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
+    def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str, off: Poses | None) -> Poses:
         """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
 
-        Positions run along the axes that location does.
+        They are so far off the path. Positions run along the axes that location does.
         """
         axes = None if self.axes is None else self.axes[some].repeat(counts, axis=0)
+        poses = self.on_paths(some, counts, progress, mode)
+        poses = poses if off is None else moved_by(poses, off)
+        return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
+
+    def on_paths(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
+        """The same along the body's own axes at rest, and on the path."""
         if mode not in self.prepared:
             self.prepared[mode] = self._prepare(mode)
         if KEYFRAME_MODES[mode].is_smooth:
             # Of the three segments between four keys the one in the middle.
             some = slice(3 * some.start, 3 * some.stop)
             counts = np.multiply.outer(counts, (0, 1, 0)).ravel()
-        poses = self.prepared[mode](counts, progress, some)
-        return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
+        return self.prepared[mode](counts, progress, some)
 
     def _prepare(self, mode: str) -> Callable[..., Poses]:
         if not KEYFRAME_MODES[mode].is_smooth:

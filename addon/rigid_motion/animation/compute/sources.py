@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,9 @@ MODE_IDS = tuple(MODE_NUMBERS)
 
 MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
 """From the number of a mode to its name."""
+
+DEPENDS_ON_KEYS = [MODE_NUMBERS[name] for name in ("pga_lerp", "cga_lerp", "motor_spline")]
+"""The modes whose path would be another one with a key more on it."""
 
 UNKNOWN = -1
 """The mode of something from a file that is damaged, or of a later version."""
@@ -197,6 +200,29 @@ class Source:
         """Return the number of the mode on a frame, on that of the original where cycles repeat it."""
         frames = np.array([frame])
         return int(self.modes_at(frames if self.cyclic is None else cycled(self.cyclic, frames)[0])[0])
+
+    @cached_property
+    def passed(self) -> np.ndarray:
+        """Which keys lie on the path between the keys around them instead of shaping it, shape (n,).
+
+        Breakdowns in all channels, that is, between others with the same mode, where a path depends on its keys.
+        """
+        passed = np.zeros(len(self.key_frames), dtype=bool)
+        if self.cyclic is None and all(keys.breakdowns is not None for keys in self.curves):
+            modes = self.modes
+            passed[1:-1] = np.isin(modes[1:], DEPENDS_ON_KEYS) & (modes[1:] == modes[:-1])
+            for keys in self.curves:
+                passed &= np.isin(self.key_frames, keys.times[keys.breakdowns])
+        return passed
+
+    @cached_property
+    def path(self) -> Source:
+        """The same without the keys that are `passed`."""
+        if not self.passed.any():
+            return self
+        frames = self.key_frames[self.passed]
+        channels = tuple((rows, keys.without(np.isin(keys.times, frames))) for rows, keys in self.channels)
+        return replace(self, channels=channels)
 
     @property
     def is_live(self) -> bool:

@@ -6,7 +6,7 @@ Frames and values are Blender's, in its single precision.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -86,6 +86,9 @@ class Keys:
 
     cycles: Cycles | None = None
 
+    breakdowns: np.ndarray | None = None
+    """Which of the keys are of type *Breakdown*, shape (n,), where any is."""
+
     is_sound: bool = True
     """Whether all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
 
@@ -106,12 +109,38 @@ class Keys:
             for array in (self.points, self.interpolation, self.left, self.right, self.easing)
         )
         settings = None if self.easing_settings is None else self.easing_settings[:, channels]
-        return Keys(points, interpolation, left, right, easing, settings, self.linear, self.cycles, self.is_sound)
+        return replace(
+            self,
+            points=points,
+            interpolation=interpolation,
+            left=left,
+            right=right,
+            easing=easing,
+            easing_settings=settings,
+        )
+
+    def without(self, keys: np.ndarray) -> Keys:
+        """The same channels without some of their keys, which are marked in an array (n,)."""
+
+        def kept(array: np.ndarray | None, axis: int = 1) -> np.ndarray | None:
+            return None if array is None else np.compress(~keys, array, axis=axis)
+
+        return replace(
+            self,
+            points=kept(self.points),
+            interpolation=kept(self.interpolation),
+            left=kept(self.left),
+            right=kept(self.right),
+            easing=kept(self.easing),
+            easing_settings=kept(self.easing_settings, 2),
+            breakdowns=kept(self.breakdowns, 0),
+        )
 
     @property
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""
         arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
+        arrays += (self.breakdowns,)
         present = [array for array in arrays if array is not None]
         header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles};"
         return b"".join((header.encode(), *(array.tobytes() for array in present)))

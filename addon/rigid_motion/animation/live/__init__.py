@@ -4,6 +4,7 @@ depsgraphs       which data-blocks were edited, by Blender's dependency graphs
 modes_in_use     which objects have to do with modes
 raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
+kept_timing      handles with which the motion goes on beside a key inserted in between
 inserted_keys    a key inserted in between keeps the pose on the screen
 dense_keys       keys inserted all along keep the motion
 separated_slots  what Separate Slots does to rigs

@@ -16,7 +16,8 @@ which of the two its value is:
   it is; so does a pose that is set on a bone (`matrix = M`), which knows nothing of constraints.
 - A pose from elsewhere was put on a bone (*Paste Pose*, a pose asset): it is meant as it is, and so keyed later, too.
 
-Where a key gets a pose, so do all keyed channels of the transform.
+Where a key gets a pose, so do all keyed channels of the transform. And where it is of the motion as it was, that goes
+on as it did: see `kept_timing`.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from ..compute.sources import SAME_FRAME, Source
 from ..queries.visible_pose import visible_components
 from ..transforms import Channel, Transform
 from ..writers.table import writer_of
+from .kept_timing import keep_timing, mark_breakdown
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -65,9 +67,9 @@ class InsertedKeys:
 
     def __init__(self) -> None:
         self._posed: dict[tuple[int, str], _Posed] = {}
-        self._inserted: OrderedDict[tuple[str, str], np.ndarray] = OrderedDict()
-        """What undo and redo bring back is decided as it was: the components on the screen, by the digests before and
-        after."""
+        self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool]] = OrderedDict()
+        """What undo and redo bring back is decided as it was: the components on the screen, and whether they were the
+        in-between as it was, by the digests before and after."""
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
@@ -149,17 +151,23 @@ class InsertedKeys:
         if not _is_inserted(old, source, frame):
             return False
         change = old.digest, source.digest
-        shown = self._inserted.get(change) if again else None
+        shown, is_in_between = self._inserted.get(change, (None, False)) if again else (None, False)
         if shown is None:
-            shown = old.values_at(np.array([frame]))[:, 0] if posed is None else posed.components
+            in_between = old.values_at(np.array([frame]))[:, 0]
+            shown = in_between if posed is None else posed.components
             if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
                 return False
-            self._inserted[change] = shown
+            is_in_between = _has_values(source, frame, in_between)
+            self._inserted[change] = shown, is_in_between
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
         for channel, value in _visible_values(user, place, old, shown, frame).items():
             if (fcurve := place.curves.get(channel)) is not None:
                 _set_key(fcurve, frame, value)
+        if is_in_between and old.keyed_range[0] < frame < old.keyed_range[1]:
+            curves = {row: place.curves[channel] for row, channel in user.channels.items() if channel in place.curves}
+            mark_breakdown(curves.values(), old, frame)
+            keep_timing(curves, old, frame)
         return True
 
 
