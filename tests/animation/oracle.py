@@ -18,6 +18,7 @@ from mathutils import Euler, Quaternion
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, normalise, rotate
+from tests.animation.path_oracle import beside_path, lies_on_path
 
 Carrier = bpy.types.Object | bpy.types.PoseBone
 """What has location, rotation and scale. Pose bones have no delta transforms of their own."""
@@ -156,18 +157,43 @@ def _components(
         if mode == "BLENDER" or not inside.any():
             continue
         share = progress(obj, first, last, frames[inside])
-        if mode in SMOOTH:
-            elapsed = np.clip((frames[inside] - first) / (last - first), 0.0, 1.0)
-            leaving, arriving = _passings(obj, keys, first, own)
-            share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
-            poses = _smooth(obj, keys, first, share, mode, own, scaled, (leaving[0], arriving[0]))
+        path = Path(obj, keys, first, mode, own, scaled)
+        if (path.first, path.last) != (first, last):
+            poses = beside_path(path, _key_poses(obj, np.array((first, last)), own, scaled), share)
         else:
-            ends = _key_poses(obj, np.array((first, last)), own, scaled)
-            poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
+            poses = path.poses(share, np.clip((frames[inside] - first) / (last - first), 0.0, 1.0))
         location[inside], quaternion[inside] = poses.positions @ _axes(obj), poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
     return location, quaternion, scale
+
+
+class Path:
+    """What a mode makes of the segment between keys that shape it: no breakdowns on the way, where it would matter."""
+
+    def __init__(self, obj: Carrier, keys: np.ndarray, frame: float, mode: str, own: Own, scaled: bool) -> None:
+        self.obj, self.mode, self.own, self.scaled = obj, mode, own, scaled
+        self.keys = np.array([key for number, key in enumerate(keys) if not _is_passed(obj, keys, number)])
+        self.first, self.last = self.keys[self.keys <= frame][-1], self.keys[self.keys > frame][0]
+
+    def poses(self, share: np.ndarray, elapsed: np.ndarray | None = None) -> Poses:
+        """At this progress, which without times is along the path alone."""
+        if self.mode not in SMOOTH:
+            ends = _key_poses(self.obj, np.array((self.first, self.last)), self.own, self.scaled)
+            return interpolate((0.0, 1.0), ends, share, self.mode, extrapolate=True)
+        leaving, arriving = _passings(self.obj, self.keys, self.first, self.own)
+        if elapsed is not None:
+            share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
+        tangents = leaving[0], arriving[0]
+        return _smooth(self.obj, self.keys, self.first, share, self.mode, self.own, self.scaled, tangents)
+
+
+def _is_passed(obj: Carrier, keys: np.ndarray, number: int) -> bool:
+    """Whether a key lies on a path that it does not shape."""
+    before, mode = (mode_at(obj, frame) for frame in keys[[number - 1, number]])
+    curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
+    curves = [curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute]
+    return 0 < number < len(keys) - 1 and before == mode and lies_on_path(curves, keys[number], mode)
 
 
 def _axes(obj: Carrier) -> np.ndarray:

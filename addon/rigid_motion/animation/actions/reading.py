@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
 
 from ..compute.components import PART_OF
-from ..compute.sources import Source
+from ..compute.sources import Source, rows_left_to
 from ..curves import Keys
-from ..transforms import Refused, Transform
+from ..transforms import Channel, Refused, Transform
 from .key_reading import read_keys
 from .records import recorded_digest, recorded_mode
-from .refusals import refuse_channel, refuse_numbers, refuse_what_is_taken
+from .refusals import refuse_channel, refuse_drivers, refuse_numbers, refuse_what_is_taken
 from .slots import SlotTransform
 
 
@@ -70,12 +70,13 @@ def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> li
 def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refused]]:
     """What is keyed in each of the places as each of its users has it."""
     found: list[list[_Keyed | Refused]] = []
-    drivers: dict[bpy.types.ID, dict[str, bpy.types.FCurve]] = {}
+    drivers: dict[bpy.types.ID, set[Channel]] = {}
     for place in places:
         users: list[_Keyed | Refused] = []
         for user in place.users:
             if user.animated not in drivers:
-                drivers[user.animated] = {one.data_path: one for one in user.animated.animation_data.drivers}
+                driving = user.animated.animation_data.drivers
+                drivers[user.animated] = {(one.data_path, one.array_index) for one in driving if not one.mute}
             try:
                 users.append(_keyed_for(user, place, drivers[user.animated]))
             except Refused as problem:
@@ -123,24 +124,31 @@ class _Keyed:
     modes: list[bpy.types.FCurve]
     """The mode channel, if there is one with keys."""
 
+    driven: frozenset[int]
+    """The rows of components that drivers move."""
 
-def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> _Keyed:
+
+def _keyed_for(user: Transform, place: SlotTransform, drivers: Collection[Channel]) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
     refuse_what_is_taken(user, place, drivers)
-    keyed = {}
-    for row, channel in user.channels.items():
+    keyed, channels = {}, user.channels
+    driven = frozenset(row for row, channel in channels.items() if channel in drivers) if drivers else frozenset()
+    left = rows_left_to(driven) if driven else ()
+    for row, channel in channels.items():
         fcurve = place.curves.get(channel)
-        if fcurve is not None and _has_say(user, fcurve):
+        if fcurve is not None and row not in left and _has_say(user, fcurve):
             keyed[row] = fcurve
+    if not keyed:
+        refuse_drivers(user, driven)
     names = frozenset(map(PART_OF.__getitem__, keyed))
     rest = {
-        row: getattr(user.carrier, path.removeprefix(user.prefix))[index]
-        for row, (path, index) in user.channels.items()
+        row: 0.0 if row in driven else getattr(user.carrier, path.removeprefix(user.prefix))[index]
+        for row, (path, index) in channels.items()
         if row not in keyed and PART_OF[row] in names
     }
     mode = place.curves.get(user.mode_channel)
     modes = [mode] if mode is not None and _has_say(user, mode) else []
-    return _Keyed(user, names, keyed, rest, modes)
+    return _Keyed(user, names, keyed, rest, modes, driven)
 
 
 def _source(
@@ -159,6 +167,7 @@ def _source(
         mode=modes[0][1] if modes else recorded_mode(place),
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
+        driven=keyed.driven,
     )
 
 

@@ -218,9 +218,12 @@ def _bake_place(transform: Transform, place: SlotTransform, source: Source, fram
     motion = in_betweens(source, frames)
     copy = move_by_copy(transform, place, BAKED)
     fcurves = copy.channelbag.fcurves
+    driven = {transform.channels[row] for row in source.driven}
     cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
     for path, values in channel_values(transform, source, motion).items():
         for index, column in enumerate(values.T):
+            if (path, index) in driven:
+                continue
             fcurve = copy.curves.get((path, index))
             if fcurve is not None and fcurve.mute:
                 # Its keys have had no say, and what there was in their place is baked.

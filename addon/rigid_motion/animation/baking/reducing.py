@@ -21,6 +21,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
+from ..actions.refusals import refuse_drivers
 from ..actions.slots import places_of, slots_of, transforms_in
 from ..compute.sources import MODE_NAMES, distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
@@ -145,6 +146,8 @@ def reduce_keys_of(
         keyed = [(place, source) for place, source in readable(transform, readings) if source.channels]
         if not keyed:
             raise Refused(_why_nothing_is_keyed(transform, 0))
+        for _, source in keyed:
+            refuse_drivers(transform, source.driven)
         found = of_rigs.get(transform, [])
         if isinstance(found, Refused):
             raise found

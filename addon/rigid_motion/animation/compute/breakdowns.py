@@ -21,11 +21,11 @@ from ...motion.quaternions import multiply, rotate
 GRID = np.linspace(-0.25, 1.25, 49)
 """Progress at which a path is first compared with a key: an easing may pass both ends."""
 
-STEPS = 8
-"""Of the Gauss-Newton method. For a key on the path it doubles the digits with each."""
+STEPS = 14
+"""Of the search from there, for more digits than single precision has."""
 
-DIFFERENCE = 1e-5
-"""The progress that slopes are measured over."""
+DIFFERENCE = 1e-4
+"""The progress on either side that slopes are measured over."""
 
 PosesAt = Callable[[np.ndarray, np.ndarray], Poses]
 """From counts (P,) and progress (m,) to the poses (m,) on paths."""
@@ -108,17 +108,26 @@ def _nearest(keys: Poses, counts: np.ndarray, poses_at: PosesAt) -> tuple[np.nda
         flat = np.arange(len(many)).repeat(each)
         return _between(poses_at(counts * each, progress.ravel()), keys[flat]).reshape(7, -1, each)
 
-    def distances(offs: np.ndarray) -> np.ndarray:
-        return np.einsum("rke,rke->ke", offs, offs)
+    everywhere = off(np.broadcast_to(GRID, (len(many), len(GRID))))
+    squared = np.einsum("rke,rke->ke", everywhere, everywhere)
 
-    start = GRID[np.argmin(distances(off(np.broadcast_to(GRID, (len(many), len(GRID))))), axis=1)]
-    step, found = GRID[1] - GRID[0], start
+    def slopes(progress: np.ndarray) -> np.ndarray:
+        before, here, behind = np.moveaxis(off(progress[:, None] + (-DIFFERENCE, 0.0, DIFFERENCE)), 2, 0)
+        return np.einsum("rk,rk->k", behind - before, here)
+
+    # Where the distance has no slope, by the Illinois method.
+    nearest = GRID[np.argmin(squared, axis=1)]
+    low, high = nearest - (GRID[1] - GRID[0]), nearest + (GRID[1] - GRID[0])
+    at_low, at_high = slopes(low), slopes(high)
+    found = np.where(at_low > 0.0, low, high)
+    crosses = (at_low < 0.0) & (at_high > 0.0)
     for _ in range(STEPS):
-        here, there = np.moveaxis(off(found[:, None] + (0.0, DIFFERENCE)), 2, 0)
-        slopes = (there - here) / DIFFERENCE
-        squared = np.einsum("rk,rk->k", slopes, slopes)
-        newton = -np.einsum("rk,rk->k", slopes, here) / np.where(squared > 0.0, squared, np.inf)
-        found = np.clip(found + newton, start - step, start + step)
+        span = np.where(at_high > at_low, at_high - at_low, 1.0)
+        found = np.where(crosses, (low * at_high - high * at_low) / span, found)
+        here = slopes(found)
+        falls = here < 0.0
+        low, high = np.where(falls, found, low), np.where(falls, high, found)
+        at_low, at_high = np.where(falls, here, 0.5 * at_low), np.where(falls, 0.5 * at_high, here)
     return found, off(found[:, None])[..., 0]
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, cycled, cyclic_times, evaluate
-from .components import PART_OF, REST, ROTATION, ROWS, SCALE
+from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
 """The modes, and what the mode channel and saved files have for each. 0 is Blender's own in-betweens."""
@@ -44,6 +45,12 @@ SAME_FRAME = 0.01
 def distinct(frames: np.ndarray) -> np.ndarray:
     """Rising frames of keys, those that are one key to Blender once."""
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+
+
+def rows_left_to(driven: Collection[int]) -> set[int]:
+    """The rows of components that are left to drivers of these: with one of a rotation or a scale go all of it."""
+    parts = {PART_OF[row] for row in driven} - {LOCATION}
+    return {row for row, part in enumerate(PART_OF) if row in driven or part in parts}
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +84,9 @@ class Source:
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
 
+    driven: frozenset[int] = frozenset()
+    """The rows of components that drivers move: to the others they are still."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -92,6 +102,8 @@ class Source:
             summary.update(self.location_axes.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
         span = self.seen if self.goes_on and not self.repeats else None
+        if self.driven:
+            summary.update(repr(sorted(self.driven)).encode())
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
         return summary.hexdigest()
 
@@ -258,7 +270,8 @@ class Source:
     def filled_rows(self) -> list[int]:
         """The rows of the components that in-betweens may differ in from Blender's."""
         rows = list(range(10) if self.uniform_scale else range(7))
-        return [row for row in rows if PART_OF[row] in self.keyed and not (row == 6 and self.order is not None)]
+        rows = [row for row in rows if PART_OF[row] in self.keyed and not (row == 6 and self.order is not None)]
+        return [row for row in rows if row not in self.driven]
 
     @cached_property
     def uniform_scale(self) -> bool:

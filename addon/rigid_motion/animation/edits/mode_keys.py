@@ -7,6 +7,7 @@ until the next, or else in its record, for all segments. What was chosen before 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -17,6 +18,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
 from ..actions.mode_property import is_keyed, set_pending_mode
+from ..actions.reading import keyed_in
 from ..actions.records import record_mode
 from ..actions.refusals import refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
@@ -52,9 +54,7 @@ def set_mode(
     """
 
     def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
-        if mode != "BLENDER":
-            check(transform, readings)
-        places = [place for place, _ in readings]
+        places = [place for place, _ in readings] if mode == "BLENDER" else able(transform, readings)
         if frames is None:
             return places
         place = active_place(transform, places)
@@ -88,6 +88,9 @@ def on_property(transform: Transform) -> None:
     if not places:
         set_pending_mode(transform, mode)
     follow_renamed(places)
+    if mode != "BLENDER":
+        with suppress(Refused):
+            places = able(transform, list(zip(places, keyed_in(places), strict=True)))
     for place in places:
         if not is_keyed(place):
             record_mode(place, MODE_NUMBERS[mode])
@@ -144,14 +147,27 @@ def _is_among(chosen: np.ndarray, frames: np.ndarray) -> np.ndarray:
     return np.searchsorted(chosen, frames + SAME_FRAME) > np.searchsorted(chosen, frames - SAME_FRAME, side="right")
 
 
-def check(transform: Transform, readings: Readings) -> None:
-    """Raise `Refused` where a transform, which is keyed so, cannot have any mode but Blender's own."""
+def able(transform: Transform, readings: Readings) -> list[SlotTransform]:
+    """Return the places of a transform, which is keyed so, that can have a mode beside Blender's own.
+
+    That is its Action at least, or one of its strips where it has none: else `Refused`. Other strips keep Blender's.
+    """
     transform.rotation  # noqa: B018 - raises where it turns by axis and angle
     refuse_linked(transform)
-    for _, source in readings:
-        if isinstance(source, Refused):
-            raise source
-        refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
+    active, found, refusals = active_place(transform, [place for place, _ in readings]), [], []
+    for place, source in readings:
+        try:
+            if isinstance(source, Refused):
+                raise source
+            refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
+            found.append(place)
+        except Refused as refusal:
+            if place is active:
+                raise
+            refusals.append(refusal)
+    if refusals and not found:
+        raise refusals[0]
+    return found
 
 
 def _new(place: SlotTransform, channel: Channel) -> bpy.types.FCurve:

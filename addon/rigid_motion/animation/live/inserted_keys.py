@@ -32,7 +32,7 @@ import numpy as np
 from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
-from ..compute.sources import SAME_FRAME, Source
+from ..compute.sources import SAME_FRAME, Source, rows_left_to
 from ..queries.visible_pose import visible_components
 from ..transforms import Channel, Transform
 from ..writers.table import writer_of
@@ -202,10 +202,11 @@ def _visible_values(
     user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float
 ) -> dict[Channel, float]:
     """The values of the channels that, with the original difference alone, look as the screen does."""
+    left = rows_left_to(old.driven)
     filled, difference = place.filled, writer_of(place).difference(place, user, frame)
     parts = {PART_OF[row] for row, channel in user.differences.items() if channel in filled}
     seen = visible_components(shown, old.original, difference, old.order, parts)
-    return {channel: seen[row] for row, channel in user.channels.items()}
+    return {channel: seen[row] for row, channel in user.channels.items() if row not in left}
 
 
 def _set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
