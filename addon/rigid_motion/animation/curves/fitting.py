@@ -15,7 +15,7 @@ STEPS = 40
 GOOD = 1e-6
 """The largest error with which nothing better is looked for: a few times the rounding of single precision."""
 
-LEAST_PULL = 1e-7
+LEAST_PULL = 1e-6
 """What a handle counts for at least, relative to the largest, to be moved for the others."""
 
 RIDGE = 1e-9
@@ -41,80 +41,62 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
     array, shape (c, 2, 2)
         Time and value of either handle of each. No handle is longer in time than the segment.
     """
-    common, error = _fit(times, values)
-    best = np.repeat(common[None], len(shares), axis=0)
+    best, least = None, np.inf
     # What is not the curve of one segment can be a mean of several, whose handles differ in time.
     others = native.copy()
     others[np.argsort(-shares)[1::2]] = STARTS[0]
-    for x in (native, others):
-        if error < GOOD:
-            break
-        tried, off = _apart(x, times, values, shares)
-        if off < 0.5 * error:
-            best, error = tried, off
-    return best
-
-
-def _apart(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return handles of segments (c, 2, 2) at these times (c, 2), and the largest error of the mean."""
-    functions = np.stack([_functions(each, times)[0] for each in x])
-    alone = [np.linalg.lstsq(rows[:2].T, values - rows[2], rcond=None)[0] for rows in functions]
-    y = np.stack(alone)
-    pulls = (shares[:, None, None] * functions[:, :2]).reshape(-1, len(times))
-    left = values - shares @ (np.einsum("ch,chm->cm", y, functions[:, :2]) + functions[:, 2])
-    # As near as can be to where each of them would be alone.
-    change = np.linalg.lstsq(pulls.T, left, rcond=LEAST_PULL)[0]
-    return np.stack((x, y + change.reshape(y.shape)), axis=2), float(np.abs(left - change @ pulls).max())
-
-
-def _fit(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the handles (2, 2) of the segment that is nearest to values at times, and the largest error."""
-    best, least = None, np.inf
-    for start in STARTS:
-        handles, error = _improved(np.array(start), times, values)
-        if error < least:
+    together = [(np.array((start,)), np.ones(1)) for start in STARTS]
+    for x, counts in (*together, (native, shares), (others, shares)):
+        handles, error = _improved(x, times, values, counts)
+        if error < (least if len(x) == 1 else 0.5 * least):
             best, least = handles, error
         if least < GOOD:
             break
-    return best, least
+    return best if len(best) == len(shares) else np.repeat(best, len(shares), axis=0)
 
 
-def _improved(x: np.ndarray, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return handles and the largest error, from where the handles are at first in time."""
+def _improved(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return handles (c, 2, 2) and the largest error, from where the handles (c, 2) are at first in time."""
     functions, _ = _functions(x, times)
-    y = np.linalg.lstsq(functions[:2].T, values - functions[2], rcond=None)[0]
-    damping, (off, slopes) = 1e-3, _off(x, y, times, values)
+    y = np.stack([np.linalg.lstsq(rows[:2].T, values - rows[2], rcond=None)[0] for rows in functions])
+    # From where each of them would be alone, as little as can be.
+    off, slopes = _off(x, y, times, values, shares)
+    y -= np.linalg.lstsq(slopes[y.size :].T, off, rcond=LEAST_PULL)[0].reshape(y.shape)
+    damping, (off, slopes) = 1e-3, _off(x, y, times, values, shares)
     for _ in range(STEPS):
         if np.abs(off).max() < GOOD:
             break
         gradient, squared = slopes @ off, slopes @ slopes.T
-        step = np.linalg.solve(squared + damping * np.diag(np.diag(squared) + RIDGE), -gradient)
-        tried = np.clip(x + step[:2], 0.0, 1.0), y + step[2:]
-        there = _off(*tried, times, values)
+        step = np.linalg.solve(squared + damping * np.diag(np.diag(squared) + RIDGE), -gradient).reshape(2, *x.shape)
+        tried = np.clip(x + step[0], 0.0, 1.0), y + step[1]
+        there = _off(*tried, times, values, shares)
         if there[0] @ there[0] < off @ off:
             (x, y), (off, slopes), damping = tried, there, 0.2 * damping
         elif damping > 1e8:
             break
         else:
             damping *= 5.0
-    return np.stack((x, y), axis=1), float(np.abs(off).max())
+    return np.stack((x, y), axis=2), float(np.abs(off).max())
 
 
 def _functions(x: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the values of both handles and of the end count for at times, (3, m), and the parameters (m,)."""
-    cubic = np.array((3.0 * x[0], 3.0 * (x[1] - 2.0 * x[0]), 1.0 + 3.0 * (x[0] - x[1])))
-    t = solve_cubics(times, np.repeat(cubic[:, None], len(times), axis=1))
-    return np.stack((3.0 * t * (1.0 - t) ** 2, 3.0 * t * t * (1.0 - t), t**3)), t
+    """Return what both handles and the end count for at times, shape (c, 3, m), and the parameters (c, m)."""
+    cubics = np.stack((3.0 * x[:, 0], 3.0 * (x[:, 1] - 2.0 * x[:, 0]), 1.0 + 3.0 * (x[:, 0] - x[:, 1])))
+    t = solve_cubics(np.tile(times, len(x)), cubics.repeat(len(times), axis=1)).reshape(len(x), -1)
+    return np.stack((3.0 * t * (1.0 - t) ** 2, 3.0 * t * t * (1.0 - t), t**3), axis=1), t
 
 
-def _off(x: np.ndarray, y: np.ndarray, times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far off the values are (m,), and how that changes with x and y, shape (4, m)."""
+def _off(
+    x: np.ndarray, y: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far off the mean is (m,), and how that changes with x and y, shape (4 c, m)."""
     functions, t = _functions(x, times)
 
     def rate(handles: np.ndarray) -> np.ndarray:
-        first, second = handles
+        first, second = handles.T[..., None]
         return 3.0 * (first * (1.0 - t) ** 2 + 2.0 * (second - first) * t * (1.0 - t) + (1.0 - second) * t * t)
 
     slope = np.clip(rate(y) / np.maximum(rate(x), 1e-6), -1e3, 1e3)
-    off = y @ functions[:2] + functions[2] - values
-    return off, np.concatenate((-slope * functions[:2], functions[:2]))
+    off = shares @ (np.einsum("ch,chm->cm", y, functions[:, :2]) + functions[:, 2]) - values
+    pulls = shares[:, None, None] * functions[:, :2]
+    return off, np.stack((-slope[:, None] * pulls, pulls)).reshape(-1, len(times))
