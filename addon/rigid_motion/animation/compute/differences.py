@@ -22,14 +22,14 @@ from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
 from ...motion.segments import prepare_within
-from ..curves import Keys, evaluate
+from ..curves import evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .breakdowns import Passages, moved_by
 from .components import LOCATION, REST, ROTATION, ROWS, SCALE
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, packed, with_neighbours
-from .samples import NOTHING, align, held_rows, range_of_each
-from .sources import MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
+from .samples import NOTHING, align, held_rows, jumps, range_of_each
+from .sources import MODE_NAMES, MODE_NUMBERS, Source
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
@@ -100,10 +100,16 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
 
 
-def progress_at(source: Source, frames: np.ndarray) -> np.ndarray:
-    """How far along its segment of the path, from 0 to 1, a source has come on rising frames (m,)."""
-    native, delta = np.empty((2, _height([source]), len(frames)))
-    return _move([source], [frames], native, delta[: _filled_height([source])])
+def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """How far along its segment of the path, from 0 to 1, each source has come on rising frames of its own, (m,)."""
+    found, of_source = {}, {id(source): own for source, own in zip(sources, frames, strict=True)}
+    for portion in _portions(sources, {name: (0, len(own)) for name, own in of_source.items()}):
+        each = [of_source[id(source)] for source in portion]
+        samples = _each(portion, map(len, each))
+        native, delta = np.empty((2, _height(portion), samples[-1][1].stop))
+        along = _move(portion, each, native, delta[: _filled_height(portion)])
+        found.update((id(source), along[place]) for source, place in samples)
+    return [found[id(source)] for source in sources]
 
 
 def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | None = None) -> list[Samples]:
@@ -429,9 +435,9 @@ def _ends(segments: list[tuple[Source, slice]], *, unit_elastic: bool = False) -
             if channels.cycles is None:
                 continue
             # A cycle whose ends differ jumps: one round ends on its last value, the next starts on its first.
-            jumps = _jumps(channels, source.key_frames)
+            jumping = jumps(channels, source.key_frames)
             for row, values in zip(own, channels.values, strict=True):
-                start[row, place][jumps[:-1]], end[row, place][jumps[1:]] = values[0], values[-1]
+                start[row, place][jumping[:-1]], end[row, place][jumping[1:]] = values[0], values[-1]
     return start, end
 
 
@@ -454,19 +460,6 @@ def _rest(rows: np.ndarray, source: Source) -> None:
         rows[row] = value
     if source.order is not None:
         rows[6] = 0.0
-
-
-def _jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
-    """At which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
-    cycles = keys.cycles
-    first, last = keys.times[[0, -1]]
-    if cycles is None or first == last:
-        return np.zeros(times.shape, dtype=bool)
-    rounds = (times - first) / (last - first)
-    whole = np.rint(rounds)
-    after = (whole >= 1) & (cycles.after == "REPEAT") & ((whole <= cycles.after_count) | (cycles.after_count == 0))
-    before = (whole <= 0) & (cycles.before == "REPEAT") & ((whole > -cycles.before_count) | (cycles.before_count == 0))
-    return (np.abs(rounds - whole) * (last - first) < SAME_FRAME) & (after | before)
 
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

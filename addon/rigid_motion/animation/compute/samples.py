@@ -1,4 +1,4 @@
-"""Differences on every frame, as rows of samples: which of them vary, and signs that go from one to the next."""
+"""Rows of samples: which of them vary, signs that go from one to the next, and where cycles jump."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..curves import Keys
 from .components import PART_OF, REST, ROTATION
-from .sources import Source
+from .sources import SAME_FRAME, Source
 
 NOTHING = 1e-9
 """What a component varies by that is always the same but for rounding errors."""
@@ -50,3 +51,16 @@ def held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[i
 def range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
     """By how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
     return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)
+
+
+def jumps(keys: Keys, times: np.ndarray) -> np.ndarray:
+    """At which of these times a cyclic channel goes from its last value to its first, shape (n,)."""
+    cycles = keys.cycles
+    first, last = keys.times[[0, -1]]
+    if cycles is None or first == last:
+        return np.zeros(times.shape, dtype=bool)
+    rounds = (times - first) / (last - first)
+    whole = np.rint(rounds)
+    after = (whole >= 1) & (cycles.after == "REPEAT") & ((whole <= cycles.after_count) | (cycles.after_count == 0))
+    before = (whole <= 0) & (cycles.before == "REPEAT") & ((whole > -cycles.before_count) | (cycles.before_count == 0))
+    return (np.abs(rounds - whole) * (last - first) < SAME_FRAME) & (after | before)

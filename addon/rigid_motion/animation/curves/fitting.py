@@ -59,10 +59,11 @@ def _improved(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.n
     """Return handles (c, 2, 2) and the largest error, from where the handles (c, 2) are at first in time."""
     functions, _ = _functions(x, times)
     y = np.stack([np.linalg.lstsq(rows[:2].T, values - rows[2], rcond=None)[0] for rows in functions])
-    # From where each of them would be alone, as little as can be.
-    off, slopes = _off(x, y, times, values, shares)
-    y -= np.linalg.lstsq(slopes[y.size :].T, off, rcond=LEAST_PULL)[0].reshape(y.shape)
     damping, (off, slopes) = 1e-3, _off(x, y, times, values, shares)
+    if len(x) > 1:
+        # From where each of them would be alone, as little as can be.
+        y -= np.linalg.lstsq(slopes[y.size :].T, off, rcond=LEAST_PULL)[0].reshape(y.shape)
+        off, slopes = _off(x, y, times, values, shares)
     for _ in range(STEPS):
         if np.abs(off).max() < GOOD:
             break

@@ -36,7 +36,7 @@ from ..compute.sources import SAME_FRAME, Source, rows_left_to
 from ..queries.visible_pose import visible_components
 from ..transforms import Channel, Transform
 from ..writers.table import writer_of
-from .kept_timing import keep_timing, mark_breakdown
+from .kept_timing import Insertion, keep_timing, mark_breakdown
 
 MOST_INSERTED = 256
 """Insertions that undo and redo can bring back as they were."""
@@ -67,9 +67,15 @@ class InsertedKeys:
 
     def __init__(self) -> None:
         self._posed: dict[tuple[int, str], _Posed] = {}
+        self._insertions: list[Insertion] = []
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool]] = OrderedDict()
         """What undo and redo bring back is decided as it was: the components on the screen, and whether they were the
         in-between as it was, by the digests before and after."""
+
+    def keep_timing(self) -> None:
+        """Have the motion go on as it did beside the keys that were given the pose of it."""
+        keep_timing(self._insertions)
+        self._insertions.clear()
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
@@ -167,7 +173,7 @@ class InsertedKeys:
         if is_in_between and old.keyed_range[0] < frame < old.keyed_range[1]:
             curves = {row: place.curves[channel] for row, channel in user.channels.items() if channel in place.curves}
             mark_breakdown(curves.values(), old, frame)
-            keep_timing(curves, old, frame)
+            self._insertions.append(Insertion(curves, old, frame))
         return True
 
 

@@ -72,48 +72,75 @@ def mark_breakdown(curves: Iterable[bpy.types.FCurve], old: Source, frame: float
                     key.type = "BREAKDOWN"
 
 
-def keep_timing(curves: Mapping[int, bpy.types.FCurve], old: Source, frame: float) -> None:
-    """Set the handles of a new key and of those beside it, where handles shape the segment.
+@dataclass(frozen=True)
+class Insertion:
+    """A key that was inserted of the motion as it was."""
 
-    Parameters
-    ----------
-    curves : mapping of int to FCurve
-        The channels by the rows of their components.
-    old : Source
-        As it was without the key.
-    frame : float
-        Of the key.
-    """
-    segment = int(np.searchsorted(old.key_frames, frame)) - 1
-    if not old.has_handles[segment]:
-        return
-    first, last = old.key_frames[segment : segment + 2]
-    moments = np.concatenate((first + (frame - first) * MOMENTS, frame + (last - frame) * MOMENTS))
-    # On the last frame the next segment begins.
-    moments[-1] = np.nextafter(last, first)
-    progress = progress_at(old, moments).reshape(2, -1)
-    values = old.values_at(moments).reshape(-1, 2, len(MOMENTS))
-    channels, done = [], np.zeros((2, len(MOMENTS)))
+    curves: Mapping[int, bpy.types.FCurve]
+    """The channels by the rows of their components."""
+
+    old: Source
+    """As it was without the key."""
+
+    frame: float
+
+    @property
+    def segment(self) -> int:
+        """The number of the segment that it divides."""
+        return int(np.searchsorted(self.old.key_frames, self.frame)) - 1
+
+    @property
+    def moments(self) -> np.ndarray:
+        """`MOMENTS` before the key and then behind it, as frames."""
+        first, last = self.old.key_frames[self.segment : self.segment + 2]
+        moments = np.concatenate((first + (self.frame - first) * MOMENTS, self.frame + (last - self.frame) * MOMENTS))
+        # On the last frame the next segment begins.
+        moments[-1] = np.nextafter(last, first)
+        return moments
+
+
+def keep_timing(insertions: Iterable[Insertion]) -> None:
+    """Set the handles of new keys and of those beside them, where handles shape the segment."""
+    shaped = [inserted for inserted in insertions if inserted.old.has_handles[inserted.segment]]
+    progress = progress_at([inserted.old for inserted in shaped], [inserted.moments for inserted in shaped])
+    for inserted, along in zip(shaped, progress, strict=True):
+        _keep_timing(inserted, along.reshape(2, -1))
+
+
+def _keep_timing(inserted: Insertion, progress: np.ndarray) -> None:
+    """The same for one of them, from its progress at `MOMENTS` on either side, shape (2, m)."""
+    old, curves = inserted.old, inserted.curves
+    frames = np.insert(old.key_frames[inserted.segment : inserted.segment + 2], 1, inserted.frame)
+    channels, others = [], []
     for rows, keys in old.channels:
+        outer, native = _handles_of(keys, frames) if keys.left is not None else (None, None)
         for number, row in enumerate(rows):
             weight = QUATERNION if old.order is None and 3 <= row < 7 else 1.0
-            beside = _keys_on(curves[row], (first, frame, last))
-            if beside is not None and beside[0].interpolation == "BEZIER":
-                channel = _Channel(beside, *_handles_of(keys, number, (first, frame, last)), weight)
-                if row in old.filled_rows:
-                    channels.append(channel)
-                    continue
+            beside = _keys_on(curves[row], frames)
+            if beside is None or beside[0].interpolation != "BEZIER":
+                others.append((row, weight, beside))
+                continue
+            channel = _Channel(beside, outer[number], native[number], weight)
+            if row in old.filled_rows:
+                channels.append(channel)
+            else:
                 channel.set_handles(channel.native)
-            elif beside is not None:
-                values[row] = [np.interp(MOMENTS, (0, 1), (key.co.y, after.co.y)) for key, after in pairwise(beside)]
-            way = values[row] - values[row, :, :1]
-            done += weight * way[:, -1:] * way
+                others.append((row, weight, None))
+    done = np.zeros((2, len(MOMENTS)))
+    values = old.values_at(inserted.moments).reshape(-1, 2, len(MOMENTS)) if others else None
+    for row, weight, beside in others:
+        if beside is not None:
+            values[row] = [np.interp(MOMENTS, (0, 1), (key.co.y, after.co.y)) for key, after in pairwise(beside)]
+        way = values[row] - values[row, :, :1]
+        done += weight * way[:, -1:] * way
     fitted = [_fitted(channels, side, progress[side], done[side]) for side in (0, 1)]
     for number, channel in enumerate(channels):
-        inner = [
-            np.array(channel.keys[side].co) + handles[number] * channel.way(side) for side, handles in enumerate(fitted)
-        ]
-        channel.set_handles(inner)
+        channel.set_handles(
+            [
+                np.array(channel.keys[side].co) + handles[number] * channel.way(side)
+                for side, handles in enumerate(fitted)
+            ]
+        )
     for fcurve in curves.values():
         fcurve.update()
 
@@ -127,21 +154,20 @@ def _keys_on(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[bpy.type
     return keys if len(keys) == 3 and max(apart) < SAME_FRAME else None
 
 
-def _handles_of(keys: Keys, number: int, frames: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return what `_Channel` has as `outer` and `native` of one of the channels, from a new key between two frames."""
+def _handles_of(keys: Keys, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what `_Channel` has as `outer` and `native` of c channels, from a new key between two frames."""
     before, behind = (int(np.argmin(np.abs(keys.times - frame))) for frame in frames[::2])
-    outer = np.stack((keys.left[number, before], keys.right[number, behind]))
-    start, end = keys.points[number, [before, behind]].astype(np.float64)
-    cubic = bezier_cubics(*(one[None] for one in (start, keys.right[number, before], keys.left[number, behind], end)))
-    first, second, third = cubic[:, 0]
-    duration = end[0] - start[0]
-    at = np.array(((frames[1] - start[0]) / duration,))
-    (t,) = solve_cubics(at, cubic[:, :, 0] / duration)
+    outer = np.stack((keys.left[:, before], keys.right[:, behind]), axis=1)
+    start, end = keys.points[:, before], keys.points[:, behind]
+    first, second, third = bezier_cubics(start, keys.right[:, before], keys.left[:, behind], end)
+    start, duration = start.astype(np.float64), keys.times[behind] - keys.times[before]
+    at = np.full(len(start), (frames[1] - keys.times[before]) / duration)
+    t = solve_cubics(at, np.stack((first, second, third))[..., 0] / duration)[:, None]
     # The control points of the cubic, and those of both parts by de Casteljau.
     p = [start, start + first / 3.0, start + (2.0 * first + second) / 3.0, start + first + second + third]
     q = [a + t * (b - a) for a, b in pairwise(p)]
     r = [a + t * (b - a) for a, b in pairwise(q)]
-    return outer, np.array(((q[0], r[0]), (r[1], q[2])))
+    return outer, np.stack((np.stack((q[0], r[0]), axis=1), np.stack((r[1], q[2]), axis=1)), axis=1)
 
 
 def _fitted(channels: Sequence[_Channel], side: int, progress: np.ndarray, done: np.ndarray) -> np.ndarray:
