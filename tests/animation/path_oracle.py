@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.spatial.transform import Rotation
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, twists
+from rigid_motion.motion.quaternions import multiply, rotate
 
 if TYPE_CHECKING:
     from tests.animation.oracle import Path
@@ -28,73 +28,51 @@ def lies_on_path(curves: list[bpy.types.FCurve], frame: float, mode: str) -> boo
 
 def beside_path(path: Path, ends: Poses, share: np.ndarray) -> Poses:
     """The poses between two keys (2,) of which at least one is a breakdown: along the path, and as far off as they."""
-    places = [0.0, 1.0]
-    moves = [np.eye(4), np.eye(4)]
-    growths = np.zeros(2)
-    for number in (0, 1):
-        key = ends[number : number + 1]
-        places[number] = _nearest(path, key)
-        at = path.poses(np.array(places[number : number + 1]))
-        moves[number] = np.linalg.inv(_matrices(at)[0]) @ _matrices(key)[0]
-        growths[number] = 0.0 if key.scales is None else np.log(key.scales[0] / at.scales[0])
-    begin, end = places
-    poses = path.poses(begin + (end - begin) * share)
+    places = [_nearest(path, ends[number : number + 1]) for number in (0, 1)]
+    at = path.poses(np.array(places))
+    (first, second), growths = _off(at, ends)[:, :6], _off(at, ends)[:, 6]
+    poses = path.poses(places[0] + (places[1] - places[0]) * share)
     blend = np.clip(share, 0.0, 1.0)
     if path.mode == "motor_spline":
         blend = blend * blend * (3.0 - 2.0 * blend)
-    change = _logarithm(np.linalg.inv(moves[0]) @ moves[1])
-    worlds = _matrices(poses) @ moves[0] @ np.array([_exponential(part * change) for part in blend]).reshape(-1, 4, 4)
-    quaternions = Rotation.from_matrix(worlds[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
-    scales = poses.scales
-    if scales is not None:
-        scales = scales * np.exp(growths[0] + blend * (growths[1] - growths[0]))
-    return Poses(worlds[:, :3, 3], quaternions, scales)
+    begin, end = _moved(first[:, None]), _moved(second[:, None])
+    change = twists.between(begin.positions, begin.quaternions, end.positions, end.quaternions)
+    begin = begin[np.zeros(len(share), dtype=int)]
+    poses = _after(_after(poses, begin), _moved(change * blend))
+    if poses.scales is not None:
+        poses = replace(poses, scales=poses.scales * np.exp(growths[0] + blend * (growths[1] - growths[0])))
+    return poses
 
 
 def _nearest(path: Path, key: Poses) -> float:
     """How far along the path the pose is that is nearest to a key, a radian being as far as a unit of length."""
 
     def distance(share: float) -> float:
-        at = path.poses(np.array((share,)))
-        off = _logarithm(np.linalg.inv(_matrices(at)[0]) @ _matrices(key)[0])
-        growth = 0.0 if key.scales is None else np.log(key.scales[0] / at.scales[0])
-        return off @ off + growth**2
+        return float((_off(path.poses(np.array((share,))), key) ** 2).sum())
 
     grid = np.linspace(-0.25, 1.25, 49)
     best = grid[np.argmin([distance(share) for share in grid])]
-    bounds = best - 1.0 / 32.0, best + 1.0 / 32.0
-    return float(minimize_scalar(distance, bounds=bounds, method="bounded", options={"xatol": 1e-10}).x)
+    low, high = best - 1.0 / 32.0, best + 1.0 / 32.0
+    for _ in range(80):
+        # By the golden section.
+        first, second = high - (high - low) / 1.618034, low + (high - low) / 1.618034
+        low, high = (low, second) if distance(first) < distance(second) else (first, high)
+    return 0.5 * (low + high)
 
 
-def _matrices(poses: Poses) -> np.ndarray:
-    """Of the rigid motions alone, shape (n, 4, 4)."""
-    made = np.tile(np.eye(4), (len(poses.positions), 1, 1))
-    made[:, :3, :3] = Rotation.from_quat(poses.quaternions[:, [1, 2, 3, 0]]).as_matrix()
-    made[:, :3, 3] = poses.positions
-    return made
+def _off(poses: Poses, keys: Poses) -> np.ndarray:
+    """The twists from poses (n,) to keys, with the growth of log scale, shape (n, 7)."""
+    found = twists.between(poses.positions, poses.quaternions, keys.positions, keys.quaternions)
+    growths = np.zeros(len(keys.positions)) if keys.scales is None else np.log(keys.scales / poses.scales)
+    return np.vstack((found, growths)).T
 
 
-def _logarithm(motion: np.ndarray) -> np.ndarray:
-    """The twist (6,) of a motion (4, 4)."""
-    turn = Rotation.from_matrix(motion[:3, :3]).as_rotvec()
-    return np.concatenate((turn, np.linalg.solve(_jacobian(turn), motion[:3, 3])))
+def _moved(rows: np.ndarray) -> Poses:
+    quaternions, translations = twists.exponential(rows)
+    return Poses(translations.T, quaternions.T)
 
 
-def _exponential(twist: np.ndarray) -> np.ndarray:
-    """The motion (4, 4) of a twist (6,)."""
-    motion = np.eye(4)
-    motion[:3, :3] = Rotation.from_rotvec(twist[:3]).as_matrix()
-    motion[:3, 3] = _jacobian(twist[:3]) @ twist[3:]
-    return motion
-
-
-def _jacobian(turn: np.ndarray) -> np.ndarray:
-    """What a velocity along the body's axes adds up to while the body turns: the left Jacobian of rotations."""
-    angle = np.linalg.norm(turn)
-    x, y, z = turn
-    crossed = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
-    if angle < 1e-4:
-        return np.eye(3) + 0.5 * crossed + crossed @ crossed / 6.0
-    return (
-        np.eye(3) + (1.0 - np.cos(angle)) / angle**2 * crossed + (angle - np.sin(angle)) / angle**3 * crossed @ crossed
-    )
+def _after(poses: Poses, moves: Poses) -> Poses:
+    """Poses after moves along the body's own axes."""
+    positions = poses.positions + rotate(poses.quaternions, moves.positions)
+    return Poses(positions, multiply(poses.quaternions, moves.quaternions), poses.scales)
