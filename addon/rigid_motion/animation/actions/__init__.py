@@ -3,6 +3,7 @@
 key_reading    keys of F-curves as arrays
 channels       the F-curves of a slot, written and read as arrays
 slots          what moves something, by which F-curves
+influences     how much influence the NLA gives a slot
 records        what an Action keeps: mode and digest
 renaming       records of bones that were renamed
 refusals       why rigid motion cannot act on something, and the way out

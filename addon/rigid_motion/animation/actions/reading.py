@@ -6,11 +6,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
+import numpy as np
 
-from ..compute.components import PART_OF
+from ..compute.components import PART_OF, REST
 from ..compute.sources import Source, rows_left_to
 from ..curves import Keys
 from ..transforms import Channel, Refused, Transform
+from .influences import influence_of
 from .key_reading import read_keys
 from .records import recorded_digest, recorded_mode
 from .refusals import refuse_channel, refuse_drivers, refuse_numbers, refuse_what_is_taken
@@ -157,17 +159,21 @@ def _source(
     """What is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
     user, rows = keyed.user, list(keyed.channels)
     goes_on = any(keys.linear or keys.cycles is not None for _, keys in channels)
+    original = user.original()
+    # Delta transforms of its own would be blended along.
+    is_blended = not user.has_difference_slot and np.array_equal(original, REST)
     return Source(
         order=None if user.rotation == "rotation_quaternion" else user.carrier.rotation_mode,
         keyed=keyed.names,
         channels=tuple(([rows[number] for number in numbers], keys) for numbers, keys in channels),
         rest=keyed.rest,
-        original=user.original(),
+        original=original,
         location_axes=user.location_axes,
         mode=modes[0][1] if modes else recorded_mode(place),
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
         driven=keyed.driven,
+        influence=influence_of(place.slot) if is_blended else None,
     )
 
 

@@ -8,6 +8,7 @@ key_speeds    how fast a smooth motion with handles passes its keys
 neighbours    the keys beside a segment, for modes that look at them
 samples       which differences vary from frame to frame
 breakdowns    keys that lie on a path instead of shaping it
+influences    differences for strips with less than full influence
 differences   from sources to differences
 
 Each module imports only those above it.

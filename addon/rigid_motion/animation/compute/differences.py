@@ -26,6 +26,7 @@ from ..curves import evaluate
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .breakdowns import Passages, moved_by
 from .components import LOCATION, REST, ROTATION, ROWS, SCALE
+from .influences import blended, undo_blending
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, packed, with_neighbours
 from .samples import NOTHING, align, held_rows, jumps, range_of_each
@@ -135,10 +136,16 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
         delta = rows[: _filled_height(portion)]
         _move(portion, frames, rows, delta)
         order = portion[0].order
+        partial = [(source, place) for source, place in samples if source.influence is not None]
+        for source, place in partial:
+            own = of_range[range_of[id(source)]]
+            blended(source, own, _sampled([(source, slice(len(own)))], [own]), delta[:, place])
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
+            for source, place in partial:
+                undo_blending(source, of_range[range_of[id(source)]], delta[3:6, place])
         else:
             align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]

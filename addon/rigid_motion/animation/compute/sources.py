@@ -87,6 +87,9 @@ class Source:
     driven: frozenset[int] = frozenset()
     """The rows of components that drivers move: to the others they are still."""
 
+    influence: tuple[tuple[float, float], ...] | None = None
+    """Frames, and the influence that a strip with nothing below it has on them; None where that is full."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -102,6 +105,8 @@ class Source:
             summary.update(self.location_axes.tobytes())
         summary.update(self.mode.raw if isinstance(self.mode, Keys) else b"%d" % self.mode)
         span = self.seen if self.goes_on and not self.repeats else None
+        if self.influence is not None:
+            summary.update(repr(self.influence).encode())
         if self.driven:
             summary.update(repr(sorted(self.driven)).encode())
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
