@@ -244,6 +244,17 @@ def test_a_pose_by_hand_is_an_ordinary_key(live_file):
     assert {point.handle_left_type for point in keys_of(obj)} == {"AUTO_CLAMPED"}
 
 
+def test_so_it_is_where_only_another_channel_is_keyed_than_was_posed(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    bpy.context.scene.frame_set(31)
+    obj.location.z += 1.0
+    bpy.context.view_layer.update()
+    obj.keyframe_insert("rotation_quaternion")
+    bpy.context.view_layer.update()
+    assert {point.type for point in keys_of(obj)} == {"KEYFRAME"}
+
+
 def test_with_blenders_own_in_betweens_it_is_blenders_own_key(live_file):
     obj, other = keyed(new_object()), keyed(new_object("Other"))
     set_mode(obj, "BLENDER")

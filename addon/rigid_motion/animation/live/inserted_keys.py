@@ -74,8 +74,8 @@ class InsertedKeys:
 
     def keep_timing(self) -> None:
         """Have the motion go on as it did beside the keys that were given the pose of it."""
-        keep_timing(self._insertions)
-        self._insertions.clear()
+        insertions, self._insertions = self._insertions, []
+        keep_timing(insertions)
 
     def notice_pose(self, transform: Transform, frame: float) -> None:
         """Keep how a transform was posed on the frame that is shown, and has been evaluated so."""
@@ -163,7 +163,7 @@ class InsertedKeys:
             shown = in_between if posed is None else posed.components
             if not _has_values(source, frame, shown) or (posed is not None and not posed.on_top):
                 return False
-            is_in_between = _has_values(source, frame, in_between)
+            is_in_between = _is_same(old, shown, in_between)
             self._inserted[change] = shown, is_in_between
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
@@ -202,6 +202,12 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
             if np.any(np.abs(keys.values[:, place] - had) > TOLERANCE * np.maximum(1.0, np.abs(had))):
                 return False
     return True
+
+
+def _is_same(source: Source, components: np.ndarray, others: np.ndarray) -> bool:
+    """Whether these are the same components (10,), as far as they are keyed."""
+    rows = [row for own, _ in source.channels for row in own]
+    return bool(np.all(np.abs(components - others)[rows] <= TOLERANCE * np.maximum(1.0, np.abs(others[rows]))))
 
 
 def _visible_values(
