@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import set_mode
+from rigid_motion.animation import bake, set_mode
 from rigid_motion.animation.actions.reading import keyed_in
 from rigid_motion.animation.actions.slots import slot_transforms_of
 from rigid_motion.animation.compute.differences import in_betweens
@@ -298,6 +298,15 @@ def test_a_breakdown_that_is_moved_is_hit_and_takes_along_what_is_beside_it_alon
     assert way.max() < 0.41
     bends = np.linalg.norm(np.diff(after[25:47, :, 0], n=2, axis=0), axis=1)
     assert bends.max() < 0.1, "and nowhere suddenly"
+
+
+def test_a_bake_of_one_side_of_a_breakdown_is_widened_to_its_path(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "pga_lerp")
+    key_on(obj, 31)
+    before = shown(obj)
+    assert bake(obj, first=33.0, last=40.0) == (25.0, 49.0)
+    assert largest(shown(obj), before) < 1e-4
 
 
 def test_as_a_keyframe_it_shapes_the_path_again(live_file):

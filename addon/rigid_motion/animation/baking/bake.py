@@ -196,9 +196,9 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))
     is_smooth = np.isin(source.modes, SMOOTH)
-    while begin > 0 and is_smooth[begin - 1]:
+    while begin > 0 and (is_smooth[begin - 1] or source.passed[begin]):
         begin -= 1
-    while end < len(keys) - 1 and is_smooth[end]:
+    while end < len(keys) - 1 and (is_smooth[end] or source.passed[end]):
         end += 1
     return float(keys[begin]), float(keys[end])
 
