@@ -69,7 +69,7 @@ def without_turns(keys: dict) -> dict:
 def assert_only_a_key_more(made: dict, after: dict, frame: float) -> None:
     """Between these snapshots no key changed but on this frame; and handles, as Blender has them follow a key.
 
-    Turns are shared out between the parts of a segment.
+    Those of the keys beside it may be set. Turns are shared out between the parts of a segment.
     """
     made, after = without_turns(made), without_turns(after)
     assert set(made) == set(after)
@@ -80,12 +80,33 @@ def assert_only_a_key_more(made: dict, after: dict, frame: float) -> None:
             [point for point in keys if abs(point[0] - frame) >= SAME_FRAME] for keys in (points, points_made)
         )
         assert len(points) - len(others) <= 1
-        assert [(*point[:2], *point[6:]) for point in others] == [(*point[:2], *point[6:]) for point in others_made]
+        assert [(*point[:2], *point[6:-2]) for point in others] == [(*point[:2], *point[6:-2]) for point in others_made]
         behind = sum(point[0] < frame for point in others)
         for number, (point, point_made) in enumerate(zip(others, others_made, strict=True)):
             # Handles that are free are the animator's; only those beside the new key are shortened with their segment.
-            if point[-2:] == ("FREE", "FREE") and number not in (behind - 1, behind):
-                assert point == point_made
+            if number not in (behind - 1, behind):
+                assert point[-2:] == point_made[-2:]
+                assert point == point_made or point[-2:] != ("FREE", "FREE")
+
+
+def is_timed_together(carrier: Carrier, frame: float) -> bool:
+    """Whether all channels go from key to key on the same frames here, with handles on the same frames or none."""
+    timings = set()
+    for (path, _), fcurve in curves_of(carrier).items():
+        points = fcurve.keyframe_points
+        if path in WIDTHS and len(points) and not fcurve.mute:
+            number = sum(point.co[0] < frame for point in points)
+            if not 0 < number < len(points):
+                return False
+            before, behind = points[number - 1], points[number]
+            handles = before.handle_right[0] - before.co[0], behind.co[0] - behind.handle_left[0]
+            eased = before.interpolation, before.easing
+            timings.add(
+                (before.co[0], behind.co[0], eased, *np.round(np.minimum(handles, behind.co[0] - before.co[0]), 4))
+            )
+            if fcurve.extrapolation == "LINEAR" or before.interpolation not in ("BEZIER", "LINEAR"):
+                return False
+    return len(timings) == 1
 
 
 class Editing(RuleBasedStateMachine):
@@ -199,6 +220,9 @@ class Editing(RuleBasedStateMachine):
         obj = self._found(name)
         keys = key_frames(obj)
         held, settable = self._holds_pose(obj, frame), self._has_keys_for_any_pose(obj)
+        goes_by = np.arange(keys[0], keys[-1], 0.5) if held and not posed and is_timed_together(obj, frame) else ()
+        before = expected_bases(obj, goes_by, self.owns.get(name))
+        moved = self._is_posed(obj)
         if posed:
             self._pose(obj, seed)
         seen = self._basis(obj)
@@ -223,6 +247,11 @@ class Editing(RuleBasedStateMachine):
                 size = max(1.0, np.abs(seen).max())
                 error = np.abs(now - seen).max() if settable else 0.0
                 assert error < 2e-5 * size, f"{name} jumped from\n{seen}\nto\n{now}\nkeys {keys}"
+                if len(before) and settable and not moved:
+                    error = np.abs(expected_bases(obj, goes_by, self.owns.get(name)) - before).max(axis=(1, 2))
+                    size = max(1.0, np.abs(before).max())
+                    worst = goes_by[error.argmax()]
+                    assert error.max() < 1e-3 * size, f"{name} moves by {error.max():.3g} on {worst}, keys {keys}"
 
         self._edit(insert, settle)
 
@@ -237,6 +266,29 @@ class Editing(RuleBasedStateMachine):
         for path in transform_paths(obj)[:2]:
             setattr(obj, path, random_values(obj, path, 1, seed)[0])
         bpy.context.view_layer.update()
+
+    def _is_posed(self, obj: Carrier) -> bool:
+        """Whether it was posed by hand on this frame."""
+        frame = bpy.context.scene.frame_current_final
+        return any(
+            abs(getattr(obj, path)[index] - fcurve.evaluate(frame)) > 1e-5 * max(1.0, abs(fcurve.evaluate(frame)))
+            for (path, index), fcurve in curves_of(obj).items()
+            if path in WIDTHS and len(fcurve.keyframe_points) and not fcurve.mute
+        )
+
+    @rule(who=shares, which=shares, kind=st.sampled_from(("KEYFRAME", "BREAKDOWN")))
+    def set_the_type_of_keys(self, who, which, kind):
+        name = self._named(who)
+
+        def change() -> None:
+            obj = self._found(name)
+            frame = self._frame(obj, which)
+            if frame is not None:
+                for fcurve, point in self._keys_on(obj, frame, False):
+                    point.type = kind
+                    fcurve.update()
+
+        self._edit(change)
 
     @rule(who=shares, seed=seeds, frame=frames_in)
     def pose_it_without_a_key_and_go_elsewhere(self, who, seed, frame):

@@ -19,6 +19,7 @@ from mathutils import Euler, Quaternion
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, normalise
 from tests.animation.modified import acting, held_frames, without_modifiers
+from tests.animation.path_oracle import beside_path, lies_on_path
 from tests.animation.smooth_oracle import share_of, with_tangents
 from tests.animation.spin_oracle import Spin, spin_and_end
 
@@ -166,21 +167,59 @@ def _components(
         if mode == "BLENDER" or not inside.any():
             continue
         share = progress(obj, first, last, frames[inside])
-        if mode in SMOOTH:
-            elapsed = np.clip((frames[inside] - first) / (last - first), 0.0, 1.0)
-            leaving, arriving = _passings(obj, keys, first, own)
-            share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
-            poses = _smooth(obj, keys, first, share, mode, own, scaled, (leaving[0], arriving[0]))
-            spin = _spin(obj, first, last, own)
+        path = Path(obj, keys, first, mode, own, scaled)
+        if (path.first, path.last) != (first, last):
+            poses = beside_path(path, _key_poses(obj, np.array((first, last)), own, scaled), share)
         else:
-            ends = _key_poses(obj, np.array((first, last)), own, scaled)
-            spin, ends.quaternions[1] = _spin_and_end(obj, first, last, own)
-            poses = interpolate((0.0, 1.0), ends, share, mode, extrapolate=True)
-        poses = spin.add_to(poses, share)
+            poses = path.poses(share, np.clip((frames[inside] - first) / (last - first), 0.0, 1.0))
         location[inside], quaternion[inside] = poses.positions @ _axes(obj), poses.quaternions
         if scaled:
             scale[inside] = poses.scales[:, None] * own.scale
     return location, quaternion, scale
+
+
+class Path:
+    """What a mode makes of the segment between keys that shape it: no breakdowns on the way, where it would matter."""
+
+    def __init__(self, obj: Carrier, keys: np.ndarray, frame: float, mode: str, own: Own, scaled: bool) -> None:
+        self.obj, self.mode, self.own, self.scaled = obj, mode, own, scaled
+        self.keys = np.array([key for number, key in enumerate(keys) if not _is_passed(obj, keys, number)])
+        self.first, self.last = self.keys[self.keys <= frame][-1], self.keys[self.keys > frame][0]
+
+    def poses(self, share: np.ndarray, elapsed: np.ndarray | None = None) -> Poses:
+        """At this progress, which without times is along the path alone."""
+        if self.mode not in SMOOTH:
+            ends = _key_poses(self.obj, np.array((self.first, self.last)), self.own, self.scaled)
+            spin, ends.quaternions[1] = _spin_and_end(self.obj, self.first, self.last, self.own)
+            return spin.add_to(interpolate((0.0, 1.0), ends, share, self.mode, extrapolate=True), share)
+        leaving, arriving = _passings(self.obj, self.keys, self.first, self.own)
+        if elapsed is not None:
+            share = share + leaving[1] * elapsed * (1.0 - elapsed) ** 2 - arriving[1] * elapsed**2 * (1.0 - elapsed)
+        tangents = leaving[0], arriving[0]
+        poses = _smooth(self.obj, self.keys, self.first, share, self.mode, self.own, self.scaled, tangents)
+        return _spin(self.obj, self.first, self.last, self.own).add_to(poses, share)
+
+
+def _is_passed(obj: Carrier, keys: np.ndarray, number: int) -> bool:
+    """Whether a key lies on a path that it does not shape."""
+    before, mode = (mode_at(obj, frame) for frame in keys[[number - 1, number]])
+    curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
+    curves = [curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute]
+    if not 0 < number < len(keys) - 1 or before != mode or _may_spin(obj):
+        return False
+    return lies_on_path(curves, keys[number], mode)
+
+
+def _may_spin(obj: Carrier) -> bool:
+    """Whether it has turns, or an angle that goes by half a turn or more from one of its keys to the next."""
+    turns = curve_of(obj, "rigid_motion.turns")
+    if turns is not None and len(turns.keyframe_points) and not turns.mute:
+        return True
+    if obj.rotation_mode == "QUATERNION":
+        return False
+    angles = (curve_of(obj, "rotation_euler", index) for index in range(3))
+    values = ([key.co[1] for key in curve.keyframe_points] for curve in angles if curve is not None and not curve.mute)
+    return any(np.abs(np.diff(of_one)).max(initial=0.0) >= np.pi - 1e-4 for of_one in values)
 
 
 def _axes(obj: Carrier) -> np.ndarray:

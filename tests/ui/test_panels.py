@@ -46,9 +46,9 @@ def test_outside_the_keys_there_is_no_segment(tool):
 
 def test_a_refusal_is_shown_with_the_way_out_and_without_a_segment(tool):
     set_mode(tool, "dq_sclerp")
-    tool.driver_add("location", 2)
+    tool.driver_add("delta_location", 2)
     (text,), mode = notes_on(tool)
-    assert "Location Z is driven" in text
+    assert "Delta Location Z is driven" in text
     assert mode is None
 
 

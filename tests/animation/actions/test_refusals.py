@@ -50,6 +50,11 @@ def driver(path: str, index: int = 0) -> Callable[[bpy.types.Object], None]:
     return add
 
 
+def all_driven(obj: bpy.types.Object) -> None:
+    for path, index in (("location", 0), ("location", 1), ("location", 2), ("rotation_quaternion", 3), ("scale", 1)):
+        driver(path, index)(obj)
+
+
 def sampled(obj: bpy.types.Object) -> None:
     curves_of(obj)["location", 2].convert_to_samples(1, 41)
 
@@ -90,9 +95,7 @@ HINDRANCES = {
     "built-in function": (modifier("FNGENERATOR"), "Location Y has a modifier of type Built-In Function"),
     "cycles in a range": (modifier("CYCLES", use_restricted_range=True), "type Cycles with a restricted range"),
     "cycles in part": (modifier("CYCLES", use_influence=True, influence=0.5), "with a restricted range or influence"),
-    "driven location": (driver("location", 2), "Location Z is driven: remove the driver, or bake it"),
-    "driven rotation": (driver("rotation_quaternion", 0), "Rotation Quaternion W is driven"),
-    "driven scale": (driver("scale", 1), "Scale Y is driven"),
+    "all driven": (all_driven, "Location X is driven: remove the driver, or bake it"),
     "driven delta": (driver("delta_location", 0), "Delta Location X is driven"),
     "animated delta location": (keyed_delta("delta_location"), "Delta Location Y is animated already: move"),
     "animated delta rotation": (keyed_delta("delta_rotation_quaternion"), "Delta Rotation Quaternion X is animated"),
@@ -154,7 +157,7 @@ def test_nothing_can_be_keyed_where_in_betweens_are(live_file):
     assert_shown([obj], PLAYED)
 
 
-@pytest.mark.parametrize("hindrance", ["noise", "driven location", "axis and angle", "cycles in a range"])
+@pytest.mark.parametrize("hindrance", ["noise", "all driven", "axis and angle", "cycles in a range"])
 def test_in_betweens_are_back_as_soon_as_nothing_is_in_the_way_any_more(live_file, hindrance):
     obj = key(new_object())
     set_mode(obj, "dq_sclerp")

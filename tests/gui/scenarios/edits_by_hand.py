@@ -103,6 +103,7 @@ def inserted(hand: Hand, view: bpy.types.Area, sheet: bpy.types.Area) -> Steps[N
     yield from hand.press("I")
     assert_on_the_screw(1, 15, 28, 40)
     np.testing.assert_allclose(shown()[14], before[14], atol=ALIKE)
+    np.testing.assert_allclose(shown(), before, atol=1e-3)
     stored = [curves_of(cube())["location", axis].evaluate(15) for axis in range(3)]
     np.testing.assert_allclose(stored, before[14, :3, 3], atol=ALIKE)
     yield from hand.picture("key-inserted")

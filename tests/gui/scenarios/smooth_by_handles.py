@@ -1,4 +1,4 @@
-"""Smooth Screw on keys that the I key sets: it eases as Screw does, and a key far away changes little."""
+"""Smooth Screw on keys that the I key sets: it eases as Screw does, and a key on the way changes nothing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import bpy
 import numpy as np
 
-from tests.animation.oracle import assert_shown, shown_worlds
+from tests.animation.oracle import assert_shown, curves_of, shown_worlds
 from tests.gui import places
 from tests.gui.driver import Hand, Steps
 
@@ -26,7 +26,7 @@ def pose(x: float, y: float, angle: float) -> None:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator sets two keys by I, chooses modes by the pie, sees the path, and sets a third key."""
+    """An animator sets two keys by I, chooses modes by the pie, sees the path, sets a third key, and two in between."""
     view = hand.area("VIEW_3D")
     view.spaces.active.region_3d.view_distance = 14
     centre = places.centre(places.region(view))
@@ -54,6 +54,18 @@ def scenario(hand: Hand) -> Steps[None]:
     moved = shown_worlds([cube()], FRAMES)[0]
     assert np.abs(moved - smooth).max() < 0.3, "a key far away changes little"
     yield from hand.picture("three-keys", places.box(places.region(view)))
+
+    before = shown_worlds([cube()], range(1, 91))[0]
+    for frame in (12, 45):
+        bpy.context.scene.frame_set(frame)
+        yield from hand.hover(centre)
+        yield from hand.press("I")
+        assert_shown([cube()], range(1, 91, 3))
+        after = shown_worlds([cube()], range(1, 91))[0]
+        assert np.abs(after - before).max() < 1e-3, "a key on an in-between leaves the motion as it was"
+    types = [key.type for key in curves_of(cube())["location", 0].keyframe_points]
+    assert types == ["KEYFRAME", "BREAKDOWN", "KEYFRAME", "BREAKDOWN", "KEYFRAME"], types
+    yield from hand.picture("keys-in-between", places.box(places.region(view)))
 
 
 def key_by_hand(hand: Hand, centre: tuple[int, int], frame: int, values: tuple[float, float, float]) -> Steps[None]:

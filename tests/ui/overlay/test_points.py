@@ -282,7 +282,7 @@ def test_without_a_second_key_there_is_no_path(scene):
     assert path_of(still, scene) is None
 
 
-def test_what_rigid_motion_refuses_has_no_path(scene):
+def test_what_rigid_motion_refuses_or_a_driver_moves_has_no_path(scene):
     turned = key(new_object("Turned"))
     turned.rotation_mode = "AXIS_ANGLE"
     driven = key(new_object("Driven"))

@@ -4,6 +4,7 @@ key_reading    keys of F-curves as arrays
 channels       the F-curves of a slot, written and read as arrays
 slots          what moves something, by which F-curves
 modifiers      which modifiers can be followed, and what they add
+influences     how much influence the NLA gives a slot
 records        what an Action keeps: mode and digest
 renaming       records of bones that were renamed
 refusals       why rigid motion cannot act on something, and the way out

@@ -12,6 +12,9 @@ import numpy as np
 from ..curves.keys import AUTO, BEZIER, CODE, CONSTANT, EASINGS, INTERPOLATIONS, LARGEST, LINEAR, Cycles, Keys
 from ..curves.steps import Stepped
 
+BREAKDOWN = bpy.types.Keyframe.bl_rna.properties["type"].enum_items["BREAKDOWN"].value
+"""The code of this type of keys."""
+
 
 def read_keys(fcurves: Sequence[Sequence[bpy.types.FCurve]]) -> list[list[tuple[list[int], Keys]]]:
     """The keys of F-curves, the first Cycles modifier and the Stepped ones of each; none of their other modifiers.
@@ -69,6 +72,10 @@ def _read_batch(
     easing = _read_property("easing", channels, CODE, rows=rows)
     _replace_unknown(easing, EASINGS, AUTO)
     settings = [_read_property(name, channels, np.float32, rows=rows) for name in ("back", "amplitude", "period")]
+    # A key that is no breakdown in the first of the channels that are keyed together is none.
+    breakdowns = _read_property("type", channels, CODE, rows=bounds[:-1].tolist()) == BREAKDOWN
+    rows = np.flatnonzero(any_in_group(breakdowns).repeat(sizes)).tolist()
+    breakdowns = _read_property("type", channels, CODE, rows=rows) == BREAKDOWN
     numbers = np.concatenate([array.reshape(len(points), -1) for array in (points, left, right, *settings)], axis=1)
     # What is no number is not smaller, either.
     sound = ~any_in_group(~(np.abs(numbers) < LARGEST)) & ~any_in_group(~(points[:, 1:, 0] >= points[:, :-1, 0]))
@@ -76,7 +83,10 @@ def _read_batch(
     for number, (rows, at) in enumerate(zip(groups, slices, strict=True)):
         handles = (left[at], right[at]) if curved[number] else (None, None)
         easings = (easing[at], np.stack([values[at] for values in settings])) if eased[number] else (None, None)
-        yield rows, Keys(points[at], interpolation[at], *handles, *easings, linear, cycles, steps, bool(sound[number]))
+        marked = breakdowns[at].all(axis=0)
+        marked = marked if marked.any() else None
+        settings = (linear, cycles, steps, marked, bool(sound[number]))
+        yield rows, Keys(points[at], interpolation[at], *handles, *easings, *settings)
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:

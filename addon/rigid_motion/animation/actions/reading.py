@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import bpy
+import numpy as np
 
-from ..compute.components import PART_OF
-from ..compute.sources import Source
+from ..compute.components import PART_OF, REST
+from ..compute.sources import Source, rows_left_to
 from ..curves import Keys
-from ..transforms import Refused, Transform
+from ..transforms import Channel, Refused, Transform
+from .influences import influence_of
 from .key_reading import read_keys
 from .modifiers import is_modified
 from .records import recorded, recorded_digest, recorded_mode
-from .refusals import refuse_channel, refuse_different_steps, refuse_numbers, refuse_what_is_taken
+from .refusals import refuse_channel, refuse_different_steps, refuse_drivers, refuse_numbers, refuse_what_is_taken
 from .slots import SlotTransform
 
 
@@ -71,12 +73,13 @@ def differing_users(place: SlotTransform, sources: list[Source | Refused]) -> li
 def sources_of_users(places: Sequence[SlotTransform]) -> list[list[Source | Refused]]:
     """What is keyed in each of the places as each of its users has it."""
     found: list[list[_Keyed | Refused]] = []
-    drivers: dict[bpy.types.ID, dict[str, bpy.types.FCurve]] = {}
+    drivers: dict[bpy.types.ID, set[Channel]] = {}
     for place in places:
         users: list[_Keyed | Refused] = []
         for user in place.users:
             if user.animated not in drivers:
-                drivers[user.animated] = {one.data_path: one for one in user.animated.animation_data.drivers}
+                driving = user.animated.animation_data.drivers
+                drivers[user.animated] = {(one.data_path, one.array_index) for one in driving if not one.mute}
             try:
                 users.append(_keyed_for(user, place, drivers[user.animated]))
             except Refused as problem:
@@ -133,22 +136,29 @@ class _Keyed:
     modified: frozenset[int]
     """The rows of channels that modifiers add something to."""
 
+    driven: frozenset[int]
+    """The rows of components that drivers move."""
 
-def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> _Keyed:
+
+def _keyed_for(user: Transform, place: SlotTransform, drivers: Collection[Channel]) -> _Keyed:
     """What of a slot moves one of its users. `Refused` where that cannot be filled in."""
     refuse_what_is_taken(user, place, drivers)
-    keyed = {}
-    for row, channel in user.channels.items():
+    keyed, channels = {}, user.channels
+    driven = frozenset(row for row, channel in channels.items() if channel in drivers) if drivers else frozenset()
+    left = rows_left_to(driven) if driven else ()
+    for row, channel in channels.items():
         fcurve = place.curves.get(channel)
-        if fcurve is not None and _has_say(user, fcurve):
+        if fcurve is not None and row not in left and _has_say(user, fcurve):
             keyed[row] = fcurve
+    if not keyed:
+        refuse_drivers(user, driven)
     has_modifiers = [row for row, fcurve in keyed.items() if fcurve.modifiers]
     if has_modifiers:
         refuse_different_steps(user.name, keyed.values())
     names = frozenset(map(PART_OF.__getitem__, keyed))
     rest = {
-        row: getattr(user.carrier, path.removeprefix(user.prefix))[index]
-        for row, (path, index) in user.channels.items()
+        row: 0.0 if row in driven else getattr(user.carrier, path.removeprefix(user.prefix))[index]
+        for row, (path, index) in channels.items()
         if row not in keyed and PART_OF[row] in names
     }
     modes, turns = (
@@ -156,7 +166,7 @@ def _keyed_for(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.
         for channel in (user.mode_channel, user.turns_channel)
     )
     modified = frozenset(row for row in has_modifiers if is_modified(keyed[row]))
-    return _Keyed(user, names, keyed, rest, modes, turns, modified)
+    return _Keyed(user, names, keyed, rest, modes, turns, modified, driven)
 
 
 def _source(
@@ -169,12 +179,15 @@ def _source(
     """What is keyed in a slot, as one of its users has it, from the keys that were read of its channels."""
     user, rows = keyed.user, list(keyed.channels)
     goes_on = any(keys.linear or keys.cycles is not None for _, keys in channels)
+    original = user.original()
+    # Delta transforms of its own would be blended along.
+    is_blended = not user.has_difference_slot and np.array_equal(original, REST)
     return Source(
         order=None if user.rotation == "rotation_quaternion" else user.carrier.rotation_mode,
         keyed=keyed.names,
         channels=tuple(([rows[number] for number in numbers], keys) for numbers, keys in channels),
         rest=keyed.rest,
-        original=user.original(),
+        original=original,
         location_axes=user.location_axes,
         mode=modes[0][1] if modes else recorded_mode(place),
         turns=turns[0][1] if turns else None,
@@ -182,6 +195,8 @@ def _source(
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
         modified=keyed.modified,
+        driven=keyed.driven,
+        influence=influence_of(place.slot) if is_blended else None,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable
 
 import bpy
 import numpy as np
@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ..compute.sources import MODE_NAMES, UNKNOWN, Source
 from ..curves import LARGEST, Keys, TooManyRounds
-from ..transforms import GROUP, LINKED, Refused, Transform
+from ..transforms import GROUP, LINKED, Channel, Refused, Transform
 from .key_reading import read_steps
 from .modifiers import FOLLOWED, is_added, is_whole, may_add
 from .records import recorded_digest, recorded_rows
@@ -79,22 +79,16 @@ BAD_SETTING = n_(
 )
 
 
-def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping[str, bpy.types.FCurve]) -> None:
-    """Raise `Refused` where a user's channels, or what the differences go into, are not to be had.
+def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Collection[Channel]) -> None:
+    """Raise `Refused` where what a user's differences go into is not to be had.
 
-    `drivers` are those of the user's data-block, by their data paths.
+    `drivers` are the channels of the user's data-block that are driven.
     """
     refuse_linked(user, place)
-    differences = user.differences.values()
-    for path, _ in (*user.channels.values(), *differences) if drivers else ():
-        if path in drivers:
-            raise Refused(
-                rpt_("{name}: {channel} is driven: remove the driver, or bake it to keys").format(
-                    name=user.name, channel=_label(drivers[path])
-                )
-            )
     # The differences of bones are in a slot of their own.
-    for channel in () if user.has_difference_slot else differences:
+    for channel in () if user.has_difference_slot else user.differences.values():
+        if channel in drivers:
+            _refuse_driver(user.name, channel)
         fcurve = place.curves.get(channel)
         if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, place)):
             if fcurve.group is not None and fcurve.group.name == GROUP:
@@ -110,6 +104,20 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
                     "{other} (Object > Apply > Animated Transforms to Deltas does the reverse)"
                 ).format(name=user.name, channel=_label(fcurve), other=_label_of(channel[0].rpartition("delta_")[2]))
             )
+
+
+def refuse_drivers(user: Transform, driven: Collection[int]) -> None:
+    """Raise `Refused` where any of the components of a user is driven, which are given by their rows."""
+    for row in sorted(driven):
+        _refuse_driver(user.name, user.channels[row])
+
+
+def _refuse_driver(name: str, channel: Channel) -> None:
+    raise Refused(
+        rpt_("{name}: {channel} is driven: remove the driver, or bake it to keys").format(
+            name=name, channel=_label_at(*channel)
+        )
+    )
 
 
 def _was_filled_in(fcurve: bpy.types.FCurve, user: Transform, place: SlotTransform) -> bool:
@@ -284,9 +292,13 @@ def _refuse_turns(name: str, turns: Keys | None) -> None:
 
 def _label(fcurve: bpy.types.FCurve) -> str:
     """A channel as the Dope Sheet names it."""
-    name = fcurve.data_path.rpartition(".")[2]
+    return _label_at(fcurve.data_path, fcurve.array_index)
+
+
+def _label_at(path: str, index: int) -> str:
+    name = path.rpartition(".")[2]
     axes = "WXYZ" if name.endswith("quaternion") else "XYZ"
-    return f"{_label_of(name)} {axes[fcurve.array_index]}" if fcurve.array_index < len(axes) else name
+    return f"{_label_of(name)} {axes[index]}" if index < len(axes) else name
 
 
 def _label_of(name: str) -> str:

@@ -206,9 +206,9 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
     end = len(keys) - 1 if last is None else np.searchsorted(keys, last - SAME_FRAME)
     begin, end = int(np.clip(begin, 0, len(keys) - 2)), int(np.clip(end, 1, len(keys) - 1))
     is_smooth = np.isin(source.modes, SMOOTH)
-    while begin > 0 and is_smooth[begin - 1]:
+    while begin > 0 and (is_smooth[begin - 1] or source.passed[begin]):
         begin -= 1
-    while end < len(keys) - 1 and is_smooth[end]:
+    while end < len(keys) - 1 and (is_smooth[end] or source.passed[end]):
         end += 1
     return float(keys[begin]), float(keys[end])
 
@@ -230,9 +230,12 @@ def _bake_place(
     motion, added = in_betweens(source, frames), added_values(place, transform, source, frames)
     copy = move_by_copy(transform, place, BAKED)
     fcurves = copy.channelbag.fcurves
+    driven = {transform.channels[row] for row in source.driven}
     cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
     for path, values in channel_values(transform, source, motion, added).items():
         for index, column in enumerate(values.T):
+            if (path, index) in driven:
+                continue
             fcurve = copy.curves.get((path, index))
             if fcurve is not None and fcurve.mute:
                 # Its keys have had no say, and what there was in their place is baked.

@@ -91,7 +91,7 @@ def fewer_keys_of_rigs(
             except Refused:
                 continue  # Its own plan says so.
             for place, source in keyed:
-                if source.channels:
+                if source.channels and not source.driven:
                     key = transform.animated, place.slot.action, place.slot.handle
                     together.setdefault(key, {})[transform] = place, source
     plans: Plans = {}

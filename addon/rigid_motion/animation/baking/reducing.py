@@ -21,7 +21,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...motion import KEYFRAME_MODES
 from ...motion.modes import no_such_mode
 from ..actions.channels import replace_keys
-from ..actions.refusals import refuse_modified
+from ..actions.refusals import refuse_drivers, refuse_modified
 from ..actions.slots import SlotTransform, places_of, slots_of, transforms_in
 from ..compute.sources import MODE_NAMES, distinct
 from ..edits.apply import Readings, Target, Targets, apply_edit, readable, transforms_of
@@ -154,10 +154,11 @@ def reduce_keys_of(
     def plan(transform: Transform, readings: Readings) -> list[FewerKeys]:
         refuse_tweak_mode(transform)
         keyed = [(place, source) for place, source in readable(transform, readings) if source.channels]
-        for _, source in keyed:
-            refuse_modified(transform.name, source)
         if not keyed:
             raise Refused(_why_nothing_is_keyed(transform, 0))
+        for _, source in keyed:
+            refuse_modified(transform.name, source)
+            refuse_drivers(transform, source.driven)
         found = of_rigs.get(transform, [])
         if isinstance(found, Refused):
             raise found

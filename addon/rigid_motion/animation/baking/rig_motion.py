@@ -158,7 +158,7 @@ def _keyed_in(
     places = transforms_in(slot)
     for place, of_users in zip(places, sources_of_users(places), strict=True):
         for user, source in zip(place.users, of_users, strict=True):
-            if user.animated == rig and isinstance(source, Source) and source.channels:
+            if user.animated == rig and isinstance(source, Source) and source.channels and not source.driven:
                 with suppress(Refused):
                     refuse_numbers(user.name, source)
                     sources[place.prefix] = source

@@ -9,6 +9,10 @@ bodies        channels as poses of a body
 turning       whole turns, of Euler angles or of the channel
 key_speeds    how fast a smooth motion with handles passes its keys
 neighbours    the keys beside a segment, for modes that look at them
+samples       which differences vary from frame to frame
+breakdowns    keys that lie on a path instead of shaping it
+ends          the poses that segments run between, and what modes make of them
+influences    differences for strips with less than full influence
 differences   from sources to differences
 
 Each module imports only those above it.

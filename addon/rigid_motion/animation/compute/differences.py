@@ -10,34 +10,32 @@ and that is kept where keys are not eased: handles shape single channels, and it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...motion import KEYFRAME_MODES, Poses, prepare, twists
+from ...motion import KEYFRAME_MODES, Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
-from ...motion.segments import prepare_within
-from .bodies import body_poses, differ, location_axes, turn_into_quaternions
+from .bodies import differ, turn_into_quaternions
+from .breakdowns import Passages
 from .channel_rows import channels_at_ends, each, filled_height, height, sampled
-from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
-from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
-from .neighbours import meeting, spins_of_neighbours, with_neighbours
-from .progress import are_idle, idle_progress, progress_weights
+from .components import LOCATION, ROTATION, ROWS, SCALE
+from .ends import Ends, measured_in
+from .influences import blended, undo_blending
+from .key_speeds import MEASURED, corrected
+from .neighbours import packed
+from .progress import are_idle, progress_weights
+from .samples import NOTHING, align, held_rows, range_of_each
 from .sources import MODE_NAMES, MODE_NUMBERS, Source
-from .turning import Turning, needs_turning, turning_of, without_spins
 
 AT_ONCE = 131072
 """Samples that are prepared for at once."""
 
 BLOCK = 24576
 """Samples worked on at once: few enough for the processor's caches."""
-
-NOTHING = 1e-9
-"""What a component varies by that is always the same but for rounding errors."""
 
 
 SMOOTH = [mode.number for mode in KEYFRAME_MODES.values() if mode.is_smooth]
@@ -90,7 +88,8 @@ def in_betweens(
     native, delta = np.empty((2, height([source]), len(moments)))
     delta = delta[: filled_height([source])]
     if len(source.key_frames) > 1:
-        _move([source], [moments], native, delta, None if mode is None else MODE_NUMBERS[mode], progress)
+        chosen = source if mode is None else replace(source, mode=MODE_NUMBERS[mode])
+        _move([chosen], [moments], native, delta, progress)
     else:
         # Without a segment there is nothing to fill in.
         sampled([(source, slice(len(moments)))], [moments], out=native)
@@ -107,6 +106,18 @@ def in_betweens(
         )
 
     return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
+
+
+def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """How far along its segment of the path, from 0 to 1, each source has come on rising frames of its own, (m,)."""
+    found, of_source = {}, {id(source): own for source, own in zip(sources, frames, strict=True)}
+    for portion in _portions(sources, {name: (0, len(own)) for name, own in of_source.items()}):
+        own = [of_source[id(source)] for source in portion]
+        samples = each(portion, map(len, own))
+        native, delta = np.empty((2, height(portion), samples[-1][1].stop))
+        along = _move(portion, own, native, delta[: filled_height(portion)])
+        found.update((id(source), along[place]) for source, place in samples)
+    return [found[id(source)] for source in sources]
 
 
 def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | None = None) -> list[Samples]:
@@ -133,61 +144,28 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
         delta = rows[: filled_height(portion)]
         _move(portion, frames, rows, delta)
         order = portion[0].order
+        partial = [(source, place) for source, place in samples if source.influence is not None]
+        for source, place in partial:
+            own = of_range[range_of[id(source)]]
+            blended(source, own, sampled([(source, slice(len(own)))], [own]), delta[:, place])
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
+            for source, place in partial:
+                undo_blending(source, of_range[range_of[id(source)]], delta[3:6, place])
         else:
-            _align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
+            align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]
-        first, differs = delta[:, starts], _range_of_each(delta, starts) > NOTHING
+        first, differs = delta[:, starts], range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
         for number, (source, place) in enumerate(samples):
             changing = {row for row in source.filled_rows if differs[row, number] or ranges is not None}
-            held = _held_rows(source, changing, first[:, number])
+            held = held_rows(source, changing, first[:, number])
             found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
     return [found[id(source)] for source in sources]
-
-
-def _align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
-    """Take quaternions (4, m) with that sign in which they are nearer to the one before, from each of the starts on.
-
-    On a key the difference is the same rotation as between keys, but where the channels have gone the long way round
-    not the same quaternion: straight from one to the other it would pass zero.
-    """
-    turned = np.einsum("km,km->m", quaternions[:, 1:], quaternions[:, :-1]) < 0.0
-    turned[[start - 1 for start in starts if start]] = False
-    if turned.any():
-        flips = np.concatenate(((0,), np.cumsum(turned)))
-        lengths = np.diff((*starts, quaternions.shape[1]))
-        odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
-        np.negative(quaternions, out=quaternions, where=odd)
-
-
-def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:
-    """The rows that never change, and have to be held all the same, of what is constant (.,) in them.
-
-    The components of a quaternion are one by one only where they are zero. In the NLA Blender puts what a strip has no
-    channel of to its default.
-    """
-    turning = source.order is None and any(PART_OF[row] == ROTATION for row in changing)
-    default = REST if source.order is None else np.where((REST == 1.0) & (np.arange(10) == 3), 0.0, REST)
-    return {
-        row
-        for row in source.filled_rows
-        if row not in changing
-        and (
-            (turning and PART_OF[row] == ROTATION and abs(constant[row]) > NOTHING)
-            or (source.in_nla and abs(constant[row] - default[row]) > NOTHING)
-        )
-    }
-
-
-def _range_of_each(rows: np.ndarray, starts: Sequence[int]) -> np.ndarray:
-    """By how much rows (r, m) vary within each of the parts that start there, shape (r, parts)."""
-    return np.maximum.reduceat(rows, starts, axis=1) - np.minimum.reduceat(rows, starts, axis=1)
 
 
 def _portions(sources: Sequence[Source], range_of: dict[int, tuple[int, int]]) -> Iterator[list[Source]]:
@@ -213,61 +191,53 @@ def _move(
     frames: Sequence[np.ndarray],
     native: np.ndarray,
     delta: np.ndarray,
-    mode: int | None = None,
     given: np.ndarray | None = None,
-) -> None:
+) -> np.ndarray:
     """Fill in Blender's own in-betweens, rotations as unit quaternions, and the deltas to the wanted ones.
 
     The sources are alike: all turn by quaternions or by Euler angles of one order, all scale evenly or none does.
     `native` is of `height`, `delta` of `filled_height`. They may be in the same place: then the deltas are there.
-    `given` is the progress on all frames, in place of that of the channels.
+    `given` is the progress on all frames, in place of that of the channels. Returns how far along its segment of the
+    path each of the samples has come.
     """
     order = sources[0].order
     samples = each(sources, map(len, frames))
-    segments = each(sources, (len(source.key_frames) - 1 for source in sources))
     timing = sampled(samples, frames, out=native)
-    start, end = bounds = channels_at_ends(segments)
     if any(source.is_elastic for source in sources):
         timing = sampled(samples, frames, unit_elastic=True)
-        bounds = channels_at_ends(segments, unit_elastic=True)
-    weights, offsets = progress_weights(*bounds, order)
     counts, on_keys, owners = _counts(sources, frames)
-    modes = np.concatenate([source.modes for source in sources]) if mode is None else np.full(counts.shape, mode)
     original = np.stack([source.original[: len(delta)] for source in sources], axis=1)
-    smooth = np.isin(modes, SMOOTH)
-    ends, lacks = _Ends.of(start, end, segments, smooth), None
-    idle = np.zeros(len(counts), dtype=bool)
-    if ends.turning is not None:
-        idle = are_idle(weights, ends.turning.spins.turns)
-    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
-    if has_handles.any():
-        measured = _measured(ends.times, segments)
-        progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]
-        for segment in np.flatnonzero(idle & has_handles):
-            moments = ends.times[segment, 0] + np.ptp(ends.times[segment]) * MEASURED
-            progress[segment] = ends.idle_progress(segment, moments, sources)
-        tangents, lacks = ends.at_keys(progress, measured, sources[0])
-        ends = replace(ends, tangents=np.where(has_handles, tangents, 1.0))
-        lacks = np.where(has_handles, lacks, 0.0)
+    modes, ends, lacks, (weights, offsets), idle = _prepared([source.path for source in sources])
+    on_paths, passages, along = counts, None, np.empty(timing.shape[1])
+    if any(source.passed.any() for source in sources):
+        passages, (weights, offsets) = _passages(sources, modes, ends)
+        on_paths = np.add.reduceat(counts, passages.first[:-1])
+        if lacks is not None:
+            lacks[:, np.diff(passages.first) > 1] = 0.0
 
     every_frame = np.concatenate(frames)
-    for some, place in blocks(np.concatenate(((0,), np.cumsum(counts))), BLOCK):
+    for some, place in blocks(np.concatenate(((0,), np.cumsum(on_paths))), BLOCK):
+        parts = some if passages is None else slice(*passages.first[[some.start, some.stop]])
         progress = np.empty((1, place.stop - place.start))
-        combine(weights[None, :, some], timing[:, place], counts[some], progress)
-        progress = progress[0] - offsets[some].repeat(counts[some])
-        bounds = np.concatenate(((0,), np.cumsum(counts[some])))
-        for number in np.flatnonzero(idle[some] & (counts[some] > 0)):
+        combine(weights[None, :, parts], timing[:, place], counts[parts], progress)
+        progress = progress[0] - offsets[parts].repeat(counts[parts])
+        bounds = np.concatenate(((0,), np.cumsum(on_paths[some])))
+        for number in np.flatnonzero(idle[some] & (on_paths[some] > 0)):
             own = slice(*bounds[number : number + 2])
             progress[own] = ends.idle_progress(some.start + number, every_frame[place][own], sources)
         turn_into_quaternions(native[:, place], order)
         default = original[:, ends.owners[some]]
         if lacks is not None:
-            first, last = (rows.repeat(counts[some]) for rows in ends.times[some].T)
+            first, last = (rows.repeat(on_paths[some]) for rows in ends.times[some].T)
             elapsed = (every_frame[place] - first) / np.where(last > first, last - first, np.inf)
-            progress = corrected(progress, elapsed, lacks[:, some].repeat(counts[some], axis=1))
+            progress = corrected(progress, elapsed, lacks[:, some].repeat(on_paths[some], axis=1))
         if given is not None:
             progress = given[place]
-        _fill(delta[:, place], native[:, place], default, modes[some], ends, some, counts[some], progress)
+        off = None
+        if passages is not None:
+            progress, off = passages.along(parts, counts[parts], progress)
+        along[place] = progress
+        _fill(delta[:, place], native[:, place], default, modes[some], ends, some, on_paths[some], progress, off)
     # A key is the animator's: nothing is added to it, not even a rounding error.
     delta[:, on_keys] = original[:, owners]
     for number, (source, place) in enumerate(samples):
@@ -275,6 +245,65 @@ def _move(
             before, after = source.used_up
             outside = (frames[number] < before) | (frames[number] > after)
             delta[:, place][:, outside] = original[:, number, None]
+    return along
+
+
+Weights = tuple[np.ndarray, np.ndarray]
+"""What `progress_weights` returns."""
+
+
+def _segments(sources: Sequence[Source]) -> list[tuple[Source, slice]]:
+    return each(sources, (len(source.key_frames) - 1 for source in sources))
+
+
+def _prepared(sources: Sequence[Source]) -> tuple[np.ndarray, Ends, np.ndarray | None, Weights, np.ndarray]:
+    """Return modes and ends of all segments, what their progress lacks at both ends, its weights, and which are idle.
+
+    Idle are those that turn although no channel changes in them.
+    """
+    segments = _segments(sources)
+    start, end = bounds = channels_at_ends(segments)
+    if any(source.is_elastic for source in sources):
+        bounds = channels_at_ends(segments, unit_elastic=True)
+    weights, offsets = progress_weights(*bounds, sources[0].order)
+    modes = np.concatenate([source.modes for source in sources])
+    smooth = np.isin(modes, SMOOTH)
+    ends, lacks = Ends.of(start, end, segments, smooth), None
+    idle = np.zeros(len(modes), dtype=bool)
+    if ends.turning is not None:
+        idle = are_idle(weights, ends.turning.spins.turns)
+    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
+    if has_handles.any():
+        measured = measured_in(ends.times, segments)
+        progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]
+        for segment in np.flatnonzero(idle & has_handles):
+            moments = ends.times[segment, 0] + np.ptp(ends.times[segment]) * MEASURED
+            progress[segment] = ends.idle_progress(segment, moments, sources)
+        tangents, lacks = ends.at_keys(progress, measured, sources[0])
+        ends = replace(ends, tangents=np.where(has_handles, tangents, 1.0))
+        lacks = np.where(has_handles, lacks, 0.0)
+    return modes, ends, lacks, (weights, offsets), idle
+
+
+def _passages(sources: Sequence[Source], modes: np.ndarray, ends: Ends) -> tuple[Passages, Weights]:
+    """Return how keys lie on paths, whose segments have these modes and ends, and the weights from key to key."""
+    segments = _segments(sources)
+    bounds = channels_at_ends(segments)
+    passed = np.concatenate([source.passed[:-1] for source in sources])
+    keys = Ends.of(*bounds, segments, np.zeros(len(passed), dtype=bool)).keys
+
+    def poses_at(counts: np.ndarray, progress: np.ndarray) -> Poses:
+        rows = np.empty((len(progress), 7 if keys.scales is None else 8))
+        for mode in np.unique(modes[counts > 0]):
+            chosen = modes == mode
+            some = np.repeat(chosen, counts)
+            poses = ends.on_paths(slice(0, len(modes)), np.where(chosen, counts, 0), progress[some], MODE_NAMES[mode])
+            rows[some] = packed(poses)
+        return Poses(rows[:, :3], rows[:, 3:7], None if keys.scales is None else rows[:, 7])
+
+    if any(source.is_elastic for source in sources):
+        bounds = channels_at_ends(segments, unit_elastic=True)
+    return Passages.of(passed, keys, poses_at, np.isin(modes, SMOOTH)), progress_weights(*bounds, sources[0].order)
 
 
 def _fill(
@@ -282,12 +311,16 @@ def _fill(
     native: np.ndarray,
     own: np.ndarray,
     modes: np.ndarray,
-    ends: _Ends,
+    ends: Ends,
     segment: slice,
     counts: np.ndarray,
     progress: np.ndarray,
+    off: Poses | None,
 ) -> None:
-    """Fill in the deltas (., m) of some segments, each with its own modes and deltas, (s,) and (., s)."""
+    """Fill in the deltas (., m) of some segments, each with its own modes and deltas, (s,) and (., s).
+
+    `off` is how far off their paths samples (m,) are.
+    """
     for mode in np.unique(modes[counts > 0]):
         chosen = modes == mode
         every = bool(chosen.all())
@@ -296,141 +329,13 @@ def _fill(
         if not mode:
             delta[:, some] = own.repeat(here, axis=1)
             continue
-        wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode])
+        wanted = ends.poses(segment, here, progress[some], MODE_NAMES[mode], None if off is None else off[some])
         part = delta if every else np.empty((len(delta), int(here.sum())))
         differ(wanted, native[:, some], part)
         if wanted.scales is not None:
             part[ROWS[SCALE]] *= own[ROWS[SCALE]].repeat(here, axis=1)
         if not every:
             delta[:, some] = part
-
-
-@dataclass(frozen=True, eq=False)
-class _Ends:
-    """What S segments of several sources run between, with the objects' own delta transforms."""
-
-    owners: np.ndarray
-    """The number of the source of each, shape (S,)."""
-
-    times: np.ndarray
-    """The frames of both keys, shape (S, 2)."""
-
-    keys: Poses
-    """The poses at both, shape (S, 2)."""
-
-    axes: np.ndarray | None
-    """The axes that location runs along, as columns in those of the poses, shape (S, 3, 3); None where they are one."""
-
-    own: np.ndarray
-    """The objects' own delta transforms, shape (10, S)."""
-
-    pairs: tuple[np.ndarray, np.ndarray] | None = None
-    """For smooth modes the segments that meet at a key, before it and after it."""
-
-    around: tuple[np.ndarray, Poses] | None = None
-    """For smooth modes frames and poses of the keys before and behind as well, shape (S, 4)."""
-
-    turning: Turning | None = None
-    """How they turn, None where all of them go the shortest way."""
-
-    whole: Turning | None = None
-    """The same in whole turns alone, for smooth modes."""
-
-    spins: np.ndarray | None = None
-    """For smooth modes what spins add at both ends of the three segments around, shape (3, 2, S, 3)."""
-
-    tangents: np.ndarray | None = None
-    """How long the tangents of smooth modes are at both keys, shape (2, S); None where all are 1."""
-
-    prepared: dict[str, Callable[..., Poses]] = field(default_factory=dict)
-    """What each mode makes of all segments, once it has been asked for."""
-
-    @classmethod
-    def of(cls, start: np.ndarray, end: np.ndarray, segments: list[tuple[Source, slice]], smooth: np.ndarray) -> _Ends:
-        """From the channels (10, S) at both ends, and which of the segments have a smooth mode."""
-        sources = [source for source, _ in segments]
-        owners = np.repeat(np.arange(len(sources)), [place.stop - place.start for _, place in segments])
-        firsts, lasts = ([source.key_frames[part] for source in sources] for part in (slice(-1), slice(1, None)))
-        times = np.stack((np.concatenate(firsts), np.concatenate(lasts)), axis=1)
-        own = np.stack([source.original for source in sources], axis=1)[:, owners]
-        axes = location_axes(sources, owners)
-        keys = body_poses(np.stack((start, end), axis=2), own[..., None], axes, sources[0])
-        turned = whole = None
-        if any(map(needs_turning, sources)):
-            turned, whole = turning_of(sources, start, end, keys, own)
-        ends = cls(owners, times, keys, axes, own, turning=turned, whole=whole)
-        if not smooth.any():
-            return ends
-        holds, pairs = np.concatenate([source.holds for source in sources]), meeting(owners, times, keys)
-        (frames, around), spins = with_neighbours(times, keys, holds, pairs), None
-        if turned is not None:
-            signs = np.where(np.einsum("si,si->s", whole.second, keys.quaternions[:, 1]) < 0.0, -1.0, 1.0)
-            around, spins = spins_of_neighbours(signs, whole.twists, around, holds, pairs)
-        return replace(ends, pairs=pairs, around=(frames, around), spins=spins)
-
-    def idle_progress(self, segment: int, frames: np.ndarray, sources: Sequence[Source]) -> np.ndarray:
-        """Return the progress on frames (m,) of a segment that turns although no channel changes in it."""
-        first, last = (np.full(len(frames), end) for end in self.times[segment])
-        return idle_progress(sources[self.owners[segment]], frames, first, last)
-
-    def at_keys(self, progress: np.ndarray, measured: np.ndarray, source: Source) -> tuple[np.ndarray, np.ndarray]:
-        """Return `tangents_and_lacks`, from progress (S, 6) and the channels (., S, 6) at the moments `MEASURED`."""
-        first, second, slopes = self.keys[:, 0], self.keys[:, 1], progress_slopes(progress)
-        turned = second.quaternions if self.whole is None else self.whole.second
-        screws = twists.between(
-            first.positions, first.quaternions, second.positions, turned, shortest=self.whole is None
-        )
-        screws, poses = np.stack((screws, screws)), body_poses(measured, self.own[..., None], self.axes, source)
-        if self.whole is not None:
-            # Angles turn by spins, too. These are known, and what is left is less than half a turn.
-            poses = without_spins(poses, self.whole.by_angles, progress)
-        native = native_twists(self.keys, poses)
-        if self.whole is not None:
-            added = np.moveaxis(self.whole.twists, 1, 0)
-            screws[:, :3] += added
-            native[:, :3] += slopes[:, None] * added
-        return tangents_and_lacks(slopes, native, screws, self.times, self.pairs)
-
-    def poses(self, some: slice, counts: np.ndarray, progress: np.ndarray, mode: str) -> Poses:
-        """What a mode makes of some of the segments, each with so many samples (s,) of this progress (m,).
-
-        Positions run along the axes that location does.
-        """
-        axes = None if self.axes is None else self.axes[some].repeat(counts, axis=0)
-        if mode not in self.prepared:
-            self.prepared[mode] = self._prepare(mode)
-        within, of_each = some, counts
-        if KEYFRAME_MODES[mode].is_smooth:
-            # Of the three segments between four keys the one in the middle.
-            within = slice(3 * some.start, 3 * some.stop)
-            of_each = np.multiply.outer(counts, (0, 1, 0)).ravel()
-        poses = self.prepared[mode](of_each, progress, within)
-        if self.turning is not None:
-            turned = self.whole if KEYFRAME_MODES[mode].is_smooth else self.turning
-            poses = turned.spins.add_to(poses, counts, progress, some)
-        return poses if axes is None else replace(poses, positions=np.einsum("mji,mj->mi", axes, poses.positions))
-
-    def _prepare(self, mode: str) -> Callable[..., Poses]:
-        curves, turned = KEYFRAME_MODES[mode].curves, self.turning
-        if not KEYFRAME_MODES[mode].is_smooth:
-            times, keys = np.broadcast_to((0.0, 1.0), self.times.shape), self.keys
-            if turned is None:
-                return prepare(times, keys, mode)
-            quaternions = np.stack((turned.first, turned.second), axis=1)
-            return prepare_within(curves, times, replace(keys, quaternions=quaternions), is_aligned=True)
-        if self.tangents is None and turned is None:
-            return prepare(*self.around, mode)
-        tangents = None if self.tangents is None else self.tangents[..., None]
-        curves = partial(curves, tangents=tangents, spins=self.spins)
-        return prepare_within(curves, *self.around, is_aligned=turned is not None)
-
-
-def _measured(times: np.ndarray, segments: list[tuple[Source, slice]]) -> np.ndarray:
-    """The channels' own values in each of S segments at the moments `MEASURED`, shape (., S, 6)."""
-    sources = [source for source, _ in segments]
-    moments = times[:, :1] + (times[:, 1:] - times[:, :1]) * MEASURED
-    frames = [moments[place].ravel() for _, place in segments]
-    return sampled(each(sources, map(len, frames)), frames).reshape(height(sources), -1, len(MEASURED))
 
 
 def _counts(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -16,8 +16,8 @@ def with_neighbours(
     `pairs` are the segments that meet, as `meeting` finds them. Where there is none, or a cycle jumps, the motion goes
     on as in the segment; where a segment holds, it rests.
     """
-    rows = _packed(keys)
-    previous, following = _packed(beyond(keys[:, 0], keys[:, 1])), _packed(beyond(keys[:, 1], keys[:, 0]))
+    rows = packed(keys)
+    previous, following = packed(beyond(keys[:, 0], keys[:, 1])), packed(beyond(keys[:, 1], keys[:, 0]))
     # Between two keys on one frame there is nothing, and what is on either side meets there.
     lasts = times[:, 1] > times[:, 0]
     duration = np.where(lasts, times[:, 1] - times[:, 0], 1.0)
@@ -56,13 +56,13 @@ def spins_of_neighbours(
 
 def meeting(owners: np.ndarray, times: np.ndarray, keys: Poses) -> tuple[np.ndarray, np.ndarray]:
     """Return the segments (p,) before and after each key at which two of them meet: both have the same pose there."""
-    rows, lasts = _packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
+    rows, lasts = packed(keys), np.flatnonzero(times[:, 1] > times[:, 0])
     left, right = lasts[:-1], lasts[1:]
     meet = (owners[right] == owners[left]) & np.all(rows[right, 0] == rows[left, 1], axis=1)
     return left[meet], right[meet]
 
 
-def _packed(poses: Poses) -> np.ndarray:
+def packed(poses: Poses) -> np.ndarray:
     """Positions, quaternions and scales in one array (..., 7 or 8)."""
     scales = () if poses.scales is None else (poses.scales[..., None],)
     return np.concatenate((poses.positions, poses.quaternions, *scales), axis=-1)

@@ -60,9 +60,10 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
     None where it may be all of them.
     """
     alike = (
-        (old.order, old.keyed, old.in_nla, old.frame_range, old.uniform_scale)
-        == (new.order, new.keyed, new.in_nla, new.frame_range, new.uniform_scale)
+        (old.order, old.keyed, old.in_nla, old.frame_range, old.uniform_scale, old.driven, old.influence)
+        == (new.order, new.keyed, new.in_nla, new.frame_range, new.uniform_scale, new.driven, new.influence)
         and not (old.goes_on or new.goes_on)
+        and not (old.passed.any() or new.passed.any())
         and {row: value for row, value in old.rest.items() if row >= 3}
         == {row: value for row, value in new.rest.items() if row >= 3}
         and np.array_equal(old.original, new.original)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from ...motion import KEYFRAME_MODES
 from ..curves import BEZIER, CONSTANT, ELASTIC, LINEAR, Keys, Stepped, cycled, cyclic_times, evaluate, held
-from .components import PART_OF, REST, ROTATION, ROWS, SCALE
+from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 
 MODE_NUMBERS = {"BLENDER": 0, **{name: mode.number for name, mode in KEYFRAME_MODES.items()}}
 """The modes, and what the mode channel and saved files have for each. 0 is Blender's own in-betweens."""
@@ -25,6 +26,9 @@ MODE_IDS = tuple(MODE_NUMBERS)
 
 MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
 """From the number of a mode to its name."""
+
+DEPENDS_ON_KEYS = [MODE_NUMBERS[name] for name in ("pga_lerp", "cga_lerp", "motor_spline")]
+"""The modes whose path would be another one with a key more on it."""
 
 UNKNOWN = -1
 """The mode of something from a file that is damaged, or of a later version."""
@@ -53,6 +57,12 @@ SAME_FRAME = 0.01
 def distinct(frames: np.ndarray) -> np.ndarray:
     """Rising frames of keys, those that are one key to Blender once."""
     return frames[np.diff(frames, prepend=-np.inf) > SAME_FRAME]
+
+
+def rows_left_to(driven: Collection[int]) -> set[int]:
+    """The rows of components that are left to drivers of these: with one of a rotation or a scale go all of it."""
+    parts = {PART_OF[row] for row in driven} - {LOCATION}
+    return {row for row, part in enumerate(PART_OF) if row in driven or part in parts}
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +105,12 @@ class Source:
     modified: frozenset[int] = frozenset()
     """The rows of channels that modifiers add something to, which stays on top of the modes."""
 
+    driven: frozenset[int] = frozenset()
+    """The rows of components that drivers move: to the others they are still."""
+
+    influence: tuple[tuple[float, float], ...] | None = None
+    """Frames, and the influence that a strip with nothing below it has on them; None where that is full."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -114,6 +130,10 @@ class Source:
         if self.has_half_turns:
             summary.update(b"spins")
         span = self.seen if self.goes_on and not self.repeats else None
+        if self.influence is not None:
+            summary.update(repr(self.influence).encode())
+        if self.driven:
+            summary.update(repr(sorted(self.driven)).encode())
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
         if self.has_modified_scale:
             summary.update(b"modified scale")
@@ -278,6 +298,31 @@ class Source:
             places and np.abs(np.diff(values[places])).max(initial=0.0) >= HALF_TURN for values, places in angles
         )
 
+    @cached_property
+    def passed(self) -> np.ndarray:
+        """Which keys lie on the path between the keys around them instead of shaping it, shape (n,).
+
+        Breakdowns in all channels, that is, between others with the same mode, where a path depends on its keys and
+        goes the shortest way round.
+        """
+        passed = np.zeros(len(self.key_frames), dtype=bool)
+        goes_the_shortest_way = self.turns is None and not self.has_half_turns
+        if self.cyclic is None and goes_the_shortest_way and all(keys.breakdowns is not None for keys in self.curves):
+            modes = self.modes
+            passed[1:-1] = np.isin(modes[1:], DEPENDS_ON_KEYS) & (modes[1:] == modes[:-1])
+            for keys in self.curves:
+                passed &= np.isin(self.key_frames, keys.times[keys.breakdowns])
+        return passed
+
+    @cached_property
+    def path(self) -> Source:
+        """The same without the keys that are `passed`."""
+        if not self.passed.any():
+            return self
+        frames = self.key_frames[self.passed]
+        channels = tuple((rows, keys.at(~np.isin(keys.times, frames))) for rows, keys in self.channels)
+        return replace(self, channels=channels)
+
     @property
     def is_live(self) -> bool:
         """Whether there is a segment that is to be filled in otherwise than Blender does."""
@@ -324,7 +369,8 @@ class Source:
     def filled_rows(self) -> list[int]:
         """The rows of the components that in-betweens may differ in from Blender's."""
         rows = list(range(10) if self.uniform_scale else range(7))
-        return [row for row in rows if PART_OF[row] in self.keyed and not (row == 6 and self.order is not None)]
+        rows = [row for row in rows if PART_OF[row] in self.keyed and not (row == 6 and self.order is not None)]
+        return [row for row in rows if row not in self.driven]
 
     @cached_property
     def uniform_scale(self) -> bool:

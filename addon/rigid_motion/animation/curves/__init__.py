@@ -4,6 +4,7 @@ steps       frames held by Stepped modifiers
 keys        F-curves as arrays
 easings     Robert Penner's equations, as Blender has them
 solvers     Bezier segments as cubics, and their roots
+fitting     the handles with which Bezier segments run through given values
 cycles      frames folded back by a Cycles modifier
 spans       what the value is from each key to the next
 grouping    which curves share their timing

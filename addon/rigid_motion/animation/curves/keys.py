@@ -91,6 +91,9 @@ class Keys:
     steps: tuple[Stepped, ...] = ()
     """Stepped modifiers, first to last. The values of curves are worked out without: see `held`."""
 
+    breakdowns: np.ndarray | None = None
+    """Which of the keys are of type *Breakdown*, shape (n,), where any is."""
+
     is_sound: bool = True
     """Whether all numbers that were read are smaller than `LARGEST`, and the keys in the order of their frames."""
 
@@ -110,7 +113,8 @@ class Keys:
 
     def at(self, chosen: np.ndarray) -> Keys:
         """The chosen ones of the keys, by a mask of shape (n,)."""
-        return self._part((slice(None), chosen))
+        part = self._part((slice(None), chosen))
+        return part if self.breakdowns is None else replace(part, breakdowns=self.breakdowns[chosen])
 
     def _part(self, part: tuple) -> Keys:
         arrays = {name: getattr(self, name) for name in ("points", "interpolation", "left", "right", "easing")}
@@ -122,6 +126,7 @@ class Keys:
     def raw(self) -> bytes:
         """All of it as bytes, for a digest that tells whether anything has changed."""
         arrays = (self.points, self.interpolation, self.left, self.right, self.easing, self.easing_settings)
+        arrays += (self.breakdowns,)
         present = [array for array in arrays if array is not None]
         header = f"{self.points.shape} {len(present)} {self.linear} {self.cycles}{self.steps or ''};"
         return b"".join((header.encode(), *(array.tobytes() for array in present)))

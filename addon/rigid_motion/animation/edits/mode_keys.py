@@ -8,6 +8,7 @@ Turns are in a channel likewise, and without it there are none.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -17,7 +18,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...motion.modes import no_such_mode
 from ..actions.mode_property import is_keyed, set_pending_mode
-from ..actions.reading import read
+from ..actions.reading import keyed_in, read
 from ..actions.records import record_mode, record_turns_axis
 from ..actions.refusals import MOST_TURNS, refuse_linked, refuse_numbers
 from ..actions.renaming import follow_renamed
@@ -55,9 +56,7 @@ def set_mode(
     """
 
     def plan(transform: Transform, readings: Readings) -> list[SlotTransform]:
-        if mode != "BLENDER":
-            check(transform, readings)
-        places = [place for place, _ in readings]
+        places = [place for place, _ in readings] if mode == "BLENDER" else able(transform, readings)
         if frames is None:
             return places
         return [_place_of(transform, places)]
@@ -108,8 +107,7 @@ def set_turns(
     """
 
     def plan(transform: Transform, readings: Readings) -> SlotTransform:
-        check(transform, readings)
-        place = _place_of(transform, [place for place, _ in readings])
+        place = _place_of(transform, able(transform, readings))
         if turns and not any(modes_in(place, frames_in(place) if frames is None else np.asarray(frames))):
             text = rpt_("{name}: Blender's own in-betweens make no turns more: choose a mode first")
             raise Refused(text.format(name=transform.name))
@@ -158,6 +156,9 @@ def on_property(transform: Transform) -> None:
     if not places:
         set_pending_mode(transform, mode)
     follow_renamed(places)
+    if mode != "BLENDER":
+        with suppress(Refused):
+            places = able(transform, list(zip(places, keyed_in(places), strict=True)))
     for place in places:
         if not is_keyed(place):
             record_mode(place, MODE_NUMBERS[mode])
@@ -172,11 +173,24 @@ def set_whole(place: SlotTransform, mode: str) -> None:
     record_mode(place, MODE_NUMBERS[mode])
 
 
-def check(transform: Transform, readings: Readings) -> None:
-    """Raise `Refused` where a transform, which is keyed so, cannot have any mode but Blender's own."""
+def able(transform: Transform, readings: Readings) -> list[SlotTransform]:
+    """Return the places of a transform, which is keyed so, that can have a mode beside Blender's own.
+
+    That is its Action at least, or one of its strips where it has none: else `Refused`. Other strips keep Blender's.
+    """
     transform.rotation  # noqa: B018 - raises where it turns by axis and angle
     refuse_linked(transform)
-    for _, source in readings:
-        if isinstance(source, Refused):
-            raise source
-        refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
+    active, found, refusals = active_place(transform, [place for place, _ in readings]), [], []
+    for place, source in readings:
+        try:
+            if isinstance(source, Refused):
+                raise source
+            refuse_numbers(transform.name, replace(source, mode=MODE_NUMBERS["dq_sclerp"]))
+            found.append(place)
+        except Refused as refusal:
+            if place is active:
+                raise
+            refusals.append(refusal)
+    if refusals and not found:
+        raise refusals[0]
+    return found

@@ -5,6 +5,7 @@ modes_in_use     which objects have to do with modes
 raw_keys         the keys of F-curves as bytes, quickly
 snapshots        which bones an edit was about
 operators        which operators have set properties, or a script
+kept_timing      handles with which the motion goes on beside a key inserted in between
 inserted_keys    a key inserted in between keeps the pose on the screen
 left_in_place    what nothing animates any more stays where it is seen
 seen_in_channels  the pose that is seen in the channels, for what of Blender reads these

@@ -18,7 +18,8 @@ which of the two its value is:
   Rigify's switches): whoever did it knows nothing of constraints, and means it as it is. So it is shown, without the
   difference, until it is keyed or the frame changes; and so it is keyed, at once or later.
 
-Where a key gets a pose, so do all keyed channels of the transform.
+Where a key gets a pose, so do all keyed channels of the transform. And where it is of the motion as it was, that goes
+on as it did: see `kept_timing`.
 """
 
 from __future__ import annotations
@@ -34,10 +35,12 @@ from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
-from ..compute.sources import SAME_FRAME, Source
+from ..compute.sources import SAME_FRAME, Source, rows_left_to
+from ..compute.turning import needs_turning
 from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Transform
 from ..writers.table import writer_of
+from .kept_timing import Insertion, keep_timing, mark_breakdown
 from .operators import Operators
 
 MOST_INSERTED = 256
@@ -77,9 +80,15 @@ class InsertedKeys:
         self._posed: dict[tuple[int, str], _Posed] = {}
         self._whole: OrderedDict[tuple[tuple[int, str], bytes], _Posed] = OrderedDict()
         """The whole poses that undo and redo can bring back, by the transform and the components."""
-        self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool]] = OrderedDict()
-        """What undo and redo bring back is decided as it was: the components that there were, and whether they were
-        all of the pose, by the digests before and after."""
+        self._insertions: list[Insertion] = []
+        self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool, bool]] = OrderedDict()
+        """What undo and redo bring back is decided as it was: the components that there were, whether they were all of
+        the pose, and whether they were the in-between as it was, by the digests before and after."""
+
+    def keep_timing(self) -> None:
+        """Have the motion go on as it did beside the keys that were given the pose of it."""
+        insertions, self._insertions = self._insertions, []
+        keep_timing(insertions)
 
     def _keep(self, transform: Transform, posed: _Posed) -> None:
         identity = _identity(transform)
@@ -203,17 +212,26 @@ class InsertedKeys:
         decided, frames = self._inserted.get(change) if again else None, np.array([frame])
         added = added_values(place, user, source, frames)[:, 0]
         if decided is None:
-            shown = old.values_at(old.held(frames))[:, 0] + added if posed is None else posed.components
+            in_between = old.values_at(old.held(frames))[:, 0] + added
+            shown = in_between if posed is None else posed.components
             if not _has_values(source, frame, shown) or (posed is not None and not (posed.on_top or posed.is_shown)):
                 return False
-            decided = self._inserted[change] = shown, posed is not None and posed.is_whole
+            is_whole = posed is not None and posed.is_whole
+            decided = shown, is_whole, not is_whole and _is_same(old, shown, in_between)
+            self._inserted[change] = decided
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
-        shown, is_whole = decided
+        shown, is_whole, is_in_between = decided
+        left = rows_left_to(old.driven)
         seen = (shown if is_whole else _seen_components(user, place, old, shown, frame)) - added
         for row, channel in user.channels.items():
-            if (fcurve := place.curves.get(channel)) is not None:
+            if row not in left and (fcurve := place.curves.get(channel)) is not None:
                 set_key(fcurve, frame, seen[row])
+        if is_in_between and old.keyed_range[0] < frame < old.keyed_range[1]:
+            curves = {row: place.curves[channel] for row, channel in user.channels.items() if channel in place.curves}
+            if not needs_turning(old):
+                mark_breakdown(curves.values(), old, frame)
+            self._insertions.append(Insertion(curves, old, frame))
         return True
 
 
@@ -242,6 +260,12 @@ def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
             if np.any(np.abs(keys.values[:, place] - had) > TOLERANCE * np.maximum(1.0, np.abs(had))):
                 return False
     return True
+
+
+def _is_same(source: Source, components: np.ndarray, others: np.ndarray) -> bool:
+    """Whether these are the same components (10,), as far as they are keyed."""
+    rows = [row for own, _ in source.channels for row in own]
+    return bool(np.all(np.abs(components - others)[rows] <= TOLERANCE * np.maximum(1.0, np.abs(others[rows]))))
 
 
 def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: np.ndarray, frame: float) -> np.ndarray:

@@ -74,6 +74,7 @@ def refresh_places(
                 keyed_anew.append(place)
             else:
                 stale.append((place, source))
+    inserted.keep_timing()
     clear(emptied)
     release(user for place in idle for user in place.users)
     read = read_again(keyed_anew)

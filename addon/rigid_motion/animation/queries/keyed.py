@@ -51,13 +51,14 @@ def source_of(carrier: bpy.types.Object | Transform) -> Source | None:
 
 
 def sources_of(places: Sequence[SlotTransform]) -> list[Source | None]:
-    """What is keyed in each of these, None where nothing is or rigid motion cannot act on it."""
+    """What is keyed in each of these, None where nothing is, it is refused, or a driver moves a part of it."""
     found: list[Source | None] = []
     for place, source in zip(places, keyed_in(places), strict=True):
         try:
             if isinstance(source, Source):
                 refuse_numbers(place.name, source)
-            found.append(source if isinstance(source, Source) and source.channels else None)
+            is_whole = isinstance(source, Source) and source.channels and not source.driven
+            found.append(source if is_whole else None)
         except Refused:
             found.append(None)
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ..actions.mode_property import has_to_do_with_modes
 from ..actions.reading import differing_users, sources_of_users
 from ..actions.refusals import refuse_numbers
 from ..actions.slots import SlotTransform, slot_transforms_of
@@ -21,6 +22,8 @@ def problem_of(target: bpy.types.Object | bpy.types.PoseBone | Transform) -> str
         for place, sources in zip(places, sources_of_users(places), strict=True):
             source = sources[place.users.index(transform)]
             if isinstance(source, Refused):
+                if not has_to_do_with_modes(place):
+                    continue
                 raise source
             refuse_numbers(transform.name, source)
             if source.is_live:

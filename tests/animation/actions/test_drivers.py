@@ -1,0 +1,153 @@
+"""A driver has its channel; what it does not move keeps its mode."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import Refused, bake, problem_of, reduce_keys_of, set_mode
+from tests.animation.bones.rigs import key_all, new_rig
+from tests.animation.oracle import curves_of, shown_worlds, snapshot
+from tests.animation.scenes import key, new_object
+
+FRAMES = np.arange(1.0, 41.0)
+MODES = ["dq_sclerp", "cga_lerp", "motor_spline"]
+
+
+def drive(carrier, path: str, index: int) -> None:
+    carrier.driver_add(path, index).driver.expression = "0.1 * frame"
+    bpy.context.view_layer.update()
+
+
+def shown(obj) -> np.ndarray:
+    return shown_worlds([obj], FRAMES)[0]
+
+
+@pytest.mark.parametrize("later", [False, True], ids=["before the mode", "after it"])
+@pytest.mark.parametrize("mode", MODES)
+def test_what_is_not_driven_moves_as_if_the_driven_coordinate_were_still(live_file, mode, later):
+    """A constant added to a coordinate moves a whole path along: the others cannot know what it is."""
+    obj, still = key(new_object()), key(new_object("Still"))
+    still_z = curves_of(still)["location", 2]
+    for point in still_z.keyframe_points:
+        point.co_ui.y = 3.0
+    still_z.update()
+    set_mode(still, mode)
+    if later:
+        set_mode(obj, mode)
+        drive(obj, "location", 2)
+    else:
+        drive(obj, "location", 2)
+        set_mode(obj, mode)
+    now, then = shown(obj), shown(still)
+    np.testing.assert_allclose(now[:, 2, 3], 0.1 * FRAMES, atol=1e-5)
+    then[:, 2, 3] = now[:, 2, 3]
+    assert np.abs(now - then).max() < 1e-5
+    assert problem_of(obj) == ""
+
+
+@pytest.mark.parametrize(("path", "index"), [("rotation_euler", 2), ("scale", 1)])
+def test_a_driven_angle_or_scale_takes_all_of_it_to_blender_and_the_rest_keeps_its_mode(live_file, path, index):
+    obj, other = (key(new_object(name, "XYZ"), scale="even") for name in ("Tool", "Other"))
+    drive(obj, path, index)
+    set_mode(obj, "dq_sclerp")
+    before = {channel: fcurve.evaluate(17.0) for channel, fcurve in curves_of(obj).items()}
+    for fcurve in [c for (name, _), c in curves_of(other).items() if name == path]:
+        fcurve.mute = True
+    set_mode(other, "dq_sclerp")
+    bpy.context.scene.frame_set(17)
+    parts = [name for name in ("location", "rotation_euler", "scale") if name != path]
+    for name in parts:
+        delta = f"delta_{name}"
+        np.testing.assert_allclose(getattr(obj, delta), getattr(other, delta), atol=1e-6)
+    assert path not in {name.removeprefix("delta_") for name, _ in curves_of(obj) if name.startswith("delta_")}
+    assert [getattr(obj, path)[i] for i in range(3) if i != index] == pytest.approx(
+        [before[path, i] for i in range(3) if i != index]
+    )
+    assert np.abs(obj.delta_location).max() > 1e-3, "there is a mode in it"
+    assert problem_of(obj) == ""
+
+
+def test_a_driver_on_one_channel_of_a_bone_leaves_the_others_their_mode(live_file):
+    rig, other = key_all(new_rig()), key_all(new_rig("Other"))
+    hand, same = rig.pose.bones["Hand"], other.pose.bones["Hand"]
+    set_mode([hand, same], "dq_sclerp")
+    drive(hand, "location", 1)
+    assert problem_of(hand) == ""
+    raw = curves_of(hand)["location", 1].evaluate(17.0)
+    bpy.context.scene.frame_set(17)
+    assert hand.location[1] == pytest.approx(1.7) != raw
+    still = curves_of(same)["location", 1]
+    for point in still.keyframe_points:
+        point.co_ui.y = 1.7
+    still.update()
+    bpy.context.scene.frame_set(16)
+    bpy.context.scene.frame_set(17)
+    (above, driven), (_, compared) = (
+        [np.array(bone.matrix) for bone in (posed["Hand"].parent, posed["Hand"])]
+        for posed in (obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones for obj in (rig, other))
+    )
+    assert np.abs(driven[:3, :3] - compared[:3, :3]).max() < 1e-5
+    rest = np.linalg.inv(np.array(hand.parent.bone.matrix_local)) @ np.array(hand.bone.matrix_local)
+    off = np.linalg.inv((above @ rest)[:3, :3]) @ (driven - compared)[:3, 3]
+    assert np.abs(off[[0, 2]]).max() < 1e-5, "along the driven axis alone the mode has no say"
+    assert abs(off[1]) > 1e-3
+
+
+def test_its_motion_is_baked_and_the_driver_stays(live_file):
+    obj = key(new_object())
+    drive(obj, "location", 2)
+    set_mode(obj, "dq_sclerp")
+    before, keyed = shown(obj), snapshot(obj)["location", 2]
+    bake(obj)
+    assert snapshot(obj)["location", 2] == keyed
+    assert np.abs(shown(obj) - before).max() < 1e-5
+    assert len(obj.animation_data.drivers) == 1
+
+
+def test_a_key_in_between_leaves_the_keys_of_a_driven_channel_alone(live_file):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    drive(obj, "location", 2)
+    bpy.context.scene.frame_set(15)
+    keyed = snapshot(obj)["location", 2]
+    before = np.array(obj.matrix_world)
+    for path, index in (("location", 0), ("location", 1), ("rotation_quaternion", -1)):
+        obj.keyframe_insert(path, index=index)
+    bpy.context.view_layer.update()
+    assert snapshot(obj)["location", 2] == keyed
+    assert np.abs(np.array(obj.matrix_world) - before).max() < 1e-5
+
+
+def test_few_keys_are_refused_where_a_driver_moves_part_of_it(live_file):
+    obj = key(new_object(), np.arange(1.0, 30.0))
+    drive(obj, "location", 2)
+    with pytest.raises(Refused, match="Location Z is driven"):
+        reduce_keys_of(obj, "dq_sclerp", 0.01, 0.1)
+
+
+def test_a_muted_driver_is_none(live_file):
+    obj, other = key(new_object()), key(new_object("Other"))
+    drive(obj, "location", 2)
+    obj.animation_data.drivers[0].mute = True
+    set_mode([obj, other], "dq_sclerp")
+    assert np.abs(shown(obj) - shown(other)).max() < 1e-6
+
+
+def test_noise_on_top_of_an_action_with_a_mode_is_no_problem_of_it(live_file):
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    before = shown(obj)
+    noise = key(new_object("Shake"), seed=3).animation_data.action
+    for fcurve in noise.layers[0].strips[0].channelbags[0].fcurves:
+        fcurve.modifiers.new("NOISE")
+    strip = obj.animation_data.nla_tracks.new().strips.new("Shake", 1, noise)
+    strip.blend_type, strip.action_slot = "ADD", noise.slots[0]
+    bpy.context.view_layer.update()
+    assert problem_of(obj) == ""
+    strip.mute = True
+    bpy.context.view_layer.update()
+    assert np.abs(shown(obj) - before).max() < 1e-5
+    set_mode(obj, "motor_spline")
+    assert problem_of(obj) == ""

@@ -1,0 +1,79 @@
+"""Handles with which Bezier segments run through given values."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from rigid_motion.animation.curves.fitting import fit_together
+from rigid_motion.animation.curves.solvers import bezier_cubics, solve_cubics
+
+TIMES = np.linspace(0.0, 1.0, 41)
+
+
+def values_of(handles: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """A segment from (0, 0) to (1, 1), by bisection on its time."""
+    points = np.stack(((0.0, 0.0), *handles, (1.0, 1.0)))
+    low, high = np.zeros_like(times), np.ones_like(times)
+    for _ in range(60):
+        t = 0.5 * (low + high)
+        late = _bezier(points, t)[:, 0] > times
+        low, high = np.where(late, low, t), np.where(late, t, high)
+    return _bezier(points, low)[:, 1]
+
+
+def _bezier(points: np.ndarray, t: np.ndarray) -> np.ndarray:
+    level = [np.repeat(point[None], len(t), axis=0) for point in points]
+    while len(level) > 1:
+        level = [one + t[:, None] * (other - one) for one, other in itertools.pairwise(level)]
+    return level[0]
+
+
+@pytest.mark.parametrize(
+    "handles",
+    [
+        ((1 / 3, 0.0), (2 / 3, 1.0)),
+        ((0.39, 0.0), (0.61, 1.0)),
+        ((0.8, 0.0), (0.9, 1.0)),
+        ((0.1, 0.7), (0.6, 1.3)),
+        ((0.0, 0.0), (1.0, 1.0)),
+        ((0.5, -0.6), (0.5, 1.6)),
+        ((0.9, 0.1), (0.2, 0.8)),
+    ],
+)
+def test_one_segment_is_recovered(handles):
+    values = values_of(np.array(handles), TIMES)
+    found = fit_together(TIMES, values, np.array((1.0,)), np.array(((0.2, 0.5),)))[0]
+    often = np.linspace(0.0, 1.0, 333)
+    assert np.abs(values_of(found, often) - values_of(np.array(handles), often)).max() < 1e-4
+    assert np.all((found[:, 0] >= 0.0) & (found[:, 0] <= 1.0))
+
+
+def test_what_no_single_segment_is_can_be_the_mean_of_several():
+    random = np.random.default_rng(1)
+    errors = []
+    for _ in range(20):
+        x = np.sort(random.uniform(0.05, 0.95, size=(4, 2)), axis=1)
+        handles = np.stack((x, random.normal(0.5, 0.5, size=(4, 2))), axis=2)
+        old, new = random.dirichlet((2.0,) * 4, size=2)
+        values = sum(share * values_of(each, TIMES) for share, each in zip(old, handles, strict=True))
+        found = fit_together(TIMES, values, new, x)
+        mean = sum(share * values_of(each, TIMES) for share, each in zip(new, found, strict=True))
+        errors.append(np.abs(mean - values).max())
+    assert max(errors) < 2e-4
+
+
+def test_a_part_of_a_segment_has_the_handles_of_de_casteljau():
+    """The same that Blender sets where it inserts a key on an F-curve."""
+    points = np.array(((0.0, 0.0), (0.2, 0.9), (0.7, 0.3), (1.0, 1.0)))
+    t = 0.4
+    q = points[:-1] + t * np.diff(points, axis=0)
+    r = q[:-1] + t * np.diff(q, axis=0)
+    end = r[0] + t * (r[1] - r[0])
+    cubic = bezier_cubics(*(point[None].astype(np.float32) for point in points))[:, 0]
+    parameters = solve_cubics(TIMES * end[0], np.repeat(cubic[:, :1], len(TIMES), axis=1))
+    values = cubic[:, 1] @ np.stack((parameters, parameters**2, parameters**3)) / end[1]
+    found = fit_together(TIMES, values, np.array((1.0,)), np.array(((0.3, 0.6),)))[0]
+    np.testing.assert_allclose(values_of(found, TIMES), values_of(np.stack((q[0], r[0])) / end, TIMES), atol=1e-5)

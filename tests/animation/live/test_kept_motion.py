@@ -1,0 +1,329 @@
+"""A key inserted between Bezier keys leaves the motion as it was: in every mode, with any handles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import bake, set_mode
+from rigid_motion.animation.actions.reading import keyed_in
+from rigid_motion.animation.actions.slots import slot_transforms_of
+from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.transforms import transform_of
+from tests.animation.bones.rigs import new_rig
+from tests.animation.oracle import MODE_IDS, curves_of, matrices, shown_worlds, snapshot
+from tests.animation.scenes import new_object, push_down, tweak
+
+FRAMES = (1.0, 17.0, 25.0, 49.0, 60.0)
+POSES = [
+    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
+    ((1.0, 0.4, -0.3), (0.9, 0.1, -0.2, 0.37)),
+    ((1.9, 1.5, 0.1), (0.6, 0.3, -0.3, 0.67)),
+    ((3.5, 1.9, 0.2), (0.2, 0.5, -0.3, 0.78)),
+    ((3.0, 1.0, 1.2), (0.1, 0.2, -0.5, 0.78)),
+]
+POINTS = np.array(((0.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0))).T
+"""The origin, and three points 1 m out."""
+
+MILLIMETRE = 1e-3
+PLAYED = np.arange(1.0, 61.0)
+
+
+def keyed(carrier, frames=FRAMES, *, scale: bool = False):
+    """Something with keys as I sets them."""
+    for number, (frame, (location, quaternion)) in enumerate(zip(frames, POSES, strict=False)):
+        carrier.location = location
+        if carrier.rotation_mode == "QUATERNION":
+            carrier.rotation_quaternion = quaternion / np.linalg.norm(quaternion)
+        else:
+            carrier.rotation_euler = np.array((0.3, -0.2, 0.5)) * number
+        carrier.scale = (1.0 + 0.4 * number,) * 3 if scale else (1.0, 1.0, 1.0)
+        insert(carrier, frame)
+    return carrier
+
+
+def insert(carrier, frame: float | None = None) -> None:
+    """Key all of it, at this frame or at that of the scene."""
+    turned = "rotation_quaternion" if carrier.rotation_mode == "QUATERNION" else "rotation_euler"
+    for path in ("location", turned, "scale"):
+        carrier.keyframe_insert(path, **({} if frame is None else {"frame": frame}))
+
+
+def keys_of(carrier):
+    for (path, _), fcurve in curves_of(carrier).items():
+        if not path.startswith(("rigid_motion", "delta")):
+            yield from fcurve.keyframe_points
+
+
+def automatic(carrier) -> None:
+    pass
+
+
+def pulled(kind: str, *, apart: bool) -> Callable:
+    """Handles set by hand, on frames that the channels share or each on its own."""
+
+    def pull(carrier) -> None:
+        random = np.random.default_rng(4)
+        shares = random.uniform(0.1, 0.6, size=(len(FRAMES), 2))
+        for (path, _), fcurve in curves_of(carrier).items():
+            points = fcurve.keyframe_points
+            if path.startswith(("rigid_motion", "delta")):
+                continue
+            for number, point in enumerate(points):
+                left, right = random.uniform(0.1, 0.6, size=2) if apart else shares[number]
+                before = point.co[0] - points[max(number - 1, 0)].co[0]
+                behind = points[min(number + 1, len(points) - 1)].co[0] - point.co[0]
+                slope = 0.02 * random.normal()
+                point.handle_left_type = point.handle_right_type = kind
+                point.handle_left = point.co[0] - left * before, point.co[1] - slope * before
+                point.handle_right = point.co[0] + right * behind, point.co[1] + slope * behind
+            fcurve.update()
+
+    return pull
+
+
+def typed(kind: str) -> Callable:
+    def set_types(carrier) -> None:
+        for point in keys_of(carrier):
+            point.handle_left_type = point.handle_right_type = kind
+        for fcurve in curves_of(carrier).values():
+            fcurve.update()
+
+    return set_types
+
+
+def linear(carrier) -> None:
+    for point in keys_of(carrier):
+        point.interpolation = "LINEAR"
+
+
+def partly_linear(carrier) -> None:
+    for point in curves_of(carrier)["location", 0].keyframe_points:
+        point.interpolation = "LINEAR"
+
+
+HANDLES = {
+    "as I sets them": automatic,
+    "AUTO": typed("AUTO"),
+    "VECTOR": typed("VECTOR"),
+    "ALIGNED": pulled("ALIGNED", apart=False),
+    "FREE": pulled("FREE", apart=False),
+    "FREE, each channel otherwise": pulled("FREE", apart=True),
+    "linear": linear,
+    "one channel linear": partly_linear,
+}
+
+
+def between(obj: bpy.types.Object) -> np.ndarray:
+    """Where the points are at quarters of frames, between the samples as well, shape (m, 3, 4)."""
+    (source,) = keyed_in(slot_transforms_of([transform_of(obj)]))
+    frames = np.arange(4.0 * FRAMES[0], 4.0 * FRAMES[-1] + 1.0) / 4.0
+    poses = in_betweens(source, frames).wanted
+    scales = np.ones(len(frames)) if poses.scales is None else poses.scales
+    return (matrices(poses.positions, poses.quaternions, np.repeat(scales[:, None], 3, axis=1)) @ POINTS)[:, :3]
+
+
+def shown(obj: bpy.types.Object) -> np.ndarray:
+    """Where Blender shows them on whole frames."""
+    return (shown_worlds([obj], PLAYED)[0] @ POINTS)[:, :3]
+
+
+def largest(now: np.ndarray, then: np.ndarray) -> float:
+    return float(np.linalg.norm(now - then, axis=1).max())
+
+
+def key_on(carrier, frame: int) -> None:
+    bpy.context.scene.frame_set(frame)
+    bpy.context.view_layer.update()
+    insert(carrier)
+    bpy.context.view_layer.update()
+
+
+@pytest.mark.parametrize("handles", HANDLES)
+@pytest.mark.parametrize("mode", [mode for mode in MODE_IDS if mode != "BLENDER"])
+def test_a_key_in_between_leaves_the_motion_as_it_was(live_file, mode, handles):
+    obj = keyed(new_object())
+    HANDLES[handles](obj)
+    set_mode(obj, mode)
+    seen, motion = shown(obj), between(obj)
+    for frame in (31, 34, 9):
+        key_on(obj, frame)
+        assert largest(shown(obj), seen) < MILLIMETRE, f"key on {frame}"
+        assert largest(between(obj), motion) < MILLIMETRE, f"key on {frame}"
+
+
+@pytest.mark.parametrize("mode", ["cga_lerp", "cga_slerp", "motor_spline"])
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+def test_so_it_does_where_it_grows_and_turns_by_any_channels(live_file, mode, order):
+    obj = keyed(new_object("Tool", order), scale=True)
+    set_mode(obj, mode)
+    seen, motion = shown(obj), between(obj)
+    for frame in (20, 40):
+        key_on(obj, frame)
+    assert largest(shown(obj), seen) < MILLIMETRE
+    assert largest(between(obj), motion) < MILLIMETRE
+
+
+def test_the_handles_beside_it_are_kept(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "dq_sclerp")
+    before = {
+        path: fcurve.keyframe_points[2].handle_left[:] for path, fcurve in curves_of(obj).items() if "d" not in path[0]
+    }
+    before = snapshot(obj)
+    key_on(obj, 31)
+    for channel, (*_, points) in snapshot(obj).items():
+        then = before[channel][-1]
+        assert points[2][2:4] == then[2][2:4], "before the key in front of it"
+        assert points[4][4:6] == then[3][4:6], "behind the key after it"
+        np.testing.assert_allclose([points[i][:6] for i in (0, 1, 5)], [then[i][:6] for i in (0, 1, 4)], atol=1e-5)
+
+
+def test_so_it_does_for_bones(live_file):
+    rig = new_rig()
+    hand = keyed(rig.pose.bones["Hand"])
+    set_mode(hand, "motor_spline")
+
+    def poses() -> np.ndarray:
+        found = []
+        for frame in PLAYED:
+            bpy.context.scene.frame_set(int(frame))
+            evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            found.append(np.array(evaluated.pose.bones["Hand"].matrix) @ POINTS)
+        return np.array(found)[:, :3]
+
+    before = poses()
+    for frame in (31, 34):
+        key_on(hand, frame)
+    assert largest(poses(), before) < MILLIMETRE
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+def test_so_it_does_in_a_strip_that_is_edited(live_file, mode):
+    obj = keyed(new_object())
+    set_mode(obj, mode)
+    strip = push_down(obj, 11)
+    before = shown_worlds([obj], PLAYED + 10.0)[0] @ POINTS
+    tweak(obj, strip)
+    key_on(obj, 40)
+    obj.animation_data.use_tweak_mode = False
+    bpy.context.view_layer.update()
+    after = shown_worlds([obj], PLAYED + 10.0)[0] @ POINTS
+    assert 30.0 in {point.co[0] for point in strip.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points}
+    assert largest(after[:, :3], before[:, :3]) < MILLIMETRE
+
+
+def test_undo_takes_it_back_and_redo_brings_the_motion_again(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    before, keys = shown(obj), snapshot(obj)
+    bpy.context.scene.frame_set(31)
+    bpy.ops.ed.undo_push(message="Begin")
+    key_on(obj, 31)
+    bpy.ops.ed.undo_push(message="Key")
+    after = snapshot(bpy.data.objects["Tool"])
+    bpy.ops.ed.undo()
+    assert snapshot(bpy.data.objects["Tool"]) == keys
+    bpy.ops.ed.redo()
+    assert snapshot(bpy.data.objects["Tool"]) == after
+    assert largest(shown(bpy.data.objects["Tool"]), before) < MILLIMETRE
+
+
+def test_a_pose_by_hand_is_an_ordinary_key(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    bpy.context.scene.frame_set(31)
+    obj.location.z += 1.0
+    bpy.context.view_layer.update()
+    insert(obj)
+    bpy.context.view_layer.update()
+    assert {point.type for point in keys_of(obj)} == {"KEYFRAME"}
+    assert {point.handle_left_type for point in keys_of(obj)} == {"AUTO_CLAMPED"}
+
+
+def test_so_it_is_where_only_another_channel_is_keyed_than_was_posed(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    bpy.context.scene.frame_set(31)
+    obj.location.z += 1.0
+    bpy.context.view_layer.update()
+    obj.keyframe_insert("rotation_quaternion")
+    bpy.context.view_layer.update()
+    assert {point.type for point in keys_of(obj)} == {"KEYFRAME"}
+
+
+def test_with_blenders_own_in_betweens_it_is_blenders_own_key(live_file):
+    obj, other = keyed(new_object()), keyed(new_object("Other"))
+    set_mode(obj, "BLENDER")
+    for one in (obj, other):
+        key_on(one, 31)
+    assert snapshot(obj)["location", 0] == snapshot(other)["location", 0]
+
+
+# -- breakdowns -------------------------------------------------------------------------------------------------------
+
+
+def type_of(obj, frame: float) -> set[str]:
+    return {point.type for point in keys_of(obj) if point.co[0] == frame}
+
+
+@pytest.mark.parametrize("mode", MODE_IDS)
+def test_it_is_a_breakdown_where_another_key_would_make_another_path(live_file, mode):
+    obj = keyed(new_object())
+    set_mode(obj, mode)
+    key_on(obj, 31)
+    depends = mode in ("pga_lerp", "cga_lerp", "motor_spline")
+    assert type_of(obj, 31.0) == {"BREAKDOWN" if depends else "KEYFRAME"}
+    assert type_of(obj, 25.0) == {"KEYFRAME"}
+
+
+def test_a_breakdown_that_is_moved_is_hit_and_takes_along_what_is_beside_it_alone(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "motor_spline")
+    key_on(obj, 31)
+    before = shown(obj)
+    fcurve = curves_of(obj)["location", 2]
+    key = next(point for point in fcurve.keyframe_points if point.co[0] == 31.0)
+    key.co_ui.y += 0.4
+    fcurve.update()
+    bpy.context.view_layer.update()
+    after = shown(obj)
+    way = np.linalg.norm(after - before, axis=1).max(axis=1)
+    assert way[30] == pytest.approx(0.4, abs=1e-5)
+    assert way[(PLAYED <= 25.0) | (PLAYED >= 49.0)].max() < 1e-5
+    assert np.all(way[25:30] > 0.0)
+    assert way.max() < 0.41
+    bends = np.linalg.norm(np.diff(after[25:47, :, 0], n=2, axis=0), axis=1)
+    assert bends.max() < 0.1, "and nowhere suddenly"
+
+
+def test_a_bake_of_one_side_of_a_breakdown_is_widened_to_its_path(live_file):
+    obj = keyed(new_object())
+    set_mode(obj, "pga_lerp")
+    key_on(obj, 31)
+    before = shown(obj)
+    assert bake(obj, first=33.0, last=40.0) == (25.0, 49.0)
+    assert largest(shown(obj), before) < 1e-4
+
+
+def test_as_a_keyframe_it_shapes_the_path_again(live_file):
+    obj, other = keyed(new_object()), keyed(new_object("Other"))
+    for one in (obj, other):
+        set_mode(one, "motor_spline")
+        key_on(one, 31)
+    before = shown(obj)
+    for point in keys_of(obj):
+        point.type = "KEYFRAME"
+    for fcurve in curves_of(obj).values():
+        fcurve.update()
+    bpy.context.view_layer.update()
+    assert largest(shown(obj), before) > 10.0 * MILLIMETRE
+    for point in keys_of(other):
+        point.type = "BREAKDOWN"
+    bpy.context.view_layer.update()
+    ends = shown_worlds([other], [1.0, 17.0, 25.0, 31.0, 49.0, 60.0])[0][:, :3, 3]
+    wanted = [POSES[number][0] for number in (0, 1, 2, 3, 4)]
+    np.testing.assert_allclose(np.delete(ends, 3, axis=0), wanted, atol=1e-5)
