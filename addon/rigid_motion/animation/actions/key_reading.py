@@ -85,8 +85,8 @@ def _read_batch(
         easings = (easing[at], np.stack([values[at] for values in settings])) if eased[number] else (None, None)
         marked = breakdowns[at].all(axis=0)
         marked = marked if marked.any() else None
-        settings = (linear, cycles, steps, marked, bool(sound[number]))
-        yield rows, Keys(points[at], interpolation[at], *handles, *easings, *settings)
+        others = (linear, cycles, steps, marked, bool(sound[number]))
+        yield rows, Keys(points[at], interpolation[at], *handles, *easings, *others)
 
 
 def _keyed_together(owners: Sequence[int], frames: np.ndarray) -> list[list[int]]:
