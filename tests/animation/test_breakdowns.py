@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Matrix, Quaternion
 
-from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, write_channel
+from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import new_rig
 from tests.animation.oracle import Own, as_quaternion, curves_of, key_frames, matrices, shown_worlds, snapshot, unit
@@ -272,3 +272,53 @@ def test_a_breakdown_below_noise_and_holds_is_that_of_the_keys(live_file):
             ]
         )
     np.testing.assert_allclose(*poses, atol=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["motor_spline", "pga_lerp"])
+def test_a_breakdown_leaves_the_path_and_changes_when_the_body_is_there(live_file, mode):
+    obj = new_object(rotation_mode="QUATERNION")
+    key(obj, seed=5, interpolation="LINEAR")
+    set_mode(obj, mode)
+    times = np.linspace(BEFORE, AFTER, 2001)
+    path = animation_of(obj, mode, times)
+    beside = shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0]
+    bpy.context.scene.frame_set(int(NOW))
+    breakdown(obj, 0.8)
+    assert {one.type for curve in curves_of(obj).values() for one in curve.keyframe_points if one.co[0] == NOW} == {
+        "BREAKDOWN"
+    }
+    shown = shown_worlds([obj], np.arange(BEFORE, AFTER + 1.0))[0]
+    nearest = np.abs(shown[:, None] - path).max(axis=(2, 3)).min(axis=1)
+    assert nearest.max() < 2e-3 * np.abs(path).max()
+    np.testing.assert_allclose(shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0], beside, atol=2e-5)
+
+
+def animation_of(obj: bpy.types.Object, mode: str, times: np.ndarray) -> np.ndarray:
+    """What a mode makes of linear keys at times (m,), as matrices."""
+    keys = key_poses(obj, 5, Own())
+    poses = interpolate(FRAMES, keys, times, mode)
+    return matrices(poses.positions, poses.quaternions, np.ones((len(times), 3)))
+
+
+@pytest.mark.parametrize("factor", [0.25, 0.5])
+def test_a_breakdown_shares_turns_out_and_cancelling_gives_them_back(live_file, factor):
+    obj = new_object(rotation_mode="QUATERNION")
+    write_channel(obj, "location", np.array((1.0, 25.0)), np.array(((0.0, 0.0, 0.0), (4.0, 0.0, 0.0))))
+    write_channel(obj, "rotation_quaternion", np.array((1.0, 25.0)), np.array(((1.0, 0.0, 0.0, 0.0),) * 2))
+    set_mode(obj, "dq_sclerp")
+    set_turns(obj, 2)
+    before = snapshot(obj)
+    motion = shown_worlds([obj], np.arange(1.0, 26.0, 0.5))[0]
+    bpy.context.scene.frame_set(13)
+    tries = Breakdowns(obj)
+    for each in (0.9, 0.1, factor):
+        tries.apply(each)
+    for share, frame in ((0.5 * factor, 7.0), (factor, 13.0), (0.5 + 0.5 * factor, 19.0)):
+        shown = shown_worlds([obj], [frame])[0][0]
+        turned = np.array(Quaternion((0.0, 0.0, 1.0), 4.0 * np.pi * share).to_matrix())
+        np.testing.assert_allclose(shown[:3, :3], turned, atol=2e-5)
+        assert shown[0, 3] == pytest.approx(4.0 * share, abs=2e-5)
+    bpy.context.scene.frame_set(13)
+    tries.cancel()
+    assert snapshot(obj) == before
+    np.testing.assert_allclose(shown_worlds([obj], np.arange(1.0, 26.0, 0.5))[0], motion, atol=1e-6)

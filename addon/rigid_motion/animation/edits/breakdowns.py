@@ -19,13 +19,16 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...motion import Poses, interpolate
 from ..actions.channels import KeyFields, key_fields, set_key_fields
 from ..actions.modifiers import added_values
+from ..actions.reading import read
 from ..actions.refusals import refuse_linked
 from ..actions.slots import SlotTransform
 from ..compute.bodies import body_poses
 from ..compute.differences import in_betweens
-from ..compute.sources import MODE_NAMES, SAME_FRAME, Source
+from ..compute.sources import DEPENDS_ON_KEYS, MODE_NAMES, MODE_NUMBERS, SAME_FRAME, Source
+from ..compute.turning import needs_turning
 from ..live import follower
 from ..live.inserted_keys import set_key
+from ..live.segment_keys import share_out_turns
 from ..queries.keyed import active_place
 from ..queries.segments import frame_in_action
 from ..queries.visible_pose import shown_components
@@ -90,6 +93,9 @@ class _Between:
     keys: dict[Channel, KeyFields]
     """The keys of its channels as they were."""
 
+    turns: KeyFields | None
+    """Those of its channel of turns, None where it has none."""
+
     @property
     def mode(self) -> str:
         return MODE_NAMES[self.source.mode_at(self.ends[0] + SAME_FRAME)]
@@ -133,10 +139,20 @@ class _Between:
         """Give its channels the keys that they had."""
         for channel, fields in self.keys.items():
             set_key_fields(self.place.curves[channel], fields)
+        channel = self.transform.turns_channel
+        if self.turns is not None:
+            set_key_fields(self.place.ensure_curve(channel), self.turns)
+        elif channel in self.place.curves:
+            self.place.channelbag.fcurves.remove(self.place.curves.pop(channel))
 
-    def key(self, components: np.ndarray) -> None:
-        """Set a key of these components in all channels that have keys."""
-        key_type = bpy.context.scene.tool_settings.keyframe_type
+    def key(self, kind: str, factor: float) -> None:
+        """Set a key of the pose in all channels that have keys, and share out the turns of the segment.
+
+        Where another key would make another path, one that lies on the path is of type *Breakdown*, and leaves it.
+        """
+        components, key_type = self.pose(kind, factor), bpy.context.scene.tool_settings.keyframe_type
+        if kind == BREAKDOWN and MODE_NUMBERS[self.mode] in DEPENDS_ON_KEYS and not needs_turning(self.source):
+            key_type = "BREAKDOWN"
         for row, channel in self.transform.channels.items():
             if channel in self.keys:
                 fcurve = self.place.curves[channel]
@@ -144,6 +160,10 @@ class _Between:
                 set_key(fcurve, self.frame, components[row])
                 if len(fcurve.keyframe_points) > before:
                     next(one for one in fcurve.keyframe_points if _is_on(one, self.frame)).type = key_type
+        if needs_turning(self.source):
+            place = self.place.read_again()
+            share_out_turns(place, read(place), self.source, factor if kind == BREAKDOWN else None)
+            self.place.curves.update(place.curves)
 
 
 class Breakdowns:
@@ -167,7 +187,7 @@ class Breakdowns:
         """Key the poses of this factor, in place of those of the factor before."""
         with self._edit():
             for between in self._between:
-                between.key(between.pose(self.kind, factor))
+                between.key(self.kind, factor)
                 follower.follower.inserted.notice_values(between.transform, self._frame)
 
     def cancel(self) -> None:
@@ -223,6 +243,7 @@ class Breakdowns:
             (transform.components() if seen is None else seen) - added,
             {name: tuple(getattr(transform.carrier, name)) for name in transform.properties.values()},
             {channel: key_fields(place.curves[channel]) for channel in keyed},
+            None if (turns := place.curves.get(transform.turns_channel)) is None else key_fields(turns),
         )
 
 

@@ -105,18 +105,29 @@ SAMPLES = 16
 """Of each part of a segment, and of each turn in it, to see how far a motion turns."""
 
 
-def share_out_turns(place: SlotTransform, source: Source) -> bool:
+def share_out_turns(
+    place: SlotTransform, source: Source, old: Source | None = None, progress: float | None = None
+) -> bool:
     """Share the turns of segments out among the parts that keys divide them into, so that the motion stays as it is.
 
-    Where keys go between such parts, these have whole turns together again. `source` is what is keyed by now. Returns
-    whether there was anything to change.
+    Where keys go between such parts, these have whole turns together again. Returns whether anything was changed.
+
+    Parameters
+    ----------
+    place : SlotTransform
+    source : Source
+        What is keyed by now.
+    old : Source, optional
+        What was before, instead of what the in-betweens are made from.
+    progress : float, optional
+        How far the pose of the one new key is along its segment, instead of where the body was on its frame.
     """
-    old = cached_source(recorded_digest(place))
+    old = cached_source(recorded_digest(place)) if old is None else old
     if old is None or old.order != source.order or source.cyclic is not None or not needs_turning(old):
         return False
     if source.key_count == old.key_count:
         return False
-    shared = _divided(old, source) if source.key_count > old.key_count else _joined(old, source)
+    shared = _divided(old, source, progress) if source.key_count > old.key_count else _joined(old, source)
     chosen = np.array(list(shared))
     if not shared or np.array_equal(turns_in(place, chosen), list(shared.values())):
         return False
@@ -124,7 +135,7 @@ def share_out_turns(place: SlotTransform, source: Source) -> bool:
     return True
 
 
-def _divided(old: Source, source: Source) -> dict[float, float]:
+def _divided(old: Source, source: Source, progress: float | None) -> dict[float, float]:
     """The turns of the parts that keys divide segments into, by the frames that these begin on."""
     shared: dict[float, float] = {}
     for segment in np.flatnonzero(old.modes).tolist():
@@ -133,7 +144,8 @@ def _divided(old: Source, source: Source) -> dict[float, float]:
         if len(parts) > 1 and np.all(are_as_before & (source.modes[parts] != 0)):
             turned = turning_in(old, segment)
             if turned.spins.turns[0]:
-                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]])
+                along = None if progress is None else (0.0, progress, 1.0)
+                shares, axes = _shares(old, turned, source.key_frames[[*parts, parts[-1] + 1]], along=along)
                 whole = _is_enough_in_whole_turns(old, segment, turned)
                 for part, share, axis in zip(parts.tolist(), shares, axes, strict=True):
                     shared[float(source.key_frames[part])] = _turns_of(source, part, turned, share, axis, whole=whole)
@@ -169,13 +181,23 @@ def _is_enough_in_whole_turns(source: Source, segment: int, turned: Turning) -> 
 
 
 def _shares(
-    source: Source, turned: Turning, frames: np.ndarray, turns: float | None = None
+    source: Source,
+    turned: Turning,
+    frames: np.ndarray,
+    turns: float | None = None,
+    along: Sequence[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """What part of the turn of a segment is made from each of the frames (p + 1,) in it to the next, (p,); and the axis
-    of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all."""
+    of its spins as it lies in the body on each of them, (p, 3). `turns` are about as many as are made in all, `along`
+    is the progress (p + 1,) on the frames, if it is not that of the motion."""
     steps = SAMPLES * (1 + int(abs(turned.spins.turns[0] if turns is None else turns)))
-    samples = np.concatenate([np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(frames)])
-    quaternions = in_betweens(source, np.append(samples, frames[-1])).wanted.quaternions
+
+    def sampled(ends: Sequence[float]) -> np.ndarray:
+        inner = [np.linspace(*pair, steps, endpoint=False) for pair in itertools.pairwise(ends)]
+        return np.append(np.concatenate(inner), ends[-1])
+
+    progress = None if along is None else sampled(along)
+    quaternions = in_betweens(source, sampled(frames), progress=progress).wanted.quaternions
     axes = np.tile(turned.spins.axes[:, 0], (len(quaternions), 1))
     if turned.spins.in_space[0]:
         axes = rotate(conjugate(quaternions), axes)
