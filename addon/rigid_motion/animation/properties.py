@@ -50,6 +50,8 @@ class SlotRecord(bpy.types.PropertyGroup):
     constraint: StringProperty(
         description="What the constraint of a bone is called, where that is not its usual name", options={"HIDDEN"}
     )
+    rate: IntProperty(description="How many samples a frame the in-betweens have", default=1, options={"HIDDEN"})
+    error: FloatProperty(description="How far off they are between samples, in Blender's units", options={"HIDDEN"})
 
 
 class BoneSlot(bpy.types.PropertyGroup):

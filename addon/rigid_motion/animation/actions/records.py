@@ -24,6 +24,8 @@ class Recorded(NamedTuple):
     digest: str = ""
     rows: str = ""
     constraint: str = ""
+    rate: int = 1
+    error: float = 0.0
 
 
 NOTHING_RECORDED = Recorded()
@@ -38,7 +40,7 @@ def recorded(place: SlotTransform) -> Recorded:
             found = NOTHING_RECORDED
         else:
             mode = record.mode if record.is_property_set("mode") else None
-            found = Recorded(mode, record.digest, record.rows, record.constraint)
+            found = Recorded(mode, record.digest, record.rows, record.constraint, max(record.rate, 1), record.error)
         place.__dict__["recorded"] = found
     return found
 
@@ -102,11 +104,15 @@ def record_mode(place: SlotTransform, number: int) -> None:
             user.motion.mode = mode
 
 
-def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -> None:
-    """Keep what in-betweens were made from, and which components they are in."""
+def record_in_betweens(
+    place: SlotTransform, digest: str, rows: Iterable[int], rate: int = 1, error: float = 0.0
+) -> None:
+    """Keep what in-betweens were made from, which components they are in, how many samples a frame they have, and how
+    far off they are between these."""
     if digest:
         record = _ensure_record(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
+        record.rate, record.error = rate, error
     elif recorded(place).digest and (record := _record_of(place)) is not None:
         record.digest = record.rows = ""
         _tidy(place, record)

@@ -342,7 +342,7 @@ def choose_slots(obj: bpy.types.Object) -> None:
                 is_new = not strip.last_slot_identifier
                 strip.action_slot = slot
                 if is_new:
-                    _give_length(strip, track)
+                    _give_length(strip, track, slot)
 
 
 def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
@@ -354,11 +354,17 @@ def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
     return keyed[0] if differences and len(keyed) == 1 else None
 
 
-def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack) -> None:
+def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack, slot: bpy.types.ActionSlot) -> None:
     """Have a strip show all of its Action, up to the next strip: Blender makes those without a slot one frame long."""
     if (strip.action_frame_start, strip.action_frame_end) != (0.0, 1.0):
         return
-    first, last = strip.action.frame_range
+    channelbag = action_get_channelbag_for_slot(strip.action, slot)
+    keyed = [fcurve.range() for fcurve in channelbag.fcurves if len(fcurve.keyframe_points)] if channelbag else []
+    if strip.action.use_frame_range or not keyed:
+        first, last = strip.action.frame_range
+    else:
+        # Differences may lie behind the keys.
+        first, last = min(begin for begin, _ in keyed), max(end for _, end in keyed)
     room = min((one.frame_start for one in track.strips if one.frame_start > strip.frame_start), default=math.inf)
     strip.action_frame_end = min(last, first + room - strip.frame_start)
     strip.action_frame_start = first

@@ -23,6 +23,7 @@ from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
 from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
+from .between_samples import largest_errors
 from .bodies import body_poses, differ, location_axes, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
@@ -65,9 +66,17 @@ class InBetweens:
     """What the modes make of them, shape (m,)."""
 
 
-Samples = dict[int, np.ndarray]
-"""The differences of one source on the m whole frames of its range, by the rows of their components where there is any.
-Frame and value of every sample by turns, in single precision, each of shape (2 m,)."""
+class Samples(dict[int, np.ndarray]):
+    """The differences of one source at m moments of its range, by the rows of their components where there is any.
+
+    Frame and value of every sample by turns, in single precision, each of shape (2 m,).
+    """
+
+    rate = 1
+    """How many there are in a frame."""
+
+    error = 0.0
+    """How far a body is off between them at most, where that was asked for: see `largest_errors`."""
 
 
 def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> InBetweens:
@@ -102,22 +111,38 @@ def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> 
     return InBetweens(frames, moved_by(source.original[:, None]), moved_by(delta))
 
 
-def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | None = None) -> list[Samples]:
-    """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source.
+def differences(
+    sources: Sequence[Source],
+    ranges: Sequence[tuple[int, int]] | None = None,
+    rates: Sequence[int] | None = None,
+    reaches: Sequence[float] | None = None,
+) -> list[Samples]:
+    """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source and between them.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
     location is added, scale multiplied. Components that are the source's original ones throughout are left out.
 
-    `ranges` are the first and last frames that are wanted of each, in place of those of the source. Then no component
-    is left out that may differ elsewhere.
+    Parameters
+    ----------
+    sources
+    ranges : sequence of pairs, optional
+        The first and last samples of each, counted from frame 0, in place of those of the source. Then no component
+        is left out that may differ elsewhere.
+    rates : sequence of int, optional
+        How many samples a frame each has; one where there are none.
+    reaches : sequence of float, optional
+        How far the body of each reaches from its origin: then the errors between samples are estimated.
     """
     found = {}
-    range_of = {id(source): source.frame_range for source in sources}
+    rates = rates or [1] * len(sources)
+    rate_of = {id(source): rate for source, rate in zip(sources, rates, strict=True)}
+    reach_of = {id(source): reach for source, reach in zip(sources, reaches or rates, strict=True)}
+    range_of = {id(source): source.sample_range(rate) for source, rate in zip(sources, rates, strict=True)}
     if ranges is not None:
         range_of = {id(source): span for source, span in zip(sources, ranges, strict=True)}
     for portion in _portions(sources, range_of):
-        spans = [range_of[id(source)] for source in portion]
-        of_range = {span: np.arange(span[0], span[1] + 1.0) for span in set(spans)}
+        spans = [(*range_of[id(source)], rate_of[id(source)]) for source in portion]
+        of_range = {span: np.arange(span[0], span[1] + 1.0) / span[2] for span in set(spans)}
         frames = [of_range[span] for span in spans]
         samples = _each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
@@ -132,14 +157,19 @@ def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | N
         else:
             _align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]
+        errors = itertools.repeat(0.0)
+        if reaches is not None:
+            errors = largest_errors(delta, samples, spans, [reach_of[id(source)] for source in portion])
         first, differs = delta[:, starts], _range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
-        for number, (source, place) in enumerate(samples):
+        for number, ((source, place), error) in enumerate(zip(samples, errors, strict=False)):
             changing = {row for row in source.filled_rows if differs[row, number] or ranges is not None}
             held = _held_rows(source, changing, first[:, number])
-            found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
+            own = Samples({row: points[row, place].ravel() for row in sorted(changing | held)})
+            own.rate, own.error = rate_of[id(source)], float(error)
+            found[id(source)] = own
     return [found[id(source)] for source in sources]
 
 

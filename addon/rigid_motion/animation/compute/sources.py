@@ -29,7 +29,7 @@ MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
 UNKNOWN = -1
 """The mode of something from a file that is damaged, or of a later version."""
 
-LAYOUT = b"2"
+LAYOUT = b"3"
 """How in-betweens are laid out in F-curves. With another number, those of older files are made anew."""
 
 FULL_TURN = 2.0 * np.pi
@@ -207,17 +207,26 @@ class Source:
 
     @cached_property
     def frame_range(self) -> tuple[int, int]:
-        """The first and last whole frame that in-betweens are for: from the first segment with a mode to the last.
+        """The first and last whole frame that in-betweens are for."""
+        return self.sample_range(1)
 
-        Where it goes on outside of its keys, they are for all that is seen, unless what is between the keys repeats.
+    def sample_range(self, rate: int) -> tuple[int, int]:
+        """The numbers of the first and last sample that in-betweens are for, of so many a frame, from frame 0 on."""
+        first, last = self._live_range
+        return math.floor(first * rate), math.ceil(last * rate)
+
+    @cached_property
+    def _live_range(self) -> tuple[float, float]:
+        """From the first segment with a mode to the last.
+
+        Where it goes on outside of its keys, all that is seen, unless what is between the keys repeats.
         """
         if self.goes_on and not self.repeats:
             return self.seen_range
-        first, last = self.keyed_range
         if self.cyclic is None and self.is_live:
             live = np.flatnonzero(self.modes)
-            first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
-        return math.floor(first), math.ceil(last)
+            return float(self.key_frames[live[0]]), float(self.key_frames[live[-1] + 1])
+        return self.keyed_range
 
     @cached_property
     def seen_range(self) -> tuple[int, int]:

@@ -37,13 +37,14 @@ from .bone_constraints import (
     remove_constraints,
     slot_of_differences,
 )
-from .layout import Layout
+from .layout import Layout, Pieces
 from .sampled import remove_if_empty, replace_samples
 from .times import (
     constraint_path,
     held_by,
     is_line,
     is_same,
+    most_samples,
     name_of,
     remove_time,
     says,
@@ -57,14 +58,19 @@ from .writer import Writer
 class ConstraintWriter(Writer):
     uses_constraints = True
 
-    def layout(self, source: Source) -> Layout:
-        return Layout.apart(source)
+    def layout(self, source: Source, rate: int) -> Layout:
+        return Layout.apart(source, rate)
 
-    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
+    def most_samples(self, source: Source) -> int:
+        return most_samples(source)
+
+    def write(
+        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
+    ) -> None:
         present = place.filled
         if points:
             _avoid_names(place)
-            curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout, pieces)
             place.has_filled(curves)
             write_time(place, layout)
             for user in place.users:
@@ -72,7 +78,7 @@ class ConstraintWriter(Writer):
                     ensure_constraint(user, place)
         elif present:
             remove_time(place)
-            replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
+            replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None, {})
             place.has_filled({})
             _remove_slot_if_empty(place.slot)
 

@@ -6,22 +6,57 @@ there go round in a ring behind frame 0 instead.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 
 from ..compute.sources import Source
 from ..curves import Cycles
+from ..transforms import Channel
 
 ENDLESS = 2.0**20
 """A step, in frames, that ends behind whatever Blender can show."""
 
 
+class Piece(NamedTuple):
+    """A straight line that is added to an F-curve in a range of its frames."""
+
+    first: float
+    last: float
+    start: float
+    slope: float
+
+    @property
+    def modifier(self) -> Modifier:
+        settings = {
+            "use_additive": True,
+            "poly_order": 1,
+            "coefficients": _single(self.start, self.slope),
+            "use_restricted_range": True,
+        }
+        first, last = _single(self.first, self.last)
+        return "GENERATOR", settings | {"frame_end": last, "frame_start": first}
+
+
+Pieces = Mapping[Channel, Sequence[Piece]]
+"""What is added to the samples of each channel."""
+
+Modifier = tuple[str, dict[str, object]]
+"""The type of an F-curve modifier, and its settings."""
+
+
+def _single(*values: float) -> tuple[float, ...]:
+    """Numbers as Blender keeps them."""
+    return tuple(np.float32(values).tolist())
+
+
 @dataclass(frozen=True)
 class Layout:
-    """How the samples on the whole frames of a range lie in an F-curve.
+    """How the samples of a range lie in an F-curve.
 
     A range of n frames that begins below zero lies in a ring: frame f on f modulo n, and what is asked for below zero
     is looked up a number of rounds later, by a Cycles modifier. Two Stepped modifiers hold the outermost frames.
@@ -29,9 +64,10 @@ class Layout:
 
     first: int
     last: int
+    """The first and the last sample, counted from frame 0."""
 
     ends: tuple[float, float]
-    """Where the outermost samples lie: not outside of the keys."""
+    """The frames of the outermost samples: not outside of the keys."""
 
     cycles: Cycles | None = None
     """How the channels repeat, and the differences with them."""
@@ -44,6 +80,9 @@ class Layout:
     is_apart: bool = False
     """Whether they are: it is that which repeats, then."""
 
+    rate: int = 1
+    """How many samples a frame has, where they are apart: then the F-curve is as many times as long."""
+
     @classmethod
     def of(cls, source: Source) -> Layout:
         """In an F-curve that is read as the frames pass."""
@@ -52,11 +91,17 @@ class Layout:
         return cls(first, last, _ends(source), cycles, first < 0 and cycles is None)
 
     @classmethod
-    def apart(cls, source: Source) -> Layout:
+    def apart(cls, source: Source, rate: int) -> Layout:
         """In an F-curve that is looked up by a time of its own, which goes round where the channels do."""
-        first, last = source.frame_range
+        first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source), cycles, shift=max(0, -first), is_apart=True)
+        shift = max(0, -source.frame_range[0])
+        return cls(first, last, _ends(source), cycles, shift=shift, is_apart=True, rate=rate)
+
+    @property
+    def frames(self) -> tuple[int, int]:
+        """The whole frames that no sample is outside of."""
+        return self.first // self.rate, -(-self.last // self.rate)
 
     @cached_property
     def count(self) -> int:
@@ -65,8 +110,10 @@ class Layout:
 
     @cached_property
     def outermost(self) -> tuple[float, float]:
-        """The frames that the first and the last sample lie on."""
-        return (0.0, float(self.count - 1)) if self.is_ring else tuple(end + self.shift for end in self.ends)
+        """The frames of the F-curve that the first and the last sample lie on."""
+        if self.is_ring:
+            return 0.0, float(self.count - 1)
+        return tuple(float(np.float32((end + self.shift) * self.rate)) for end in self.ends)
 
     @cached_property
     def _order(self) -> np.ndarray:
@@ -83,6 +130,8 @@ class Layout:
         else:
             if self.shift:
                 points[:, 0] += self.shift
+            if self.rate > 1:
+                points[:, 0] *= self.rate
             points[0, 0], points[-1, 0] = self.outermost
         return points.ravel()
 
@@ -95,28 +144,29 @@ class Layout:
         )
 
     def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
-        if not self._modifiers:
-            return not fcurve.modifiers
+        """Whether it has those that all have; whatever is added to it may have to be something else by now."""
         modifiers = list(fcurve.modifiers)
-        return [modifier.type for modifier in modifiers] == [kind for kind, _ in self._modifiers] and all(
-            getattr(modifier, name) == value
-            for modifier, (_, settings) in zip(modifiers, self._modifiers, strict=True)
-            for name, value in settings.items()
+        count = len(self._modifiers)
+        return _are(modifiers[:count], self._modifiers) and all(
+            modifier.type == "GENERATOR" and modifier.use_restricted_range and not modifier.mute
+            for modifier in modifiers[count:]
         )
 
-    def modify(self, fcurve: bpy.types.FCurve) -> None:
-        """Give an F-curve the modifiers that it needs, in place of those it has."""
-        if self._has_modifiers(fcurve):
+    def modify(self, fcurve: bpy.types.FCurve, pieces: Sequence[Piece] = ()) -> None:
+        """Give an F-curve the modifiers that it needs, in place of those it has, and add these to it."""
+        present = list(fcurve.modifiers)
+        wanted = [*self._modifiers, *(piece.modifier for piece in pieces)]
+        if _are(present, wanted):
             return
-        for modifier in list(fcurve.modifiers):
+        for modifier in present:
             fcurve.modifiers.remove(modifier)
-        for kind, settings in self._modifiers:
+        for kind, settings in wanted:
             modifier = fcurve.modifiers.new(kind)
             for name, value in settings.items():
                 setattr(modifier, name, value)
 
     @cached_property
-    def _modifiers(self) -> list[tuple[str, dict[str, object]]]:
+    def _modifiers(self) -> list[Modifier]:
         """Types and settings. Blender asks the last one first."""
         if self.is_apart:
             return []
@@ -134,6 +184,16 @@ class Layout:
             ("STEPPED", {"frame_step": ENDLESS, "frame_offset": first, "use_frame_end": True, "frame_end": first}),
             ("STEPPED", {"frame_step": ENDLESS, "frame_offset": last, "use_frame_start": True, "frame_start": last}),
         ]
+
+
+def _are(modifiers: Sequence[bpy.types.FModifier], wanted: Sequence[Modifier]) -> bool:
+    """Whether modifiers are of these types, with these settings."""
+    return [modifier.type for modifier in modifiers] == [kind for kind, _ in wanted] and all(
+        (tuple(found) if isinstance(value, tuple) else found) == value
+        for modifier, (_, settings) in zip(modifiers, wanted, strict=True)
+        for name, value in settings.items()
+        for found in (getattr(modifier, name),)
+    )
 
 
 def _ends(source: Source) -> tuple[float, float]:

@@ -19,6 +19,8 @@ import numpy as np
 from ..actions.channels import add_cycles, replace_keys
 from ..actions.records import recorded
 from ..actions.slots import Slot, SlotTransform, strips_of
+from ..compute.between_samples import MOST_SAMPLES
+from ..compute.sources import Source
 from ..curves import Cycles
 from ..transforms import CONSTRAINT, WIDTHS, Channel, bone_name
 from .layout import Layout
@@ -57,9 +59,17 @@ def time_of(place: SlotTransform) -> bpy.types.FCurve | None:
 
 
 def span_of(place: SlotTransform) -> tuple[int, int]:
-    """The frames that an evaluation time of 0 and one of 1 stand for."""
-    points = next(iter(place.filled.values())).sampled_points
-    return 0, _duration(math.ceil(points[len(points) - 1].co[0]))
+    """The frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one where
+    more than one sample is shown in a frame."""
+    points, rate = next(iter(place.filled.values())).sampled_points, recorded(place).rate
+    return 0, _duration(math.ceil(points[len(points) - 1].co[0] / rate)) * rate
+
+
+def most_samples(source: Source) -> int:
+    """How many samples a frame can have for a constraint to show all of them."""
+    first, last = source.frame_range
+    fit = MOST_FRAMES // _duration(last + max(0, -first))
+    return min(1 << max(fit.bit_length() - 1, 0), MOST_SAMPLES)
 
 
 def _duration(last: int) -> int:
@@ -175,14 +185,14 @@ def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
 
 def _line(layout: Layout) -> Line:
     """From frames to the evaluation times of their samples."""
-    duration = _duration(layout.last + layout.shift)
+    duration = _duration(layout.frames[1] + layout.shift)
     return layout.shift / duration, 1.0 / duration
 
 
 def _seams(layout: Layout) -> list[tuple[float, float]]:
     """The outermost frames, and the evaluation times of their samples."""
     start, step = _line(layout)
-    return [(frame, start + step * frame) for frame in (layout.first, layout.last)]
+    return [(frame, start + step * frame) for frame in layout.frames]
 
 
 def _without_offset(cycles: Cycles) -> Cycles:
