@@ -31,6 +31,7 @@ from .baking.reducing import (
 )
 from .baking.sizes import radius_of
 from .compute.sources import MODE_IDS
+from .edits.exactness import error_between_frames, set_exact
 from .edits.mode_keys import set_mode
 from .edits.repair import constraint_trouble, restore_constraints
 from .live import edit_mode, follower
@@ -50,6 +51,7 @@ __all__ = [
     "channelbag_of",
     "constraint_trouble",
     "discard_dense_keys",
+    "error_between_frames",
     "is_baked",
     "is_reduced",
     "key_frames",
@@ -64,6 +66,7 @@ __all__ = [
     "restore_constraints",
     "restore_keys",
     "set_enabled",
+    "set_exact",
     "set_mode",
     "total_reduction",
     "unbake",

@@ -159,6 +159,7 @@ def _source(
         mode=modes[0][1] if modes else recorded_mode(place),
         in_nla=place.slot.in_nla,
         seen=place.slot.seen if goes_on else None,
+        is_on_top=user.has_difference_slot,
     )
 
 

@@ -80,7 +80,7 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Mapping
                     name=user.name, channel=_label(drivers[path])
                 )
             )
-    # The differences of bones are in a slot of their own.
+    # Differences that are in a slot of their own take the place of nothing.
     for channel in () if user.has_difference_slot else differences:
         fcurve = place.curves.get(channel)
         if fcurve is not None and not (is_filled_in(fcurve) or _was_filled_in(fcurve, user, place)):

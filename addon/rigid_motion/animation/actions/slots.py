@@ -113,8 +113,14 @@ class SlotTransform:
         return {
             (fcurve.data_path, fcurve.array_index): fcurve
             for fcurve in group.channels
-            if not fcurve.keyframe_points and (apart or _is_difference(fcurve.data_path))
+            if not fcurve.keyframe_points
+            and (self._has_difference(fcurve.data_path) if apart else _is_difference(fcurve.data_path))
         }
+
+    def _has_difference(self, path: str) -> bool:
+        """Whether a data path in a slot of differences is that of one of its own."""
+        prefix, prop = split_path(path)
+        return prefix == self.prefix and prop in WIDTHS
 
     def has_filled(self, curves: Curves) -> None:
         """Take note of the F-curves that in-betweens are in by now."""
@@ -193,7 +199,7 @@ def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
     """What a prefix stands for in each of the users of a slot that has it."""
     kind = kind_of(prefix)
     users = () if kind is None else (kind.in_object(user, prefix) for user in slot.users)
-    return tuple(user for user in users if user is not None)
+    return () if kind is None else kind.together(tuple(user for user in users if user is not None))
 
 
 def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChannelbag | None:

@@ -149,6 +149,9 @@ def differences(
         rows, points = np.empty((2, _height(portion), samples[-1][1].stop))
         delta = rows[: _filled_height(portion)]
         _move(portion, frames, rows, delta)
+        for source, place in samples:
+            if source.is_on_top and not np.array_equal(source.original, REST):
+                _take_off(delta[:, place], source.original)
         order = portion[0].order
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
@@ -171,6 +174,15 @@ def differences(
             own.rate, own.error = rate_of[id(source)], float(error)
             found[id(source)] = own
     return [found[id(source)] for source in sources]
+
+
+def _take_off(delta: np.ndarray, original: np.ndarray) -> None:
+    """Leave of differences (., m) what comes on top of the original one, in place."""
+    delta[ROWS[LOCATION]] -= original[ROWS[LOCATION], None]
+    inverse = original[ROWS[ROTATION]] * (1.0, -1.0, -1.0, -1.0)
+    delta[ROWS[ROTATION]] = multiply(delta[ROWS[ROTATION]].T, inverse).T
+    if len(delta) > ROWS[SCALE].start:
+        delta[ROWS[SCALE]] /= np.where(original[ROWS[SCALE]] == 0.0, 1.0, original[ROWS[SCALE]])[:, None]
 
 
 def _align(quaternions: np.ndarray, starts: Sequence[int]) -> None:

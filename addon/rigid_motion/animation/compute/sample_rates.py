@@ -78,7 +78,7 @@ def sampled(
 def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach: float) -> float:
     """How far a body is off between samples, as `differences` returns them for all of a source's range."""
     first, last = source.sample_range(rate)
-    delta = np.repeat(source.original[:, None], last - first + 1, axis=1)
+    delta = np.repeat(source.difference_at_keys[:, None], last - first + 1, axis=1)
     if source.order is not None:
         delta[ROWS[ROTATION]] = 0.0
     for row, own in points.items():

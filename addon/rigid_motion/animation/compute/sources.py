@@ -74,6 +74,9 @@ class Source:
     seen: tuple[int, int] | None = None
     """First and last frame that are seen of it, in scenes and strips."""
 
+    is_on_top: bool = False
+    """Whether differences come on top of the original one, and not in its place."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -91,6 +94,11 @@ class Source:
         span = self.seen if self.goes_on and not self.repeats else None
         summary.update(LAYOUT + repr((self.order, self.in_nla, span)).encode())
         return summary.hexdigest()
+
+    @property
+    def difference_at_keys(self) -> np.ndarray:
+        """What is written on keys, as components, shape (10,)."""
+        return REST if self.is_on_top else self.original
 
     @property
     def curves(self) -> list[Keys]:

@@ -19,7 +19,7 @@ def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> 
         return carrier
     for kind in KINDS:
         if isinstance(carrier, kind.carrier_type):
-            return kind(carrier)
+            return kind.of(carrier)
     raise TypeError(f"neither an object nor a pose bone: {carrier!r}")
 
 

@@ -68,7 +68,7 @@ def _keys(source: Source, layout: Layout) -> np.ndarray:
 
 def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
     """What the differences are at keys, shape (rows, k): the original ones, in the sign and turn near to these."""
-    original = np.array(source.original)
+    original = np.array(source.difference_at_keys)
     turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
     found = np.repeat(original[rows, None], near.shape[1], axis=1)
     if not turning:

@@ -31,7 +31,7 @@ class DeltaWriter(Writer):
             user.note_original(points)
         curves, gone = replace_samples(place.channelbag, GROUP, place.filled, points, layout, pieces)
         for channel in gone:
-            del place.curves[channel]
+            place.curves.pop(channel, None)
         place.curves.update(curves)
         place.has_filled(curves)
         if gone and points:

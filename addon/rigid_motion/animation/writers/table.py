@@ -6,13 +6,17 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 from ..actions.slots import Slot, SlotTransform
-from ..transforms import BoneTransform, ObjectTransform, Transform
+from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
 from .constraints import ConstraintWriter
 from .deltas import DeltaWriter
 from .writer import Writer
 
-WRITERS: dict[type[Transform], Writer] = {BoneTransform: ConstraintWriter(), ObjectTransform: DeltaWriter()}
-"""A row for each of the `transforms.KINDS`."""
+WRITERS: dict[type[Transform], Writer] = {
+    BoneTransform: ConstraintWriter(),
+    ObjectTransform: DeltaWriter(),
+    ExactObjectTransform: ConstraintWriter(),
+}
+"""A row for each of the `transforms.KINDS`, and for objects that are to be exact between frames."""
 
 
 def writer_of(place: SlotTransform) -> Writer:

@@ -22,7 +22,7 @@ from ..actions.slots import Slot, SlotTransform, strips_of
 from ..compute.between_samples import MOST_SAMPLES
 from ..compute.sources import Source
 from ..curves import Cycles
-from ..transforms import CONSTRAINT, WIDTHS, Channel, bone_name
+from ..transforms import CONSTRAINT, WIDTHS, Channel
 from .layout import Layout
 from .sampled import hide_fcurve, remove_if_empty
 
@@ -144,16 +144,24 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
     frames, times = np.array(_seams(layout)).T
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
-    hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
+    hide_fcurve(place.channelbag, place.kind.difference_group(place.prefix), fcurve)
 
 
 def write_line(place: SlotTransform, path: str, line: Line) -> None:
-    """An F-curve that is a line, without keys."""
-    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+    """An F-curve beside those of a transform that is a line, without keys."""
+    group = place.kind.difference_group(place.prefix)
+    place.curves[path, 0] = new_line(place.channelbag, group, (path, 0), line)
+
+
+def new_line(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, line: Line) -> bpy.types.FCurve:
+    """An F-curve in a group that is a line, without keys."""
+    path, index = channel
+    fcurve = channelbag.fcurves.new(path, index=index)
     generator = fcurve.modifiers.new("GENERATOR")
     generator.poly_order = 1
     generator.coefficients = line
-    hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
+    hide_fcurve(channelbag, group, fcurve)
+    return fcurve
 
 
 def says(fcurve: bpy.types.FCurve, layout: Layout) -> bool:
@@ -205,7 +213,7 @@ def remove_time(place: SlotTransform) -> None:
     fcurve = place.curves.pop((time_path(place), 0), None)
     if fcurve is not None:
         place.channelbag.fcurves.remove(fcurve)
-        remove_if_empty(place.channelbag, bone_name(place.prefix))
+        remove_if_empty(place.channelbag, place.kind.difference_group(place.prefix))
 
 
 def is_same(one: SlotTransform, other: SlotTransform) -> bool:
