@@ -6,6 +6,7 @@ menus        entries in Blender's menus, and the pies   panels       the sidebar
 rows         its lines, aligned                         notes        what the panel notes on a target
 shown        the transform seen on the screen           overlay      paths in the viewport
 look         how they look                              wording      labels and texts
+exactness    exact between frames, or not
 preferences  of the extension                           manual       where the documentation is
 """
 
@@ -13,9 +14,9 @@ from __future__ import annotations
 
 import bpy
 
-from . import keymap, manual, menus, operators, overlay, panels, preferences, shown
+from . import exactness, keymap, manual, menus, operators, overlay, panels, preferences, shown
 
-CLASSES = (*preferences.CLASSES, *operators.CLASSES, *menus.CLASSES, *panels.CLASSES)
+CLASSES = (*preferences.CLASSES, *operators.CLASSES, *exactness.CLASSES, *menus.CLASSES, *panels.CLASSES)
 
 
 def register() -> None:

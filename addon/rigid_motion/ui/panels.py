@@ -14,7 +14,7 @@ from ..animation.compute.components import SCALE
 from ..animation.queries.polls import with_in_betweens
 from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
 from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
-from . import overlay
+from . import exactness, overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import CURRENT, SELECTED, WHOLE, active_target, fcurves_of, is_key_editor, modes_meant
@@ -53,6 +53,7 @@ class _Main:
             labelled(layout, label).prop(target.motion, "mode", text="")
         if segment is not None:
             _draw_segment(context, layout, segment)
+        exactness.draw(context, layout, target)
         for icon, text in notes:
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:

@@ -363,6 +363,13 @@ class EditingObjects(Editing):
             self._link(obj, None, None)
             bpy.context.view_layer.update()
 
+    @precondition(lambda self: self.history)
+    @rule(who=shares, is_exact=st.booleans())
+    def be_exact_between_frames(self, who, is_exact):
+        obj = bpy.data.objects[self._named(who)]
+        if self.on and self._is_free(obj.name):
+            self._edit(lambda: animation.set_exact(obj, is_exact))
+
     # What holds all the time
 
     @precondition(lambda self: self.on and self.history)
@@ -379,14 +386,24 @@ class EditingObjects(Editing):
             keys = key_frames(obj)
             if obj.parent is not None or obj.rotation_mode != "QUATERNION" or len(keys) < 2 or goes_on(obj):
                 continue
-            whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]))
+            whole = np.setdiff1d(np.arange(np.ceil(keys[0]), np.floor(keys[-1])), np.floor(keys[keys % 1.0 > 0.0]))
             frames = whole[:: max(1, len(whole) // 6)] + 0.25
             if len(frames):
                 shown = shown_worlds([obj], frames)[0]
-                wanted = expected_off_whole_frames(obj, frames, self.owns[name])
+                is_exact = obj.rigid_motion.is_exact
+                wanted = (expected_bases if is_exact else expected_off_whole_frames)(obj, frames, self.owns[name])
                 size = max(1.0, np.abs(wanted).max(), np.abs(expected_bases(obj, whole)).max())
                 error = np.abs(shown - wanted).max(axis=(1, 2)) / size * shortest_quaternion(obj, frames)
                 assert error.max() < 1e-4, f"{name} is off by {error.max():.3g} on frame {frames[error.argmax()]}"
+
+    @precondition(lambda self: self.on and self.history)
+    @invariant()
+    def keys_off_whole_frames_are_hit(self):
+        for name in self.names:
+            obj = bpy.data.objects[name]
+            keys = key_frames(obj)
+            if obj.parent is None and len(keys) > 1 and keys[0] >= 0.0 and not goes_on(obj):
+                assert_shown([obj], keys[keys % 1.0 > 0.0][:6], self.owns)
 
     @precondition(lambda self: self.on and self.history)
     @invariant()

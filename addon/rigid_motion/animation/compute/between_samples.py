@@ -9,7 +9,7 @@ import numpy as np
 from .components import LOCATION, ROTATION, ROWS, SCALE
 from .sources import Source
 
-MOST_SAMPLES = 8
+MOST_SAMPLES = 16
 """The most samples a frame."""
 
 BLOCK = 16384

@@ -7,6 +7,7 @@ transform  the interface: channels, and where differences go
 objects    objects, by their delta transforms, or by a constraint where they are to be exact between frames
 bones      pose bones, by a constraint
 kinds      the table of both
+reaches    how far things reach
 posing     where the poses of bones put them
 
 Each module imports only those above it.

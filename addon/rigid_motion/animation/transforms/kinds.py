@@ -7,10 +7,10 @@ from functools import lru_cache
 import bpy
 
 from .bones import BoneTransform
-from .objects import ObjectTransform
+from .objects import ExactObjectTransform, ObjectTransform
 from .transform import Transform
 
-KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform)
+KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform, ExactObjectTransform)
 
 
 def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:

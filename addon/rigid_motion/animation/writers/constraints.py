@@ -55,7 +55,7 @@ from .times import (
 )
 from .writer import Writer
 
-AT_REST = "At Rest"
+AT_REST = "Rigid Motion Rest"
 """The group of what a slot of differences holds of objects that has no samples."""
 
 

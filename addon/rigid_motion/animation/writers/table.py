@@ -16,7 +16,7 @@ WRITERS: dict[type[Transform], Writer] = {
     ObjectTransform: DeltaWriter(),
     ExactObjectTransform: ConstraintWriter(),
 }
-"""A row for each of the `transforms.KINDS`, and for objects that are to be exact between frames."""
+"""A row for each of the `transforms.KINDS`."""
 
 
 def writer_of(place: SlotTransform) -> Writer:

@@ -79,6 +79,7 @@ OF_OPERATORS = {
     "Restore Keys": "Schlüsselbilder wiederherstellen",
     "Discard Dense Keys": "Dichte Schlüsselbilder verwerfen",
     "Restore Constraint": "Beschränkung wiederherstellen",
+    "Exact Between Frames": "Genau zwischen Einzelbildern",
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
     "Pie Menu": "Kreismenü",
     "Documentation": "Dokumentation",
