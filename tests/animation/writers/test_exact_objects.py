@@ -10,7 +10,7 @@ from rigid_motion.animation import error_between_frames, refresh, set_exact, set
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.bones.rigs import ORDERS, in_turn
 from tests.animation.oracle import Own, curves_of, expected_worlds, shown_worlds
-from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas
+from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down
 
 PROMISE = 1e-4
 """Metres."""
@@ -64,3 +64,69 @@ def test_delta_transforms_of_its_own_stay_the_objects(live_file, order):
     set_exact(obj, False)
     set_mode(obj, "BLENDER")
     assert own_deltas(obj) == own
+
+
+def test_who_comes_to_share_the_action_is_exact_as_well(live_file):
+    obj, other = (set_up(name) for name in ("Tool", "Other"))
+    set_exact(obj)
+    other.animation_data.action = obj.animation_data.action
+    other.animation_data.action_slot = obj.animation_data.action_slot
+    bpy.context.view_layer.update()
+    for one in (obj, other):
+        assert largest_error(one, EIGHTHS) < PROMISE
+    set_exact(other, False)
+    bpy.context.view_layer.update()
+    for one in (obj, other):
+        assert not len(one.constraints)
+        assert largest_error(one, np.arange(1.0, 41.0)) < PROMISE
+    assert refresh() == 0
+
+
+def test_an_exact_action_that_comes_to_another_object_is_as_that_has_it(live_file):
+    obj, other = (set_up(name) for name in ("Tool", "Other"))
+    set_exact(obj)
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    obj.animation_data.action = None
+    bpy.context.view_layer.update()
+    assert not len(obj.constraints)
+    other.animation_data.action, other.animation_data.action_slot = action, slot
+    bpy.context.view_layer.update()
+    assert largest_error(other, np.arange(1.0, 41.0)) < PROMISE
+    assert not len(other.constraints)
+    assert len(action.slots) == 1
+    assert refresh() == 0
+
+
+def set_up(name: str) -> bpy.types.Object:
+    obj = key(new_object(name), seed=sum(map(ord, name)))
+    set_mode(obj, "dq_sclerp")
+    bpy.context.view_layer.update()
+    return obj
+
+
+def test_it_is_saved_undone_and_slowed_down(live_file, tmp_path):
+    set_up("Tool")
+    bpy.ops.ed.undo_push()
+    set_exact(bpy.data.objects["Tool"])
+    bpy.ops.ed.undo_push()
+    bpy.ops.ed.undo()
+    assert not len(bpy.data.objects["Tool"].constraints)
+    assert largest_error(bpy.data.objects["Tool"], np.arange(1.0, 41.0)) < PROMISE
+    bpy.ops.ed.redo()
+    assert largest_error(bpy.data.objects["Tool"], EIGHTHS) < PROMISE
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "exact.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "exact.blend"))
+    obj = bpy.data.objects["Tool"]
+    assert refresh() == 0
+    assert largest_error(obj, EIGHTHS) < PROMISE
+    assert tuple(obj.animation_data.action.frame_range) == (1.0, 40.0)
+    wanted = expected_worlds(obj, EIGHTHS)
+    push_down(obj, scale=4.0)
+    (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
+    assert np.abs(shown - wanted).max() < PROMISE
+    obj.parent = new_object("Parent")
+    obj.parent.location.x = 1.0
+    refresh()
+    bpy.context.view_layer.update()
+    (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
+    assert np.abs(shown[:, :3, 3] - (1.0, 0.0, 0.0) - wanted[:, :3, 3]).max() < PROMISE

@@ -8,6 +8,7 @@ and exports from being longer for it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -26,8 +27,9 @@ from ..transforms.reaches import metres_per_channel_unit, reach_at_rest
 from .corners import corners
 from .table import release, writer_of
 
-TOLERANCE = 0.00005
-"""How far off a body may be between frames, in metres: half of what is promised, for bones hang on one another."""
+TOLERANCE = 0.0001
+"""How far off a body may be between frames, in metres, within a metre of its origin; and what reaches farther, by this
+part of its reach."""
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -73,7 +75,8 @@ def _needs(readings: Sequence[tuple[SlotTransform, Source]]) -> list[Need]:
     needs = []
     for place, source in readings:
         user = place.users[0]
-        need = Need(TOLERANCE / metres_per_channel_unit(user), reach_at_rest(user, reaches))
+        unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
+        need = Need(TOLERANCE * max(1.0 / unit, reach), reach)
         needs.append(need._replace(most=writer_of(place).most_samples(source)))
     return needs
 
@@ -211,24 +214,35 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         if (action.use_frame_range and not was_set_for_samples) or not (was_set_for_samples or motion.has_longer):
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-        of_bones = {pair.differences for pair in motion.bone_slots}
-        samples, keyed = [], []
+        apart = {pair.differences for pair in motion.bone_slots}
+        samples: list[bpy.types.FCurve] = []
+        begin, end = math.inf, -math.inf
         for bag in bags:
-            for fcurve in bag.fcurves:
-                # A modifier alone makes no range, be it the time of a constraint.
-                if len(fcurve.keyframe_points) or len(fcurve.sampled_points):
-                    ours = bag.slot_handle in of_bones or is_filled_in(fcurve) or is_time(fcurve)
-                    (samples if ours else keyed).append(fcurve.range())
-        if keyed and samples and not _is_within(samples, keyed):
-            begin, end = _union(keyed)
+            for fcurve in bag.fcurves if bag.slot_handle not in apart else ():
+                first, last = fcurve.range()
+                if begin <= first and last <= end:
+                    # There may be thousands: no more is asked than is needed.
+                    continue
+                if is_filled_in(fcurve) or is_time(fcurve):
+                    samples.append(fcurve)
+                elif _has_range(fcurve):
+                    begin, end = min(begin, first), max(end, last)
+        samples += (fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves)
+        keyed = [(begin, end)]
+        if begin <= end and any(not _is_within([one.range()], keyed) and _has_range(one) for one in samples):
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
             motion.range_is_ours = True
         elif was_set_for_samples:
             action.use_frame_range = motion.range_is_ours = False
-        if not samples and motion.has_longer:
+        if motion.has_longer and not any(map(_has_range, samples)):
             motion.has_longer = False
+
+
+def _has_range(fcurve: bpy.types.FCurve) -> bool:
+    """Whether an F-curve begins and ends anywhere. A modifier alone makes no range, be it the time of a constraint."""
+    return len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0
 
 
 def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
+from dataclasses import replace
 
 from ..actions.slots import Slot, SlotTransform
 from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
@@ -22,6 +23,23 @@ WRITERS: dict[type[Transform], Writer] = {
 def writer_of(place: SlotTransform) -> Writer:
     """Where the differences of a transform go."""
     return WRITERS[place.kind]
+
+
+def leave_other_way(place: SlotTransform) -> None:
+    """Take the in-betweens of an object out of where they are not to be any more: it came to share a slot, or an Action
+    came to it, and so it is exact between frames, or is so no more."""
+    if place.kind.is_part:
+        return
+    kind = ObjectTransform if place.kind is ExactObjectTransform else ExactObjectTransform
+    other = replace(place, users=tuple(kind(user.carrier) for user in place.users))
+    if other.filled:
+        WRITERS[kind].write(other, {}, None, {})
+    editable = [user for user in place.users if user.animated.is_editable]
+    if kind is ObjectTransform:
+        WRITERS[kind].release(kind(user.carrier) for user in editable)
+    for user in editable:
+        if user.motion.is_exact != user.has_difference_slot:
+            user.motion.is_exact = user.has_difference_slot
 
 
 def release(transforms: Iterable[Transform]) -> None:
