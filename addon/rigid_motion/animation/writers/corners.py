@@ -19,7 +19,7 @@ from .layout import Layout, Piece
 MOST_CORNERS = 64
 """Keys that are reached in one F-curve. Blender asks all modifiers on every frame."""
 
-SHARE = 0.2
+SHARE = 0.05
 """What a corner makes of the tolerance at least to be worth a modifier."""
 
 

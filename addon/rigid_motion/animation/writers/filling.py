@@ -27,9 +27,9 @@ from ..transforms.reaches import metres_per_channel_unit, reach_at_rest
 from .corners import corners
 from .table import release, writer_of
 
-TOLERANCE = 0.0001
+TOLERANCE = 0.00005
 """How far off a body may be between frames, in metres, within a metre of its origin; and what reaches farther, by this
-part of its reach."""
+part of its reach. It is half of what is promised, for bones hang on one another."""
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -63,7 +63,8 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
         _tag(place)
         if not samples:
             emptied += place.users
-        if not _is_within([layout.outermost], [source.keyed_range]):
+        first, last = source.keyed_range
+        if layout.outermost[0] < first or layout.outermost[1] > last:
             longer.add(place.slot.action)
     release(emptied)
     _limit_ranges({place.slot.action for place, _ in readings}, longer)
@@ -215,7 +216,8 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
         apart = {pair.differences for pair in motion.bone_slots}
-        samples: list[bpy.types.FCurve] = []
+        # Those of bones first: one that lies outside is enough to know.
+        samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves]
         begin, end = math.inf, -math.inf
         for bag in bags:
             for fcurve in bag.fcurves if bag.slot_handle not in apart else ():
@@ -223,20 +225,20 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
                 if begin <= first and last <= end:
                     # There may be thousands: no more is asked than is needed.
                     continue
+                if not _has_range(fcurve):
+                    continue
                 if is_filled_in(fcurve) or is_time(fcurve):
                     samples.append(fcurve)
-                elif _has_range(fcurve):
+                else:
                     begin, end = min(begin, first), max(end, last)
-        samples += (fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves)
-        keyed = [(begin, end)]
-        if begin <= end and any(not _is_within([one.range()], keyed) and _has_range(one) for one in samples):
+        if begin <= end and any(_is_outside(fcurve, begin, end) for fcurve in samples):
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
             motion.range_is_ours = True
         elif was_set_for_samples:
             action.use_frame_range = motion.range_is_ours = False
-        if motion.has_longer and not any(map(_has_range, samples)):
+        if not samples and motion.has_longer:
             motion.has_longer = False
 
 
@@ -245,10 +247,7 @@ def _has_range(fcurve: bpy.types.FCurve) -> bool:
     return len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0
 
 
-def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    return min(begin for begin, _ in ranges), max(end for _, end in ranges)
-
-
-def _is_within(inner: Sequence[tuple[float, float]], outer: Sequence[tuple[float, float]]) -> bool:
-    (first, last), (begin, end) = _union(inner), _union(outer)
-    return begin <= first and last <= end
+def _is_outside(fcurve: bpy.types.FCurve, begin: float, end: float) -> bool:
+    """Whether samples of an F-curve lie outside of these frames."""
+    first, last = fcurve.range()
+    return (first < begin or last > end) and _has_range(fcurve)
