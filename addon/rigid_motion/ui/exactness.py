@@ -66,7 +66,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transfo
     text = iface_("Exact")
     if is_off:
         text = iface_("{distance} off").format(distance=length(scene, error / metres_per_unit(scene), precision=2))
-    row = labelled(layout, iface_("Between Frames"))
+    row = labelled(layout, iface_("Subframes"))
     if target.is_part:
         row.label(text=text, translate=False)
     else:

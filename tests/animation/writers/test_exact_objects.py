@@ -130,3 +130,33 @@ def test_it_is_saved_undone_and_slowed_down(live_file, tmp_path):
     bpy.context.view_layer.update()
     (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
     assert np.abs(shown[:, :3, 3] - (1.0, 0.0, 0.0) - wanted[:, :3, 3]).max() < PROMISE
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+def test_delta_transforms_hit_keys_off_whole_frames_too(live_file, mode, order):
+    frames = (1.3, 10.5, 16.4, 40.0)
+    obj = new_object("Tool", order)
+    own = give_own_deltas(obj)
+    set_mode(key(obj, frames), mode)
+    bpy.context.view_layer.update()
+    assert largest_error(obj, np.array((*frames, *range(2, 40))), own) < PROMISE
+    for fcurve in curves_of(obj).values():
+        if len(fcurve.keyframe_points) > 2:
+            fcurve.keyframe_points[2].co_ui.x = 20.7
+    bpy.context.view_layer.update()
+    assert largest_error(obj, np.array((1.3, 10.5, 20.7, 40.0)), own) < PROMISE
+    assert refresh() == 0
+
+
+@pytest.mark.parametrize("is_exact", [False, True])
+def test_a_key_inserted_between_frames_keeps_the_pose(live_file, is_exact):
+    obj = set_up("Tool")
+    set_exact(obj, is_exact)
+    bpy.context.scene.frame_set(10, subframe=0.5)
+    bpy.context.view_layer.update()
+    (before,) = shown_worlds([obj], [10.5])
+    for path in ("location", "rotation_quaternion"):
+        obj.keyframe_insert(path, frame=10.5)
+    bpy.context.view_layer.update()
+    (after,) = shown_worlds([obj], [10.5])
+    assert np.abs(after - before).max() < 1e-5

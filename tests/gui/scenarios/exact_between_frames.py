@@ -15,7 +15,7 @@ PROMISED, WORTH_OFFERING = 1e-4, 1e-3
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    """An animator keys a cube, gives it a mode, and looks at the row *Between Frames*."""
+    """An animator keys a cube, gives it a mode, and looks at the row *Subframes*."""
     key_the_cube()
     view = hand.area("VIEW_3D")
     yield from hand.hover(places.centre(places.region(view)))

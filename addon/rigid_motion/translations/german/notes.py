@@ -18,7 +18,7 @@ NOTES = {
         "In der Delta-Transformation sind die Zwischenbilder, daher hält diese Änderung nur bis zum nächsten "
         "Einzelbild. Damit sie bleibt, unten „Delta-Transformation“ bearbeiten"
     ),
-    "Between Frames": "Zwischen Bildern",
+    "Subframes": "Dazwischen",
     "Exact": "Genau",
     "{distance} off": "{distance} daneben",
     "Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first": (
