@@ -19,6 +19,19 @@ EULER = 2.0**0.5
 """By how much more than the length of three small angles a body can turn."""
 
 
+class Samples(dict[int, np.ndarray]):
+    """The differences of one source at m moments of its range, by the rows of their components where there is any.
+
+    Frame and value of every sample by turns, in single precision, each of shape (2 m,).
+    """
+
+    rate = 1
+    """How many there are in a frame."""
+
+    error = 0.0
+    """How far a body is off between them at most, where that was asked for: see `largest_errors`."""
+
+
 def largest_errors(
     delta: np.ndarray,
     samples: Sequence[tuple[Source, slice]],

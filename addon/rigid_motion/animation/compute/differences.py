@@ -23,8 +23,8 @@ from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
 from ...motion.segments import prepare_within
 from ..curves import Keys, evaluate
-from .between_samples import largest_errors
-from .bodies import body_poses, differ, location_axes, turn_into_quaternions
+from .between_samples import Samples, largest_errors
+from .bodies import align, body_poses, differ, location_axes, take_off, turn_into_quaternions
 from .components import LOCATION, PART_OF, REST, ROTATION, ROWS, SCALE
 from .key_speeds import MEASURED, corrected, native_twists, progress_slopes, tangents_and_lacks
 from .neighbours import meeting, with_neighbours
@@ -64,19 +64,6 @@ class InBetweens:
 
     wanted: Poses
     """What the modes make of them, shape (m,)."""
-
-
-class Samples(dict[int, np.ndarray]):
-    """The differences of one source at m moments of its range, by the rows of their components where there is any.
-
-    Frame and value of every sample by turns, in single precision, each of shape (2 m,).
-    """
-
-    rate = 1
-    """How many there are in a frame."""
-
-    error = 0.0
-    """How far a body is off between them at most, where that was asked for: see `largest_errors`."""
 
 
 def in_betweens(source: Source, frames: np.ndarray, mode: str | None = None) -> InBetweens:
@@ -151,14 +138,14 @@ def differences(
         _move(portion, frames, rows, delta)
         for source, place in samples:
             if source.is_on_top and not np.array_equal(source.original, REST):
-                _take_off(delta[:, place], source.original)
+                take_off(delta[:, place], source.original)
         order = portion[0].order
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
         else:
-            _align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
+            align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]
         errors = itertools.repeat(0.0)
         if reaches is not None:
@@ -174,30 +161,6 @@ def differences(
             own.rate, own.error = rate_of[id(source)], float(error)
             found[id(source)] = own
     return [found[id(source)] for source in sources]
-
-
-def _take_off(delta: np.ndarray, original: np.ndarray) -> None:
-    """Leave of differences (., m) what comes on top of the original one, in place."""
-    delta[ROWS[LOCATION]] -= original[ROWS[LOCATION], None]
-    inverse = original[ROWS[ROTATION]] * (1.0, -1.0, -1.0, -1.0)
-    delta[ROWS[ROTATION]] = multiply(delta[ROWS[ROTATION]].T, inverse).T
-    if len(delta) > ROWS[SCALE].start:
-        delta[ROWS[SCALE]] /= np.where(original[ROWS[SCALE]] == 0.0, 1.0, original[ROWS[SCALE]])[:, None]
-
-
-def _align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
-    """Take quaternions (4, m) with that sign in which they are nearer to the one before, from each of the starts on.
-
-    On a key the difference is the same rotation as between keys, but where the channels have gone the long way round
-    not the same quaternion: straight from one to the other it would pass zero.
-    """
-    turned = np.einsum("km,km->m", quaternions[:, 1:], quaternions[:, :-1]) < 0.0
-    turned[[start - 1 for start in starts if start]] = False
-    if turned.any():
-        flips = np.concatenate(((0,), np.cumsum(turned)))
-        lengths = np.diff((*starts, quaternions.shape[1]))
-        odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
-        np.negative(quaternions, out=quaternions, where=odd)
 
 
 def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .between_samples import MOST_SAMPLES, largest_errors
+from .between_samples import MOST_SAMPLES, Samples, largest_errors
 from .components import ROTATION, ROWS
-from .differences import Samples, differences
+from .differences import differences
 from .sources import Source
 
 
