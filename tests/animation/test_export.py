@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import refresh, set_mode
+from rigid_motion.animation import refresh, set_exact, set_mode
 from rigid_motion.motion import KEYFRAME_MODES
 from tests.animation.oracle import assert_shown, expected_worlds, matrices, shown_worlds, snapshot
 from tests.animation.scenes import FRAMES, enabled, give_own_deltas, key, new_object
@@ -112,6 +112,27 @@ def test_a_sampled_gltf_file_has_every_mode_on_every_frame(exporter, tmp_path, a
     for obj in objects:
         set_mode(obj, "BLENDER")
     assert max(np.abs(worlds_in(path, obj.name) - shown_worlds([obj], PLAYED)[0]).max() for obj in objects) > 0.1
+
+
+@pytest.mark.parametrize("animation_mode", ["ACTIONS", "SCENE"])
+def test_what_is_exact_between_frames_is_exported_as_it_is_seen(exporter, tmp_path, animation_mode):
+    parent = new_object("Arm", "YXZ")
+    parent.location, parent.rotation_euler, parent.scale = (1.0, 2.0, 3.0), (0.4, -0.2, 0.9), (2.0, 2.0, 2.0)
+    objects, owns = [], {}
+    for seed, order in enumerate(("QUATERNION", "ZXY", "QUATERNION", "XYZ")):
+        obj = new_object(f"{seed} {order}", order)
+        owns[obj.name] = give_own_deltas(obj, seed)
+        obj.parent = parent if seed > 1 else None
+        objects.append(key(obj, seed=seed, scale="even"))
+    set_mode(objects, "motor_spline")
+    set_exact(objects)
+    bpy.context.view_layer.update()
+    assert_shown(objects, PLAYED, owns)
+    path = export(tmp_path / "shot.gltf", export_animation_mode=animation_mode)
+    for obj in objects:
+        assert_near(worlds_in(path, obj.name), expected_worlds(obj, PLAYED, owns))
+    clips = json.loads(path.read_text(encoding="utf-8"))["animations"]
+    assert len(clips) == len(objects), "none of differences"
 
 
 def test_an_action_in_a_strip_is_exported_with_its_in_betweens(exporter, tmp_path):

@@ -46,8 +46,15 @@ def test_half_the_speed_has_a_quarter_of_the_error(live_file):
 
 
 @pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_what_is_exact_is_within_a_tenth_of_a_millimetre(live_file, mode, rotation_mode):
+    _, exact, *_ = measure(BRISK, mode, rotation_mode, 0.1)
+    assert exact.largest < 1e-4
+
+
+@pytest.mark.parametrize("rotation_mode", ["QUATERNION", "XYZ"])
 def test_baking_every_quarter_of_a_frame_leaves_a_tenth_of_the_error(live_file, rotation_mode):
-    found, finely, whole = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
+    found, _, finely, whole = measure(BRISK, "dq_sclerp", rotation_mode, 0.1)
     assert finely.largest < 0.1 * found.largest
     assert whole.largest > 0.5 * found.largest, "baking whole frames does not help"
 

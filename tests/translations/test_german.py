@@ -24,6 +24,10 @@ from tests.translations.shown_texts import (
 GERMAN = LANGUAGES["de_DE"]
 
 UNSEEN = {
+    "How many samples a frame the in-betweens have",
+    "How far off they are between samples, in Blender's units",
+    "Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
+    "Rigid Motion Rest",
     # Names in files and in Blender's own interface
     "Rigid Motion",
     "Object Transforms",
@@ -51,7 +55,7 @@ UNSEEN = {
     "How far what stands on the ground slid there",
     "How far it slides there with fewer keys",
     "The mode that was chosen before there was an Action to keep it",
-    "The constraints that the bone was given. Who takes one off does so on purpose",
+    "The constraints that it was given. Who takes one off does so on purpose",
     "The name that Actions have records of the bone under. Where it has another, it was renamed",
     "Which components of them, as bits",
     "Whether bones have modes, or constraints for them",

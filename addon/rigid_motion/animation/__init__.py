@@ -32,6 +32,7 @@ from .baking.reducing import (
 from .baking.sizes import radius_of
 from .compute.sources import MODE_IDS
 from .edits.breakdowns import Breakdowns, breakdown
+from .edits.exactness import error_between_frames, set_exact
 from .edits.mode_keys import set_mode, set_turns
 from .edits.repair import constraint_trouble, restore_constraints
 from .live import edit_mode, follower
@@ -53,6 +54,7 @@ __all__ = [
     "channelbag_of",
     "constraint_trouble",
     "discard_dense_keys",
+    "error_between_frames",
     "is_baked",
     "is_reduced",
     "key_frames",
@@ -67,6 +69,7 @@ __all__ = [
     "restore_constraints",
     "restore_keys",
     "set_enabled",
+    "set_exact",
     "set_mode",
     "set_turns",
     "total_reduction",

@@ -78,6 +78,8 @@ class SlotRecord(bpy.types.PropertyGroup):
     constraint: StringProperty(
         description="What the constraint of a bone is called, where that is not its usual name", options={"HIDDEN"}
     )
+    rate: IntProperty(description="How many samples a frame the in-betweens have", default=1, options={"HIDDEN"})
+    error: FloatProperty(description="How far off they are between samples, in Blender's units", options={"HIDDEN"})
 
 
 class BoneSlot(bpy.types.PropertyGroup):
@@ -187,6 +189,11 @@ class _Motion:
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},
     )
+    mounted: StringProperty(
+        description="The constraints that it was given. Who takes one off does so on purpose",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     bakes: CollectionProperty(type=ChangedAction, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"})
 
 
@@ -196,14 +203,14 @@ class BoneMotion(_Motion, bpy.types.PropertyGroup):
         options={"HIDDEN"},
         override={"LIBRARY_OVERRIDABLE"},
     )
-    mounted: StringProperty(
-        description="The constraints that the bone was given. Who takes one off does so on purpose",
-        options={"HIDDEN"},
-        override={"LIBRARY_OVERRIDABLE"},
-    )
 
 
 class ObjectMotion(_Motion, bpy.types.PropertyGroup):
+    is_exact: BoolProperty(
+        description="Whether in-betweens are exact between frames, by a constraint, and not in delta transforms",
+        options={"HIDDEN"},
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     filled: BoolVectorProperty(
         description="Which delta transforms in-betweens are in; the object's own are kept here meanwhile",
         size=4,

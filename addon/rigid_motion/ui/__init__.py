@@ -10,6 +10,7 @@ shown        the transform seen on the screen           overlay      paths in th
 look         how they look                              wording      labels and texts
 bake         the one that bakes, with its dialog        slider       a factor, dragged with the mouse
 breakdown    those that key poses by a slider
+exactness    exact between frames, or not
 preferences  of the extension                           manual       where the documentation is
 turn_operator  whole turns between keys
 """
@@ -20,6 +21,7 @@ import bpy
 
 from . import (
     breakdown,
+    exactness,
     keymap,
     manual,
     menus,
@@ -38,6 +40,7 @@ CLASSES = (
     *operators.CLASSES,
     *turn_operator.CLASSES,
     *breakdown.CLASSES,
+    *exactness.CLASSES,
     *pose_operators.CLASSES,
     *reducing.CLASSES,
     *menus.CLASSES,

@@ -22,6 +22,7 @@ PAGES = (
     ("bpy.ops.rigid_motion.set_mode", MODES),
     ("bpy.ops.rigid_motion.reduce_keys", "reduction.md"),
     ("bpy.ops.rigid_motion.mend", IN_THE_FILE),
+    ("bpy.ops.rigid_motion.exact", LIMITS),
     ("bpy.ops.rigid_motion.*", HOW_TO),
     ("bpy.types.objectmotion.mode", MODES),
     ("bpy.types.slotrecord.*", HOW_TO),

@@ -53,8 +53,7 @@ def _draw_rest(layout: bpy.types.UILayout, pie: str, *, posing: bool) -> None:
     layout.separator()
     layout.operator("rigid_motion.clear")
     layout.operator("rigid_motion.refresh")
-    if posing:
-        layout.operator("rigid_motion.mend")
+    layout.operator("rigid_motion.mend" if posing else "rigid_motion.exact")
     layout.separator()
     layout.operator("wm.call_menu_pie", text="Pie Menu").name = pie
 

@@ -15,7 +15,7 @@ from ..animation.queries.keyed import active_place
 from ..animation.queries.polls import with_in_betweens
 from ..animation.queries.segments import SegmentFacts, parts_with_in_betweens
 from ..animation.transforms import ORIGINALS, OWN_WORDS, Refused, Transform
-from . import overlay
+from . import exactness, overlay
 from .notes import facts_and_notes
 from .rows import draw_text, labelled
 from .targets import (
@@ -65,6 +65,7 @@ class _Main:
             _draw_segment(context, layout, segment)
             if segment.mode != "BLENDER":
                 _draw_turns(layout, target)
+        exactness.draw(context, layout, target)
         for icon, text in notes:
             draw_text(context, layout, text, icon)
         if ("ERROR", OUT_OF_DATE) in notes:

@@ -159,7 +159,7 @@ def _time_of_reduction(page: str) -> str:
 
 def of_sub_frames(page: str) -> list[str]:
     """Of the page of `subframes.py`."""
-    return facts(page, (_live_between, _baked_between))
+    return facts(page, (_live_between, _exact_between, _baked_between))
 
 
 def _motions(page: str) -> list[Table]:
@@ -184,6 +184,14 @@ def _live_between(page: str) -> str:
     return (
         "Measured: what Blender shows at quarter frames, beside what a mode gives there. The largest displacement of "
         f"all modes: {'; '.join(told)}."
+    )
+
+
+def _exact_between(page: str) -> str:
+    told = [f"{_largest(one, 'exact, mm'):.2g} mm" for one in _motions(page)]
+    return (
+        "With *Exact Between Frames*, as bones always are, the largest displacement at any 32nd part of a frame is "
+        f"{', '.join(told[:-1])} and {told[-1]}."
     )
 
 

@@ -29,7 +29,6 @@ from tests.animation.oracle import (
     SMOOTH,
     assert_shown,
     curves_of,
-    expected_off_whole_frames,
     key_frames,
     shown_worlds,
     snapshot,
@@ -144,14 +143,6 @@ def test_keys_may_be_anywhere(live_file, mode, order):
     played = np.arange(-36.0, 70.0)
     assert len(key_frames(hand)) == len(frames) + 3
     assert_posed(rig, played)
-
-
-@pytest.mark.parametrize("mode", [mode for mode in MODES if mode not in SMOOTH])
-def test_between_whole_frames_differences_run_straight(live_file, mode):
-    rig, frames = moving_rig(mode), np.arange(-1.0, 42.0, 0.375)
-    bases = {bone.name: expected_off_whole_frames(bone, frames) for bone in rig.pose.bones}
-    (shown,) = shown_poses([rig], frames)
-    assert_same_poses(rig, frames, shown, expected_poses(rig, frames, bases))
 
 
 KEYED = {

@@ -436,7 +436,13 @@ class EditingBones(RigEditing):
         self._edit(swap)
 
     @precondition(lambda self: self.on)
-    @rule(who=shares, start=st.integers(1, 60), scale=st.sampled_from((1.0, 2.0)), which=st.none() | shares, seed=seeds)
+    @rule(
+        who=shares,
+        start=st.integers(1, 60),
+        scale=st.sampled_from((1.0, 2.0, 4.0)),
+        which=st.none() | shares,
+        seed=seeds,
+    )
     def push_down_edit_and_delete_the_strip(self, who, start, scale, which, seed):
         name = self._named(who)
         rig = bpy.data.objects[name[0]]
@@ -454,11 +460,12 @@ class EditingBones(RigEditing):
             bpy.context.view_layer.update()
         first, last = np.ceil(strip.action_frame_start), np.floor(strip.action_frame_end)
         own = np.arange(first, last + 1.0, max(1.0, (last - first) // 8))
+        own = np.union1d(own, own[:-1] + 0.25)
         motions = {bone.name: self._motion(bone, own) for bone in rig.pose.bones}
         frames = strip.frame_start + scale * (own - strip.action_frame_start)
         rig.animation_data.use_tweak_mode = False
         bpy.context.view_layer.update()
-        self._assert_placed(rig, frames, motions)
+        self._assert_placed(rig, frames, motions, 10 * TOLERANCE)
         bpy.context.scene.frame_set(start + 5)
         rig.animation_data.nla_tracks.remove(rig.animation_data.nla_tracks[0])
         bpy.context.view_layer.update()

@@ -68,13 +68,13 @@ def test_an_edit_of_a_key_computes_the_frames_around_it_and_leaves_the_others(
 ):
     obj = tool(mode, order)
     before, ranges = samples_of(obj), []
-    differences = filling.differences
+    sampled = filling.sampled
 
-    def watched(sources, spans=None):
+    def watched(sources, needs, spans=None):
         ranges.extend(spans if spans is not None else [None] * len(sources))
-        return differences(sources, spans)
+        return sampled(sources, needs, spans)
 
-    monkeypatch.setattr(filling, "differences", watched)
+    monkeypatch.setattr(filling, "sampled", watched)
     edit(obj)
     bpy.context.view_layer.update()
     # Handles of the keys beside it may follow, and a smooth mode looks one key on.

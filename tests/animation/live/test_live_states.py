@@ -16,6 +16,7 @@ from tests.animation.edit_steps import TakenAway
 from tests.animation.editing import LAST, ORDERS, frames_in, goes_on, seeds, shares
 from tests.animation.oracle import (
     MODE_IDS,
+    WIDTHS,
     Own,
     as_quaternion,
     assert_shown,
@@ -365,6 +366,9 @@ class EditingObjects(TakenAway, WithTools):
         frame, name = scene.frame_current_final, obj.name
         if obj.parent is not None or not self._holds_pose(obj, frame):
             return
+        # What is keyed in a muted channel is not seen.
+        if any(fcurve.mute for (path, _), fcurve in curves_of(obj).items() if path in WIDTHS):
+            return
         values = np.random.default_rng(seed).normal(size=6)
         matrix = Matrix.LocRotScale(values[:3], Euler(values[3:]), obj.matrix_world.to_scale())
         location, rotation, _ = transform_paths(obj)
@@ -395,6 +399,13 @@ class EditingObjects(TakenAway, WithTools):
             self._link(obj, None, None)
             bpy.context.view_layer.update()
 
+    @precondition(lambda self: self.history)
+    @rule(who=shares, is_exact=st.booleans())
+    def be_exact_between_frames(self, who, is_exact):
+        obj = bpy.data.objects[self._named(who)]
+        if self.on and self._is_free(obj.name):
+            self._edit(lambda: animation.set_exact(obj, is_exact))
+
     # What holds all the time
 
     @precondition(lambda self: self.on and self.history)
@@ -411,14 +422,25 @@ class EditingObjects(TakenAway, WithTools):
             keys = key_frames(obj)
             if obj.parent is not None or obj.rotation_mode != "QUATERNION" or len(keys) < 2 or goes_on(obj):
                 continue
-            whole = np.arange(np.ceil(keys[0]), np.floor(keys[-1]))
+            whole = np.setdiff1d(np.arange(np.ceil(keys[0]), np.floor(keys[-1])), np.floor(keys[keys % 1.0 > 0.0]))
             frames = whole[:: max(1, len(whole) // 6)] + 0.25
             if len(frames):
                 shown = shown_worlds([obj], frames)[0]
-                wanted = expected_off_whole_frames(obj, frames, self.owns[name])
+                is_exact = obj.rigid_motion.is_exact
+                wanted = (expected_bases if is_exact else expected_off_whole_frames)(obj, frames, self.owns[name])
                 size = max(1.0, np.abs(wanted).max(), np.abs(expected_bases(obj, whole)).max())
                 error = np.abs(shown - wanted).max(axis=(1, 2)) / size * shortest_quaternion(obj, frames)
                 assert error.max() < 1e-4, f"{name} is off by {error.max():.3g} on frame {frames[error.argmax()]}"
+
+    @precondition(lambda self: self.on and self.history)
+    @invariant()
+    def keys_off_whole_frames_are_hit(self):
+        for name in self.names:
+            obj = bpy.data.objects[name]
+            keys = key_frames(obj)
+            off = keys[keys % 1.0 > 0.0][:6]
+            if obj.parent is None and len(keys) > 1 and keys[0] >= 0.0 and len(off) and not goes_on(obj):
+                assert_shown([obj], off, self.owns)
 
     @precondition(lambda self: self.on and self.history)
     @invariant()

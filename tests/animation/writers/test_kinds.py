@@ -31,7 +31,7 @@ def test_a_data_path_tells_the_kind_that_it_leads_to(prefix, kind, part):
     assert is_part(prefix) is part
 
 
-def test_what_blender_has_is_found_again_by_its_prefix(empty_file):
+def test_what_blender_has_is_found_again_by_its_prefix(live_file):
     rig = new_rig()
     for carrier in (rig, *rig.pose.bones):
         transform = transform_of(carrier)

@@ -197,6 +197,7 @@ def _source(
         modified=keyed.modified,
         driven=keyed.driven,
         influence=influence_of(place.slot) if is_blended else None,
+        is_on_top=user.has_difference_slot,
     )
 
 

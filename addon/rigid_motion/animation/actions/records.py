@@ -25,6 +25,8 @@ class Recorded(NamedTuple):
     rows: str = ""
     constraint: str = ""
     turns_axis: str = SCREW_AXIS
+    rate: int = 1
+    error: float = 0.0
 
 
 NOTHING_RECORDED = Recorded()
@@ -39,7 +41,9 @@ def recorded(place: SlotTransform) -> Recorded:
             found = NOTHING_RECORDED
         else:
             mode = record.mode if record.is_property_set("mode") else None
-            found = Recorded(mode, record.digest, record.rows, record.constraint, record.turns_axis or SCREW_AXIS)
+            axis = record.turns_axis or SCREW_AXIS
+            samples = max(record.rate, 1), record.error
+            found = Recorded(mode, record.digest, record.rows, record.constraint, axis, *samples)
         place.__dict__["recorded"] = found
     return found
 
@@ -110,11 +114,15 @@ def record_turns_axis(place: SlotTransform, axis: str) -> None:
         place.__dict__.pop("recorded", None)
 
 
-def record_in_betweens(place: SlotTransform, digest: str, rows: Iterable[int]) -> None:
-    """Keep what in-betweens were made from, and which components they are in."""
+def record_in_betweens(
+    place: SlotTransform, digest: str, rows: Iterable[int], rate: int = 1, error: float = 0.0
+) -> None:
+    """Keep what in-betweens were made from, which components they are in, how many samples a frame they have, and how
+    far off they are between these."""
     if digest:
         record = _ensure_record(place)
         record.digest, record.rows = digest, "".join(f"{row:x}" for row in sorted(rows))
+        record.rate, record.error = rate, error
     elif recorded(place).digest and (record := record_of(place)) is not None:
         record.digest = record.rows = ""
         _tidy(place, record)

@@ -85,7 +85,7 @@ def refuse_what_is_taken(user: Transform, place: SlotTransform, drivers: Collect
     `drivers` are the channels of the user's data-block that are driven.
     """
     refuse_linked(user, place)
-    # The differences of bones are in a slot of their own.
+    # Differences that are in a slot of their own take the place of nothing.
     for channel in () if user.has_difference_slot else user.differences.values():
         if channel in drivers:
             _refuse_driver(user.name, channel)

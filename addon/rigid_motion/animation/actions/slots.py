@@ -113,8 +113,14 @@ class SlotTransform:
         return {
             (fcurve.data_path, fcurve.array_index): fcurve
             for fcurve in group.channels
-            if not fcurve.keyframe_points and (apart or _is_difference(fcurve.data_path))
+            if not fcurve.keyframe_points
+            and (self._has_difference(fcurve.data_path) if apart else _is_difference(fcurve.data_path))
         }
+
+    def _has_difference(self, path: str) -> bool:
+        """Whether a data path in a slot of differences is that of one of its own."""
+        prefix, prop = split_path(path)
+        return prefix == self.prefix and prop in WIDTHS
 
     def has_filled(self, curves: Curves) -> None:
         """Take note of the F-curves that in-betweens are in by now."""
@@ -193,7 +199,7 @@ def _users_of(slot: Slot, prefix: str) -> tuple[Transform, ...]:
     """What a prefix stands for in each of the users of a slot that has it."""
     kind = kind_of(prefix)
     users = () if kind is None else (kind.in_object(user, prefix) for user in slot.users)
-    return tuple(user for user in users if user is not None)
+    return () if kind is None else kind.together(tuple(user for user in users if user is not None))
 
 
 def _channelbag(action: bpy.types.Action, handle: int) -> bpy.types.ActionChannelbag | None:
@@ -342,7 +348,7 @@ def choose_slots(obj: bpy.types.Object) -> None:
                 is_new = not strip.last_slot_identifier
                 strip.action_slot = slot
                 if is_new:
-                    _give_length(strip, track)
+                    _give_length(strip, track, slot)
 
 
 def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
@@ -354,11 +360,17 @@ def _slot_to_choose(strip: bpy.types.NlaStrip) -> bpy.types.ActionSlot | None:
     return keyed[0] if differences and len(keyed) == 1 else None
 
 
-def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack) -> None:
+def _give_length(strip: bpy.types.NlaStrip, track: bpy.types.NlaTrack, slot: bpy.types.ActionSlot) -> None:
     """Have a strip show all of its Action, up to the next strip: Blender makes those without a slot one frame long."""
     if (strip.action_frame_start, strip.action_frame_end) != (0.0, 1.0):
         return
-    first, last = strip.action.frame_range
+    channelbag = action_get_channelbag_for_slot(strip.action, slot)
+    keyed = [fcurve.range() for fcurve in channelbag.fcurves if len(fcurve.keyframe_points)] if channelbag else []
+    if strip.action.use_frame_range or not keyed:
+        first, last = strip.action.frame_range
+    else:
+        # Differences may lie behind the keys.
+        first, last = min(begin for begin, _ in keyed), max(end for _, end in keyed)
     room = min((one.frame_start for one in track.strips if one.frame_start > strip.frame_start), default=math.inf)
     strip.action_frame_end = min(last, first + room - strip.frame_start)
     strip.action_frame_start = first

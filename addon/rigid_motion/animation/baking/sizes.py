@@ -8,9 +8,7 @@ import bpy
 import numpy as np
 
 from ..transforms import Transform
-
-SOME_SIZE = 0.1
-"""The radius, in metres, of what has no size."""
+from ..transforms.reaches import SOME_SIZE, metres_per_unit, reach_of, size_of
 
 SAME_PLACE = 0.1
 """Heads of bones that are closer than this, of a bone's length, make no size."""
@@ -48,19 +46,6 @@ def radius_of(obj: bpy.types.Object | bpy.types.PoseBone) -> float:
     return size or SOME_SIZE / metres_per_unit(bpy.context.scene)
 
 
-def reach_of(bone: bpy.types.PoseBone) -> float:
-    """How far a bone reaches from its head at rest, in the rig's unit: its length.
-
-    Importers make up the lengths of bones that nothing hangs on: such a bone reaches no further than the one before it,
-    as far as that is long, or its head is from the head of that.
-    """
-    length, parent = bone.bone.length, bone.bone.parent
-    if parent is not None and not bone.bone.children:
-        before = (bone.bone.head_local - parent.head_local).length
-        length = min(length, max(before, parent.length))
-    return length or SOME_SIZE / metres_per_unit(bpy.context.scene)
-
-
 def rig_size(rig: bpy.types.Object) -> float:
     """The size of a rig in the scene's units: the largest extent of its joints along any axis, at rest.
 
@@ -85,17 +70,8 @@ def first_tolerance(scene: bpy.types.Scene, targets: Iterable[Transform], *, sha
     return float(f"{(OF_KEY_POSES if shared else OF_A_RIG) * max(sizes):.2g}")
 
 
-def metres_per_unit(scene: bpy.types.Scene) -> float:
-    return 1.0 if scene.unit_settings.system == "NONE" else scene.unit_settings.scale_length
-
-
 def _evaluated(obj: bpy.types.Object) -> bpy.types.Object:
     return obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
-
-
-def size_of(matrix: object) -> float:
-    """The scale of a matrix, the same along all axes."""
-    return float(np.cbrt(abs(np.linalg.det(np.array(matrix)[:3, :3]))))
 
 
 def scale_in_scene(transform: Transform) -> float:

@@ -57,3 +57,27 @@ def location_axes(sources: Sequence[Source], owners: np.ndarray) -> np.ndarray |
         return None
     same = np.eye(3)
     return np.stack([same if (own := source.location_axes) is None else own for source in sources])[owners]
+
+
+def take_off(delta: np.ndarray, original: np.ndarray) -> None:
+    """Leave of differences (., m) what comes on top of the original one, in place."""
+    delta[ROWS[LOCATION]] -= original[ROWS[LOCATION], None]
+    inverse = original[ROWS[ROTATION]] * (1.0, -1.0, -1.0, -1.0)
+    delta[ROWS[ROTATION]] = multiply(delta[ROWS[ROTATION]].T, inverse).T
+    if len(delta) > ROWS[SCALE].start:
+        delta[ROWS[SCALE]] /= np.where(original[ROWS[SCALE]] == 0.0, 1.0, original[ROWS[SCALE]])[:, None]
+
+
+def align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
+    """Take quaternions (4, m) with that sign in which they are nearer to the one before, from each of the starts on.
+
+    On a key the difference is the same rotation as between keys, but where the channels have gone the long way round
+    not the same quaternion: straight from one to the other it would pass zero.
+    """
+    turned = np.einsum("km,km->m", quaternions[:, 1:], quaternions[:, :-1]) < 0.0
+    turned[[start - 1 for start in starts if start]] = False
+    if turned.any():
+        flips = np.concatenate(((0,), np.cumsum(turned)))
+        lengths = np.diff((*starts, quaternions.shape[1]))
+        odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
+        np.negative(quaternions, out=quaternions, where=odd)

@@ -10,6 +10,7 @@ and that is kept where keys are not eased: handles shape single channels, and it
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,16 +20,17 @@ from ...motion import KEYFRAME_MODES, Poses
 from ...motion.eulers import extrinsic_eulers_from_quaternions
 from ...motion.piecewise import blocks, combine
 from ...motion.quaternions import multiply
-from .bodies import differ, turn_into_quaternions
+from .between_samples import Samples, largest_errors
+from .bodies import align, differ, take_off, turn_into_quaternions
 from .breakdowns import Passages
 from .channel_rows import channels_at_ends, each, filled_height, height, sampled
-from .components import LOCATION, ROTATION, ROWS, SCALE
+from .components import LOCATION, REST, ROTATION, ROWS, SCALE
 from .ends import Ends, measured_in
 from .influences import blended, undo_blending
 from .key_speeds import MEASURED, corrected
 from .neighbours import packed
 from .progress import are_idle, progress_weights
-from .samples import NOTHING, align, held_rows, range_of_each
+from .samples import NOTHING, held_rows, range_of_each
 from .sources import MODE_NAMES, MODE_NUMBERS, Source
 
 AT_ONCE = 131072
@@ -62,11 +64,6 @@ class InBetweens:
 
     wanted: Poses
     """What the modes make of them, shape (m,)."""
-
-
-Samples = dict[int, np.ndarray]
-"""The differences of one source on the m whole frames of its range, by the rows of their components where there is any.
-Frame and value of every sample by turns, in single precision, each of shape (2 m,)."""
 
 
 def in_betweens(
@@ -120,51 +117,76 @@ def progress_at(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list
     return [found[id(source)] for source in sources]
 
 
-def differences(sources: Sequence[Source], ranges: Sequence[tuple[int, int]] | None = None) -> list[Samples]:
-    """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source.
+def differences(
+    sources: Sequence[Source],
+    ranges: Sequence[tuple[int, int]] | None = None,
+    rates: Sequence[int] | None = None,
+    reaches: Sequence[float] | None = None,
+) -> list[Samples]:
+    """What turns Blender's in-betweens into the wanted ones, on the whole frames of each source and between them.
 
     The rotation is a quaternion or, for a source that turns by Euler angles, as these, and applied on the left;
     location is added, scale multiplied. Components that are the source's original ones throughout are left out. Holds
     are left to the F-curves that the differences go into.
 
-    `ranges` are the first and last frames that are wanted of each, in place of those of the source. Then no component
-    is left out that may differ elsewhere.
+    Parameters
+    ----------
+    sources
+    ranges : sequence of pairs, optional
+        The first and last samples of each, counted from frame 0, in place of those of the source. Then no component
+        is left out that may differ elsewhere.
+    rates : sequence of int, optional
+        How many samples a frame each has; one where there are none.
+    reaches : sequence of float, optional
+        How far the body of each reaches from its origin: then the errors between samples are estimated.
     """
     found = {}
-    range_of = {id(source): source.frame_range for source in sources}
+    rates = rates or [1] * len(sources)
+    rate_of = {id(source): rate for source, rate in zip(sources, rates, strict=True)}
+    reach_of = {id(source): reach for source, reach in zip(sources, reaches or rates, strict=True)}
+    range_of = {id(source): source.sample_range(rate) for source, rate in zip(sources, rates, strict=True)}
     if ranges is not None:
         range_of = {id(source): span for source, span in zip(sources, ranges, strict=True)}
     for portion in _portions(sources, range_of):
-        spans = [range_of[id(source)] for source in portion]
-        of_range = {span: np.arange(span[0], span[1] + 1.0) for span in set(spans)}
+        spans = [(*range_of[id(source)], rate_of[id(source)]) for source in portion]
+        of_range = {span: np.arange(span[0], span[1] + 1.0) / span[2] for span in set(spans)}
         frames = [of_range[span] for span in spans]
+        frames_of = {id(source): own for source, own in zip(portion, frames, strict=True)}
         samples = each(portion, map(len, frames))
         # Both in one array: of smaller ones the C library gives the memory back at once, and asks for it the next time.
         rows, points = np.empty((2, height(portion), samples[-1][1].stop))
         delta = rows[: filled_height(portion)]
         _move(portion, frames, rows, delta)
+        for source, place in samples:
+            if source.is_on_top and not np.array_equal(source.original, REST):
+                take_off(delta[:, place], source.original)
         order = portion[0].order
         partial = [(source, place) for source, place in samples if source.influence is not None]
         for source, place in partial:
-            own = of_range[range_of[id(source)]]
+            own = frames_of[id(source)]
             blended(source, own, sampled([(source, slice(len(own)))], [own]), delta[:, place])
         if order is not None:
             for some, place in blocks(np.array((0, *(own.stop for _, own in samples))), BLOCK):
                 starts = [own.start - place.start for _, own in samples[some]]
                 delta[3:6, place] = extrinsic_eulers_from_quaternions(delta[ROWS[ROTATION], place].T, order, starts).T
             for source, place in partial:
-                undo_blending(source, of_range[range_of[id(source)]], delta[3:6, place])
+                undo_blending(source, frames_of[id(source)], delta[3:6, place])
         else:
             align(delta[ROWS[ROTATION]], [place.start for _, place in samples])
         starts = [place.start for _, place in samples]
+        errors = itertools.repeat(0.0)
+        if reaches is not None:
+            errors = largest_errors(delta, samples, spans, [reach_of[id(source)] for source in portion])
         first, differs = delta[:, starts], range_of_each(delta, starts) > NOTHING
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
-        for number, (source, place) in enumerate(samples):
+        for number, ((source, place), error) in enumerate(zip(samples, errors, strict=False)):
             changing = {row for row in source.filled_rows if differs[row, number] or ranges is not None}
             held = held_rows(source, changing, first[:, number])
-            found[id(source)] = {row: points[row, place].ravel() for row in sorted(changing | held)}
+            own = Samples({row: points[row, place].ravel() for row in sorted(changing | held)})
+            own.rate, own.error = rate_of[id(source)], float(error)
+            found[id(source)] = own
     return [found[id(source)] for source in sources]
 
 

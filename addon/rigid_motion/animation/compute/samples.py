@@ -1,4 +1,4 @@
-"""Rows of samples: which of them vary, and signs that go from one to the next."""
+"""Rows of samples: which of them vary."""
 
 from __future__ import annotations
 
@@ -11,21 +11,6 @@ from .sources import Source
 
 NOTHING = 1e-9
 """What a component varies by that is always the same but for rounding errors."""
-
-
-def align(quaternions: np.ndarray, starts: Sequence[int]) -> None:
-    """Take quaternions (4, m) with that sign in which they are nearer to the one before, from each of the starts on.
-
-    On a key the difference is the same rotation as between keys, but where the channels have gone the long way round
-    not the same quaternion: straight from one to the other it would pass zero.
-    """
-    turned = np.einsum("km,km->m", quaternions[:, 1:], quaternions[:, :-1]) < 0.0
-    turned[[start - 1 for start in starts if start]] = False
-    if turned.any():
-        flips = np.concatenate(((0,), np.cumsum(turned)))
-        lengths = np.diff((*starts, quaternions.shape[1]))
-        odd = (flips - np.repeat(flips[list(starts)], lengths)) % 2 == 1
-        np.negative(quaternions, out=quaternions, where=odd)
 
 
 def held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:

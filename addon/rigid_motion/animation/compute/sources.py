@@ -33,7 +33,7 @@ DEPENDS_ON_KEYS = [MODE_NUMBERS[name] for name in ("pga_lerp", "cga_lerp", "moto
 UNKNOWN = -1
 """The mode of something from a file that is damaged, or of a later version."""
 
-LAYOUT = b"2"
+LAYOUT = b"3"
 """How in-betweens are laid out in F-curves. With another number, those of older files are made anew."""
 
 FULL_TURN = 2.0 * np.pi
@@ -111,6 +111,9 @@ class Source:
     influence: tuple[tuple[float, float], ...] | None = None
     """Frames, and the influence that a strip with nothing below it has on them; None where that is full."""
 
+    is_on_top: bool = False
+    """Whether differences come on top of the original one, and not in its place."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -138,6 +141,11 @@ class Source:
         if self.has_modified_scale:
             summary.update(b"modified scale")
         return summary.hexdigest()
+
+    @property
+    def difference_at_keys(self) -> np.ndarray:
+        """What is written on keys, as components, shape (10,)."""
+        return REST if self.is_on_top else self.original
 
     @property
     def curves(self) -> list[Keys]:
@@ -332,17 +340,26 @@ class Source:
 
     @cached_property
     def frame_range(self) -> tuple[int, int]:
-        """The first and last whole frame that in-betweens are for: from the first segment with a mode to the last.
+        """The first and last whole frame that in-betweens are for."""
+        return self.sample_range(1)
 
-        Where it goes on outside of its keys, they are for all that is seen, unless what is between the keys repeats.
+    def sample_range(self, rate: int) -> tuple[int, int]:
+        """The numbers of the first and last sample that in-betweens are for, of so many a frame, from frame 0 on."""
+        first, last = self._live_range
+        return math.floor(first * rate), math.ceil(last * rate)
+
+    @cached_property
+    def _live_range(self) -> tuple[float, float]:
+        """From the first segment with a mode to the last.
+
+        Where it goes on outside of its keys, all that is seen, unless what is between the keys repeats.
         """
         if self.goes_on and not self.repeats:
             return self.seen_range
-        first, last = self.keyed_range
         if self.cyclic is None and self.is_live:
             live = np.flatnonzero(self.modes)
-            first, last = self.key_frames[live[0]], self.key_frames[live[-1] + 1]
-        return math.floor(first), math.ceil(last)
+            return float(self.key_frames[live[0]]), float(self.key_frames[live[-1] + 1])
+        return self.keyed_range
 
     @property
     def held_range(self) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 apply       targets, refusals and one refresh for every verb
 mode_keys   choosing modes
+exactness   objects that are exact between frames
 repair      constraints of bones, put back
 breakdowns  poses in between, keyed where the playhead is
 

@@ -20,7 +20,7 @@ from ..compute.sources import Source
 from ..transforms import Refused, Transform
 from ..writers.filling import clear, fill_in, follow_ranges, hold, is_complete
 from ..writers.sampled import regroup
-from ..writers.table import release, remove_orphans, writer_of
+from ..writers.table import leave_other_way, release, remove_orphans, writer_of
 from .dense_keys import keep_motion
 from .inserted_keys import InsertedKeys
 from .segment_keys import share_out_turns
@@ -57,6 +57,8 @@ def refresh_places(
         sources = [keyed.get(place) for place in places]
     stale, idle, emptied, keyed_anew = [], [], [], []
     for place, source in zip(places, sources, strict=True):
+        if place.slot.action.is_editable:
+            leave_other_way(place)
         writer_of(place).show(place)
         # What is linked has the in-betweens that its own file was saved with.
         if not place.slot.action.is_editable:

@@ -4,9 +4,10 @@ A transform knows whose Action animates it, on which property its channels are, 
 Blender's in-betweens and the wanted ones goes.
 
 transform  the interface: channels, and where differences go
-objects    objects, by their delta transforms
+objects    objects, by their delta transforms, or by a constraint where they are to be exact between frames
 bones      pose bones, by a constraint
 kinds      the table of both
+reaches    how far things reach
 posing     where the poses of bones put them
 
 Each module imports only those above it.
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 from .bones import CONSTRAINT, BoneTransform, bone_name, let_override_be_read, prefix_of, shows_differences, split_path
 from .kinds import KINDS, is_part, kind_of, transform_of
-from .objects import GROUP, ORIGINALS, ObjectTransform, default_of
+from .objects import GROUP, ORIGINALS, ExactObjectTransform, ObjectTransform, default_of
 from .transform import (
     LINKED,
     MODE_PROPERTY,
@@ -41,6 +42,7 @@ __all__ = [
     "WIDTHS",
     "BoneTransform",
     "Channel",
+    "ExactObjectTransform",
     "ObjectTransform",
     "Refused",
     "Transform",

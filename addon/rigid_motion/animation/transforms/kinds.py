@@ -7,10 +7,10 @@ from functools import lru_cache
 import bpy
 
 from .bones import BoneTransform
-from .objects import ObjectTransform
+from .objects import ExactObjectTransform, ObjectTransform
 from .transform import Transform
 
-KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform)
+KINDS: tuple[type[Transform], ...] = (BoneTransform, ObjectTransform, ExactObjectTransform)
 
 
 def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> Transform:
@@ -19,7 +19,7 @@ def transform_of(carrier: bpy.types.Object | bpy.types.PoseBone | Transform) -> 
         return carrier
     for kind in KINDS:
         if isinstance(carrier, kind.carrier_type):
-            return kind(carrier)
+            return kind.of(carrier)
     raise TypeError(f"neither an object nor a pose bone: {carrier!r}")
 
 

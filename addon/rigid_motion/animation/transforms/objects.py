@@ -64,8 +64,18 @@ class ObjectTransform(Transform):
         return not prefix
 
     @classmethod
+    def of(cls, carrier: bpy.types.Object) -> ObjectTransform:
+        return ExactObjectTransform(carrier) if carrier.rigid_motion.is_exact else cls(carrier)
+
+    @classmethod
     def in_object(cls, obj: bpy.types.Object, prefix: str) -> ObjectTransform:
-        return cls(obj)
+        return cls.of(obj)
+
+    @classmethod
+    def together(cls, users: tuple[Transform, ...]) -> tuple[Transform, ...]:
+        if any(user.has_difference_slot for user in users):
+            return tuple(ExactObjectTransform(user.carrier) for user in users)
+        return users
 
     @classmethod
     def difference_group(cls, prefix: str) -> str:
@@ -169,6 +179,27 @@ class ObjectTransform(Transform):
         summary = [path in paths for path in ORIGINALS]
         if list(motion.filled) != summary:
             motion.filled = summary
+
+
+class ExactObjectTransform(ObjectTransform):
+    """An object that is to be exact between frames. The difference is put on top of it by a constraint, as on bones:
+    samples of delta transforms lie on whole frames."""
+
+    has_difference_slot = True
+    matrix_lacks_difference = False
+
+    @classmethod
+    def of(cls, carrier: bpy.types.Object) -> ObjectTransform:
+        return cls(carrier)
+
+    def differences_for(self, rotation: str) -> dict[int, Channel]:
+        return channels_under("", rotation)
+
+    @property
+    def constraint_settings(self) -> dict[str, object]:
+        # Without a parent, an object's local axes are those that it has been turned to.
+        space = "WORLD" if self.carrier.parent is None else "LOCAL"
+        return super().constraint_settings | {"owner_space": space}
 
 
 def _paths_in(bits: int) -> set[str]:

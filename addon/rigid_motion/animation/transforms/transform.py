@@ -97,6 +97,16 @@ class Transform(ABC):
     def difference_group(cls, prefix: str) -> str:
         """The group of F-curves that its differences are in."""
 
+    @classmethod
+    def of(cls, carrier: bpy.types.Object | bpy.types.PoseBone) -> Transform:
+        """The transform of a carrier of this kind."""
+        return cls(carrier)
+
+    @classmethod
+    def together(cls, users: tuple[Transform, ...]) -> tuple[Transform, ...]:
+        """Users of one slot as what they are there, where all have the same differences."""
+        return users
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Transform) and (self.animated, self.prefix) == (other.animated, other.prefix)
 
@@ -195,6 +205,17 @@ class Transform(ABC):
     @abstractmethod
     def original(self) -> np.ndarray:
         """What it has for a difference without in-betweens, as components (10,): rotation as a unit quaternion."""
+
+    @property
+    def constraint_settings(self) -> dict[str, object]:
+        """How a constraint mixes its difference in: location added, rotation from the left, scale multiplied, and
+        transforms by hand see it."""
+        return {
+            "use_eval_time": True,
+            "mix_mode": "BEFORE_SPLIT",
+            "owner_space": "LOCAL",
+            "target_space": "LOCAL",
+        }
 
 
 def properties_for(rotation: str) -> dict[str, str]:

@@ -11,14 +11,6 @@ from ..actions.slots import Curves, SlotTransform, uses_of
 from ..transforms import BoneTransform, Transform, shows_differences
 from .times import constraint_path, name_of, span_of
 
-SETTINGS = {
-    "use_eval_time": True,
-    "mix_mode": "BEFORE_SPLIT",
-    "owner_space": "LOCAL",
-    "target_space": "LOCAL",
-}
-"""How the constraint mixes: location added, rotation from the left, scale multiplied, and transforms by hand see it."""
-
 
 def constraint_of(user: Transform, place: SlotTransform) -> bpy.types.ActionConstraint | None:
     """The constraint that shows the differences of a slot on a bone."""
@@ -118,7 +110,7 @@ def ensure_constraint(user: BoneTransform, place: SlotTransform) -> None:
     constraint.frame_start, constraint.frame_end = span_of(place)
     if (mounted := "\n".join((*names, name))) != user.motion.mounted:
         user.motion.mounted = mounted
-    if not user.animated.rigid_motion.has_bones:
+    if user.is_part and not user.animated.rigid_motion.has_bones:
         user.animated.rigid_motion.has_bones = True
 
 
@@ -127,7 +119,7 @@ def _new(user: BoneTransform, index: int, name: str) -> bpy.types.ActionConstrai
     constraints = user.carrier.constraints
     constraint = constraints.new("ACTION")
     constraint.name = name
-    for setting, value in SETTINGS.items():
+    for setting, value in user.constraint_settings.items():
         setattr(constraint, setting, value)
     constraints.move(len(constraints) - 1, index)
     constraint = constraints[index]

@@ -6,7 +6,7 @@ import bpy
 
 from ..actions.slots import SlotTransform
 from ..transforms import BoneTransform, Transform, shows_differences
-from .bone_constraints import SETTINGS, constraint_of, ensure_constraint, shown_by, slot_of_differences
+from .bone_constraints import constraint_of, ensure_constraint, shown_by, slot_of_differences
 from .times import name_of
 
 REMOVED, OTHER_SLOT, MUTED, CHANGED, NOT_FIRST, WEAK = "REMOVED", "OTHER_SLOT", "MUTED", "CHANGED", "NOT_FIRST", "WEAK"
@@ -34,7 +34,7 @@ def _trouble_with(
 ) -> str:
     if not constraint.enabled:
         return MUTED
-    if any(getattr(constraint, setting) != value for setting, value in SETTINGS.items()):
+    if any(getattr(constraint, setting) != value for setting, value in user.constraint_settings.items()):
         return CHANGED
     if is_behind:
         return NOT_FIRST
@@ -58,7 +58,7 @@ def restore(user: BoneTransform, place: SlotTransform) -> None:
                 break
     ensure_constraint(user, place)
     constraint = constraint_of(user, place)
-    for setting, value in SETTINGS.items():
+    for setting, value in user.constraint_settings.items():
         setattr(constraint, setting, value)
     constraint.enabled = True
     if not _is_influence_animated(constraint, user, place):

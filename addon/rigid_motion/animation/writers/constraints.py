@@ -1,4 +1,4 @@
-"""Pose bones: differences are put on top of a bone by an Action constraint, first in its stack.
+"""Pose bones, and objects that are exact between frames: an Action constraint, first in the stack, adds differences.
 
 The differences are in a second slot of the Action that has the keys. Nothing but constraints uses it. Which frame of it
 a constraint takes, its evaluation time says, see `times`.
@@ -38,14 +38,16 @@ from .bone_constraints import (
     remove_constraints,
     slot_of_differences,
 )
-from .layout import Layout
+from .layout import Layout, Pieces
 from .sampled import remove_if_empty, replace_samples
 from .times import (
     constraint_path,
     held_by,
     is_line,
     is_same,
+    most_samples,
     name_of,
+    new_line,
     remove_time,
     says,
     time_of,
@@ -54,27 +56,41 @@ from .times import (
 )
 from .writer import Writer
 
+AT_REST = "Rigid Motion Rest"
+"""The group of what a slot of differences holds of objects that has no samples."""
+
 
 class ConstraintWriter(Writer):
     uses_constraints = True
 
-    def layout(self, source: Source) -> Layout:
-        return Layout.apart(source)
+    def layout(self, source: Source, rate: int) -> Layout:
+        return Layout.apart(source, rate)
 
-    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
+    def most_samples(self, source: Source) -> int:
+        return most_samples(source)
+
+    def write(
+        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
+    ) -> None:
         present = place.filled
         if points:
             _avoid_names(place)
-            curves, _ = replace_samples(_channelbag(place), bone_name(place.prefix), present, points, layout)
+            curves, _ = replace_samples(
+                _channelbag(place), place.kind.difference_group(place.prefix), present, points, layout, pieces
+            )
             place.has_filled(curves)
+            _keep_at_rest(place, points)
             write_time(place, layout)
             for user in place.users:
                 if user.animated.is_editable and not has_constraint(user, place):
                     ensure_constraint(user, place)
         elif present:
             remove_time(place)
-            replace_samples(place.slot.bones_channelbag, bone_name(place.prefix), present, {}, None)
+            replace_samples(
+                place.slot.bones_channelbag, place.kind.difference_group(place.prefix), present, {}, None, {}
+            )
             place.has_filled({})
+            _keep_at_rest(place, {})
             _remove_slot_if_empty(place.slot)
 
     def is_shown(self, place: SlotTransform, layout: Layout, channels: Collection[Channel]) -> bool:
@@ -132,7 +148,7 @@ class ConstraintWriter(Writer):
         for path, index in missing:
             write_line(place, path, held[path, index])
         if len(present) > len(held):
-            remove_if_empty(place.channelbag, bone_name(place.prefix))
+            remove_if_empty(place.channelbag, place.kind.difference_group(place.prefix))
         return bool(missing) or len(present) > len(held)
 
     def trouble_of(self, user: Transform, place: SlotTransform) -> str:
@@ -248,7 +264,7 @@ def _difference_at(constraint: bpy.types.ActionConstraint, time: float, filled: 
     for row, channel in user.differences.items():
         if (fcurve := filled.get(channel)) is not None:
             difference[row] = fcurve.evaluate(at)
-    return _weighted(difference, constraint.influence, user)
+    return _with_original(_weighted(difference, constraint.influence, user), user)
 
 
 def _frame_of_a_key(place: SlotTransform) -> float:
@@ -260,6 +276,45 @@ def _frame_of_a_key(place: SlotTransform) -> float:
         for key in fcurve.keyframe_points
     ]
     return min(frames, key=lambda frame: (abs(frame - round(frame)), frame), default=0.0)
+
+
+def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
+    """Hold the quaternions that a slot of differences has no samples of.
+
+    Blender evaluates the slot on an object whose quaternions are zero, and takes these for half a turn.
+    """
+    channelbag = place.slot.bones_channelbag
+    if place.kind.is_part or channelbag is None:
+        return
+    held = set()
+    if points and place.users[0].rotation == "rotation_quaternion":
+        held = {("delta_rotation_quaternion", 0)}
+        if all(path != "rotation_quaternion" for path, _ in points):
+            held.add(("rotation_quaternion", 0))
+    group = channelbag.groups.get(AT_REST)
+    present = {} if group is None else {(one.data_path, one.array_index): one for one in group.channels}
+    for channel in present.keys() - held:
+        channelbag.fcurves.remove(present[channel])
+    remove_if_empty(channelbag, AT_REST)
+    for path, index in held - present.keys():
+        new_line(channelbag, AT_REST, (path, index), (1.0, 0.0))
+
+
+def _with_original(difference: np.ndarray, user: Transform) -> np.ndarray:
+    """A difference that comes on top of a user's original one, together with that."""
+    original = user.original()
+    if np.array_equal(original, REST):
+        return difference
+    location, rotation, scale = ROWS[LOCATION], ROWS[ROTATION], ROWS[SCALE]
+    difference[location] += original[location]
+    difference[scale] *= original[scale]
+    if user.rotation == "rotation_quaternion":
+        difference[rotation] = Quaternion(difference[rotation]) @ Quaternion(original[rotation])
+    else:
+        order = user.carrier.rotation_mode
+        turned = Euler(difference[3:6], order).to_quaternion() @ Quaternion(original[rotation])
+        difference[3:6] = turned.to_euler(order)
+    return difference
 
 
 def _weighted(difference: np.ndarray, influence: float, user: Transform) -> np.ndarray:

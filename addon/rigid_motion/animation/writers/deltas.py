@@ -13,21 +13,26 @@ from ..actions.slots import SlotTransform, is_above, is_filled_in, is_replacing,
 from ..compute.components import PART_OF
 from ..compute.sources import Source
 from ..transforms import GROUP, ORIGINALS, Channel, ObjectTransform, Transform, default_of
-from .layout import Layout
+from .layout import Layout, Pieces
 from .sampled import hold_constants, replace_samples
 from .writer import Writer
 
 
 class DeltaWriter(Writer):
-    def layout(self, source: Source) -> Layout:
+    def layout(self, source: Source, rate: int) -> Layout:
         return Layout.of(source)
 
-    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
+    def most_samples(self, source: Source) -> int:
+        return 1
+
+    def write(
+        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
+    ) -> None:
         for user in place.users:
             user.note_original(points)
-        curves, gone = replace_samples(place.channelbag, GROUP, place.filled, points, layout)
+        curves, gone = replace_samples(place.channelbag, GROUP, place.filled, points, layout, pieces)
         for channel in gone:
-            del place.curves[channel]
+            place.curves.pop(channel, None)
         place.curves.update(curves)
         place.has_filled(curves)
         if gone and points:

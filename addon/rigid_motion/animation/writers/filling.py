@@ -8,20 +8,28 @@ and exports from being longer for it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import bpy
 import numpy as np
 
-from ..actions.records import record_in_betweens, recorded_digest, recorded_rows
+from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
 from ..actions.slots import SlotTransform, is_filled_in, is_time
 from ..compute.components import PART_OF, ROTATION
-from ..compute.differences import NOTHING, differences
+from ..compute.differences import NOTHING
+from ..compute.sample_rates import Need, error_of, sampled
 from ..compute.source_cache import cached_source, changed_range
 from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
+from ..transforms.reaches import metres_per_channel_unit, reach_at_rest
+from .corners import corners
 from .table import release, writer_of
+
+TOLERANCE = 0.00005
+"""How far off a body may be between frames, in metres, within a metre of its origin; and what reaches farther, by this
+part of its reach. It is half of what is promised, for bones hang on one another."""
 
 SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
@@ -30,62 +38,99 @@ SAME_ROTATION = 1e-4
 def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     """Compute and write the in-betweens of these; of those that are there already, what has changed."""
     changed, anew = [], []
-    for place, source in readings:
+    needs = _needs(readings)
+    for (place, source), need in zip(readings, needs, strict=True):
         span = _changed_range(place, source)
         if span is None:
-            anew.append((place, source))
+            anew.append((place, source, need))
         else:
-            changed.append((place, source, span))
+            changed.append((place, source, need, span))
     anew += _fill_in_changed(changed)
     # However far cycles are seen, one round is all that is written where it repeats.
-    rounds = [replace(source, seen=None) if source.repeats else source for _, source in anew]
+    rounds = [replace(source, seen=None) if source.repeats else source for _, source, _ in anew]
     longer, emptied = set(), []
-    for (place, source), samples in zip(anew, differences(rounds), strict=True):
+    for (place, source, need), samples in zip(anew, sampled(rounds, [need for *_, need in anew]), strict=True):
         writer = writer_of(place)
-        layout, channels = writer.layout(source), _channels(place, source)
-        writer.write(place, {channels[row]: layout.points(points) for row, points in samples.items()}, layout)
+        layout, channels = writer.layout(source, samples.rate), _channels(place, source)
+        pieces, error = corners(source, samples, layout, need)
+        record_in_betweens(place, source.digest, samples, samples.rate, max(samples.error, error))
+        writer.write(
+            place,
+            {channels[row]: layout.points(points) for row, points in samples.items()},
+            layout,
+            {channels[row]: own for row, own in pieces.items()},
+        )
         _tag(place)
-        record_in_betweens(place, source.digest, samples)
         if not samples:
             emptied += place.users
-        if layout.outermost[0] < source.keyed_range[0] or layout.outermost[1] > source.keyed_range[1]:
+        first, last = source.keyed_range
+        if layout.outermost[0] < first or layout.outermost[1] > last:
             longer.add(place.slot.action)
     release(emptied)
     _limit_ranges({place.slot.action for place, _ in readings}, longer)
 
 
+def _needs(readings: Sequence[tuple[SlotTransform, Source]]) -> list[Need]:
+    """How exact each of these is to be between frames."""
+    reaches: dict[bpy.types.Bone, float] = {}
+    needs = []
+    for place, source in readings:
+        user = place.users[0]
+        unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
+        need = Need(TOLERANCE * max(1.0 / unit, reach), reach)
+        needs.append(need._replace(most=writer_of(place).most_samples(source)))
+    return needs
+
+
 def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
-    """The frames to fill in anew where the rest is as it has to be, None where all of them are."""
-    old = cached_source(recorded_digest(place))
-    if old is None or old is source or writer_of(place).layout(source).is_ring or not is_complete(place, source):
+    """The samples to fill in anew where the rest is as it has to be, None where all of them are."""
+    old, rate = cached_source(recorded_digest(place)), recorded(place).rate
+    if old is None or old is source or old.sample_range(rate) != source.sample_range(rate):
         return None
-    return changed_range(old, source)
+    if writer_of(place).layout(source, rate).is_ring or not is_complete(place, source):
+        return None
+    span = changed_range(old, source)
+    if span is None:
+        return None
+    begin, end = source.sample_range(rate)
+    return max(span[0] * rate, begin), min(span[1] * rate, end)
 
 
 def _fill_in_changed(
-    readings: Sequence[tuple[SlotTransform, Source, tuple[int, int]]],
-) -> list[tuple[SlotTransform, Source]]:
-    """Fill in a range of frames of each. Those for which that will not do are returned, and left as they are."""
+    readings: Sequence[tuple[SlotTransform, Source, Need, tuple[int, int]]],
+) -> list[tuple[SlotTransform, Source, Need]]:
+    """Fill in a range of samples of each. Those for which that will not do are returned, and left as they are."""
     others = []
-    found = differences([source for _, source, _ in readings], [span for *_, span in readings])
-    for (place, source, (first, last)), samples in zip(readings, found, strict=True):
-        channels, rows, curves = _channels(place, source), recorded_rows(place), place.filled
-        begin = source.frame_range[0]
-        part = slice(2 * (first - begin) + 1, 2 * (last - begin) + 2, 2)
+    sources, spans = [source for _, source, *_ in readings], [span for *_, span in readings]
+    rates = [recorded(place).rate for place, *_ in readings]
+    fixed = [need._replace(fewest=rate, most=rate) for (*_, need, _), rate in zip(readings, rates, strict=True)]
+    for (place, source, need, (first, last)), samples in zip(readings, sampled(sources, fixed, spans), strict=True):
+        channels, rows, curves, before = _channels(place, source), recorded_rows(place), place.filled, recorded(place)
+        if samples.error > need.tolerance and before.rate < need.most:
+            others.append((place, source, need))
+            continue
+        layout = writer_of(place).layout(source, before.rate)
+        part = slice(2 * (first - layout.first) + 1, 2 * (last - layout.first) + 2, 2)
         written = {}
         for row in rows:
             points = curves[channels[row]].sampled_points
             written[row] = np.empty(2 * len(points), np.float32)
             points.foreach_get("co", written[row])
         values = {row: points[1::2] for row, points in samples.items()}
-        before = {row: points[part] for row, points in written.items()}
-        if not (_is_covered(values, rows) and _continue(values, before, source)):
-            others.append((place, source))
+        present = {row: points[part] for row, points in written.items()}
+        if not (_is_covered(values, rows) and _continue(values, present, source)):
+            others.append((place, source, need))
             continue
         for row, points in written.items():
             points[part] = values[row]
             curves[channels[row]].sampled_points.foreach_set("co", points)
-        record_in_betweens(place, source.digest, rows)
+        pieces, error = corners(source, written, layout, need)
+        for row in rows:
+            layout.modify(curves[channels[row]], pieces.get(row, ()))
+        elsewhere = before.error
+        if elsewhere > need.tolerance and elsewhere > samples.error:
+            elsewhere = error_of(source, written, before.rate, need.reach)
+        record_in_betweens(place, source.digest, rows, before.rate, max(samples.error, error, elsewhere))
         _tag(place)
     return others
 
@@ -117,7 +162,7 @@ def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], sour
 def is_complete(place: SlotTransform, source: Source) -> bool:
     """Whether all F-curves are as they were written for a source."""
     writer, channels, curves = writer_of(place), _channels(place, source), place.filled
-    layout, written = writer.layout(source), [channels.get(row) for row in recorded_rows(place)]
+    layout, written = writer.layout(source, recorded(place).rate), [channels.get(row) for row in recorded_rows(place)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
@@ -128,7 +173,7 @@ def is_complete(place: SlotTransform, source: Source) -> bool:
 def clear(places: Sequence[SlotTransform]) -> None:
     """Take the in-betweens out of slots, and give their users their original differences back."""
     for place in places:
-        writer_of(place).write(place, {}, None)
+        writer_of(place).write(place, {}, None, {})
         _tag(place)
         record_in_betweens(place, "", ())
     release(user for place in places for user in place.users)
@@ -170,16 +215,23 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         if (action.use_frame_range and not was_set_for_samples) or not (was_set_for_samples or motion.has_longer):
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
-        of_bones = {pair.differences for pair in motion.bone_slots}
-        samples, keyed = [], []
+        apart = {pair.differences for pair in motion.bone_slots}
+        # Those of bones first: one that lies outside is enough to know.
+        samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves]
+        begin, end = math.inf, -math.inf
         for bag in bags:
-            for fcurve in bag.fcurves:
-                # A modifier alone makes no range, be it the time of a constraint.
-                if len(fcurve.keyframe_points) or len(fcurve.sampled_points):
-                    ours = bag.slot_handle in of_bones or is_filled_in(fcurve) or is_time(fcurve)
-                    (samples if ours else keyed).append(fcurve.range())
-        if keyed and samples and not _is_within(samples, keyed):
-            begin, end = _union(keyed)
+            for fcurve in bag.fcurves if bag.slot_handle not in apart else ():
+                first, last = fcurve.range()
+                if begin <= first and last <= end:
+                    # There may be thousands: no more is asked than is needed.
+                    continue
+                if not _has_range(fcurve):
+                    continue
+                if is_filled_in(fcurve) or is_time(fcurve):
+                    samples.append(fcurve)
+                else:
+                    begin, end = min(begin, first), max(end, last)
+        if begin <= end and any(_is_outside(fcurve, begin, end) for fcurve in samples):
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
@@ -190,10 +242,12 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             motion.has_longer = False
 
 
-def _union(ranges: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    return min(begin for begin, _ in ranges), max(end for _, end in ranges)
+def _has_range(fcurve: bpy.types.FCurve) -> bool:
+    """Whether an F-curve begins and ends anywhere. A modifier alone makes no range, be it the time of a constraint."""
+    return len(fcurve.keyframe_points) > 0 or len(fcurve.sampled_points) > 0
 
 
-def _is_within(inner: Sequence[tuple[float, float]], outer: Sequence[tuple[float, float]]) -> bool:
-    (first, last), (begin, end) = _union(inner), _union(outer)
-    return begin <= first and last <= end
+def _is_outside(fcurve: bpy.types.FCurve, begin: float, end: float) -> bool:
+    """Whether samples of an F-curve lie outside of these frames."""
+    first, last = fcurve.range()
+    return (first < begin or last > end) and _has_range(fcurve)

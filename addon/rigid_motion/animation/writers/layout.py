@@ -7,22 +7,57 @@ there go round in a ring behind frame 0 instead.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 
 from ..compute.sources import Source
 from ..curves import Cycles, Stepped
+from ..transforms import Channel
 
 ENDLESS = 2.0**20
 """A step, in frames, that ends behind whatever Blender can show."""
 
 
+class Piece(NamedTuple):
+    """A straight line that is added to an F-curve in a range of its frames."""
+
+    first: float
+    last: float
+    start: float
+    slope: float
+
+    @property
+    def modifier(self) -> Modifier:
+        settings = {
+            "use_additive": True,
+            "poly_order": 1,
+            "coefficients": _single(self.start, self.slope),
+            "use_restricted_range": True,
+        }
+        first, last = _single(self.first, self.last)
+        return "GENERATOR", settings | {"frame_end": last, "frame_start": first}
+
+
+Pieces = Mapping[Channel, Sequence[Piece]]
+"""What is added to the samples of each channel."""
+
+Modifier = tuple[str, dict[str, object]]
+"""The type of an F-curve modifier, and its settings."""
+
+
+def _single(*values: float) -> tuple[float, ...]:
+    """Numbers as Blender keeps them."""
+    return tuple(np.float32(values).tolist())
+
+
 @dataclass(frozen=True)
 class Layout:
-    """How the samples on the whole frames of a range lie in an F-curve.
+    """How the samples of a range lie in an F-curve.
 
     A range of n frames that begins below zero lies in a ring: frame f on f modulo n, and what is asked for below zero
     is looked up a number of rounds later, by a Cycles modifier. Two Stepped modifiers hold the outermost frames.
@@ -30,9 +65,10 @@ class Layout:
 
     first: int
     last: int
+    """The first and the last sample, counted from frame 0."""
 
     ends: tuple[float, float]
-    """Where the outermost samples lie: not outside of the keys."""
+    """The frames of the outermost samples: not outside of the keys."""
 
     cycles: Cycles | None = None
     """How the channels repeat, and the differences with them."""
@@ -48,6 +84,9 @@ class Layout:
     steps: tuple[Stepped, ...] = ()
     """The frames that the channels hold, and the differences with them."""
 
+    rate: int = 1
+    """How many samples a frame has, where they are apart: then the F-curve is as many times as long."""
+
     @classmethod
     def of(cls, source: Source) -> Layout:
         """In an F-curve that is read as the frames pass."""
@@ -56,11 +95,17 @@ class Layout:
         return cls(first, last, _ends(source), cycles, first < 0 and cycles is None, steps=source.steps)
 
     @classmethod
-    def apart(cls, source: Source) -> Layout:
+    def apart(cls, source: Source, rate: int) -> Layout:
         """In an F-curve that is looked up by a time of its own, which goes round where the channels do."""
-        first, last = source.frame_range
+        first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source), cycles, shift=max(0, -first), is_apart=True, steps=source.steps)
+        shift, steps = max(0, -source.frame_range[0]), source.steps
+        return cls(first, last, _ends(source), cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
+
+    @property
+    def frames(self) -> tuple[int, int]:
+        """The whole frames that no sample is outside of."""
+        return self.first // self.rate, -(-self.last // self.rate)
 
     @cached_property
     def count(self) -> int:
@@ -69,8 +114,10 @@ class Layout:
 
     @cached_property
     def outermost(self) -> tuple[float, float]:
-        """The frames that the first and the last sample lie on."""
-        return (0.0, float(self.count - 1)) if self.is_ring else tuple(end + self.shift for end in self.ends)
+        """The frames of the F-curve that the first and the last sample lie on."""
+        if self.is_ring:
+            return 0.0, float(self.count - 1)
+        return tuple(float(np.float32((end + self.shift) * self.rate)) for end in self.ends)
 
     @cached_property
     def _order(self) -> np.ndarray:
@@ -87,6 +134,8 @@ class Layout:
         else:
             if self.shift:
                 points[:, 0] += self.shift
+            if self.rate > 1:
+                points[:, 0] *= self.rate
             points[0, 0], points[-1, 0] = self.outermost
         return points.ravel()
 
@@ -99,30 +148,31 @@ class Layout:
         )
 
     def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
-        if not self._modifiers:
-            return not fcurve.modifiers
+        """Whether it has those that all have; whatever is added to it may have to be something else by now."""
         modifiers = list(fcurve.modifiers)
-        return [modifier.type for modifier in modifiers] == [kind for kind, _ in self._modifiers] and all(
-            getattr(modifier, name) == value
-            for modifier, (_, settings) in zip(modifiers, self._modifiers, strict=True)
-            for name, value in settings.items()
+        count = len(self._modifiers)
+        return _are(modifiers[:count], self._modifiers) and all(
+            modifier.type == "GENERATOR" and modifier.use_restricted_range and not modifier.mute
+            for modifier in modifiers[count:]
         )
 
-    def modify(self, fcurve: bpy.types.FCurve) -> None:
-        """Give an F-curve the modifiers that it needs, in place of those it has."""
-        if self._has_modifiers(fcurve):
+    def modify(self, fcurve: bpy.types.FCurve, pieces: Sequence[Piece] = ()) -> None:
+        """Give an F-curve the modifiers that it needs, in place of those it has, and add these to it."""
+        present = list(fcurve.modifiers)
+        wanted = [*self._modifiers, *(piece.modifier for piece in pieces)]
+        if _are(present, wanted):
             return
-        for modifier in list(fcurve.modifiers):
+        for modifier in present:
             fcurve.modifiers.remove(modifier)
-        add_modifiers(fcurve, self._modifiers)
+        add_modifiers(fcurve, wanted)
 
     @cached_property
-    def _modifiers(self) -> list[tuple[str, dict[str, object]]]:
+    def _modifiers(self) -> list[Modifier]:
         """Types and settings. Blender asks the last one first."""
         return [] if self.is_apart else [*self._repeating, *self.stepping]
 
     @property
-    def stepping(self) -> list[tuple[str, dict[str, object]]]:
+    def stepping(self) -> list[Modifier]:
         """Types and settings of those that hold frames."""
         found = []
         for one in self.steps:
@@ -135,7 +185,7 @@ class Layout:
         return found
 
     @property
-    def _repeating(self) -> list[tuple[str, dict[str, object]]]:
+    def _repeating(self) -> list[Modifier]:
         if self.cycles is not None:
             # The difference repeats as it is also where the channels go on from where they have come.
             before, after = (mode.removesuffix("_OFFSET") for mode in (self.cycles.before, self.cycles.after))
@@ -152,12 +202,22 @@ class Layout:
         ]
 
 
-def add_modifiers(fcurve: bpy.types.FCurve, modifiers: list[tuple[str, dict[str, object]]]) -> None:
+def add_modifiers(fcurve: bpy.types.FCurve, modifiers: Sequence[Modifier]) -> None:
     """Give an F-curve modifiers of these types and settings, behind those that it has."""
     for kind, settings in modifiers:
         modifier = fcurve.modifiers.new(kind)
         for name, value in settings.items():
             setattr(modifier, name, value)
+
+
+def _are(modifiers: Sequence[bpy.types.FModifier], wanted: Sequence[Modifier]) -> bool:
+    """Whether modifiers are of these types, with these settings."""
+    return [modifier.type for modifier in modifiers] == [kind for kind, _ in wanted] and all(
+        (tuple(found) if isinstance(value, tuple) else found) == value
+        for modifier, (_, settings) in zip(modifiers, wanted, strict=True)
+        for name, value in settings.items()
+        for found in (getattr(modifier, name),)
+    )
 
 
 def _ends(source: Source) -> tuple[float, float]:

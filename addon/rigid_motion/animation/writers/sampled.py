@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.records import recorded_rows
 from ..actions.slots import Curves, SlotTransform
 from ..transforms import Channel
-from .layout import Layout
+from .layout import Layout, Pieces
 
 FARTHEST = 1_000_000
 """Frames from 0 up to which Blender can show any."""
@@ -23,6 +23,7 @@ def replace_samples(
     present: Mapping[Channel, bpy.types.FCurve],
     points: Mapping[Channel, np.ndarray],
     layout: Layout | None,
+    pieces: Pieces,
 ) -> tuple[Curves, list[Channel]]:
     """Have sampled F-curves of a group hold these samples, frame and value of each by turns, and no others.
 
@@ -36,6 +37,8 @@ def replace_samples(
         The samples of each channel.
     layout
         How they lie, None where there are none.
+    pieces
+        What is added to them between samples.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def replace_samples(
         if fcurve is None:
             fcurve = _new(channelbag, group, channel, layout.count)
         fcurve.sampled_points.foreach_set("co", samples)
-        layout.modify(fcurve)
+        layout.modify(fcurve, pieces.get(channel, ()))
         curves[channel] = fcurve
     gone = [channel for channel in present if channel not in points]
     for channel in gone:
@@ -71,7 +74,9 @@ def hold_constants(place: SlotTransform, group: str, present: Curves, held: Mapp
     points = {channel: np.array((first, value, first + 1, value), dtype=np.float32) for channel, value in held.items()}
     for channel in present:
         place.curves.pop(channel, None)
-    curves, _ = replace_samples(place.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)))
+    curves, _ = replace_samples(
+        place.channelbag, group, present, points, Layout(first, first + 1, (first, first + 1)), {}
+    )
     place.curves.update(curves)
     place.has_filled(curves)
     return True

@@ -4,22 +4,44 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from ..actions.slots import Slot, SlotTransform
-from ..transforms import BoneTransform, ObjectTransform, Transform
+from ..transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
 from .constraints import ConstraintWriter
 from .deltas import DeltaWriter
 from .writer import Writer
 
-WRITERS: dict[type[Transform], Writer] = {BoneTransform: ConstraintWriter(), ObjectTransform: DeltaWriter()}
+WRITERS: dict[type[Transform], Writer] = {
+    BoneTransform: ConstraintWriter(),
+    ObjectTransform: DeltaWriter(),
+    ExactObjectTransform: ConstraintWriter(),
+}
 """A row for each of the `transforms.KINDS`."""
 
 
 def writer_of(place: SlotTransform) -> Writer:
     """Where the differences of a transform go."""
     return WRITERS[place.kind]
+
+
+def leave_other_way(place: SlotTransform) -> None:
+    """Take the in-betweens of an object out of where they are not to be any more: it came to share a slot, or an Action
+    came to it, and so it is exact between frames, or is so no more."""
+    if place.kind.is_part:
+        return
+    kind = ObjectTransform if place.kind is ExactObjectTransform else ExactObjectTransform
+    other = replace(place, users=tuple(kind(user.carrier) for user in place.users))
+    if other.filled:
+        WRITERS[kind].write(other, {}, None, {})
+    editable = [user for user in place.users if user.animated.is_editable]
+    if kind is ObjectTransform:
+        WRITERS[kind].release(kind(user.carrier) for user in editable)
+    for user in editable:
+        if user.motion.is_exact != user.has_difference_slot:
+            user.motion.is_exact = user.has_difference_slot
 
 
 def release(transforms: Iterable[Transform]) -> None:

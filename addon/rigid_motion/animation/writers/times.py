@@ -20,8 +20,10 @@ from ..actions.channels import add_cycles, replace_keys
 from ..actions.key_reading import read_steps
 from ..actions.records import recorded
 from ..actions.slots import Slot, SlotTransform, strips_of
+from ..compute.between_samples import MOST_SAMPLES
+from ..compute.sources import Source
 from ..curves import Cycles, Stepped
-from ..transforms import CONSTRAINT, WIDTHS, Channel, bone_name
+from ..transforms import CONSTRAINT, WIDTHS, Channel
 from .layout import Layout, add_modifiers
 from .sampled import hide_fcurve, remove_if_empty
 
@@ -58,9 +60,17 @@ def time_of(place: SlotTransform) -> bpy.types.FCurve | None:
 
 
 def span_of(place: SlotTransform) -> tuple[int, int]:
-    """The frames that an evaluation time of 0 and one of 1 stand for."""
-    points = next(iter(place.filled.values())).sampled_points
-    return 0, _duration(math.ceil(points[len(points) - 1].co[0]))
+    """The frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one where
+    more than one sample is shown in a frame."""
+    points, rate = next(iter(place.filled.values())).sampled_points, recorded(place).rate
+    return 0, _duration(math.ceil(points[len(points) - 1].co[0] / rate)) * rate
+
+
+def most_samples(source: Source) -> int:
+    """How many samples a frame can have for a constraint to show all of them."""
+    first, last = source.frame_range
+    fit = MOST_FRAMES // _duration(last + max(0, -first))
+    return min(1 << max(fit.bit_length() - 1, 0), MOST_SAMPLES)
 
 
 def _duration(last: int) -> int:
@@ -136,16 +146,23 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
     replace_keys(fcurve, frames, times)
     add_cycles(fcurve, _without_offset(layout.cycles))
     add_modifiers(fcurve, layout.stepping)
-    hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
+    hide_fcurve(place.channelbag, place.kind.difference_group(place.prefix), fcurve)
 
 
-def write_line(place: SlotTransform, path: str, line: Line) -> bpy.types.FCurve:
-    """An F-curve that is a line, without keys."""
-    fcurve = place.curves[path, 0] = place.channelbag.fcurves.new(path)
+def write_line(place: SlotTransform, path: str, line: Line) -> None:
+    """An F-curve beside those of a transform that is a line, without keys."""
+    group = place.kind.difference_group(place.prefix)
+    place.curves[path, 0] = new_line(place.channelbag, group, (path, 0), line)
+
+
+def new_line(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, line: Line) -> bpy.types.FCurve:
+    """An F-curve in a group that is a line, without keys."""
+    path, index = channel
+    fcurve = channelbag.fcurves.new(path, index=index)
     generator = fcurve.modifiers.new("GENERATOR")
     generator.poly_order = 1
     generator.coefficients = line
-    hide_fcurve(place.channelbag, bone_name(place.prefix), fcurve)
+    hide_fcurve(channelbag, group, fcurve)
     return fcurve
 
 
@@ -183,14 +200,14 @@ def _line_of(fcurve: bpy.types.FCurve) -> Line | None:
 
 def _line(layout: Layout) -> Line:
     """From frames to the evaluation times of their samples."""
-    duration = _duration(layout.last + layout.shift)
+    duration = _duration(layout.frames[1] + layout.shift)
     return layout.shift / duration, 1.0 / duration
 
 
 def _seams(layout: Layout) -> list[tuple[float, float]]:
     """The outermost frames, and the evaluation times of their samples."""
     start, step = _line(layout)
-    return [(frame, start + step * frame) for frame in (layout.first, layout.last)]
+    return [(frame, start + step * frame) for frame in layout.frames]
 
 
 def _without_offset(cycles: Cycles) -> Cycles:
@@ -203,7 +220,7 @@ def remove_time(place: SlotTransform) -> None:
     fcurve = place.curves.pop((time_path(place), 0), None)
     if fcurve is not None:
         place.channelbag.fcurves.remove(fcurve)
-        remove_if_empty(place.channelbag, bone_name(place.prefix))
+        remove_if_empty(place.channelbag, place.kind.difference_group(place.prefix))
 
 
 def is_same(one: SlotTransform, other: SlotTransform) -> bool:

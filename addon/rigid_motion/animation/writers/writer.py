@@ -11,7 +11,7 @@ import numpy as np
 from ..actions.slots import Slot, SlotTransform
 from ..compute.sources import Source
 from ..transforms import Channel, Transform
-from .layout import Layout
+from .layout import Layout, Pieces
 
 
 class Writer(ABC):
@@ -21,12 +21,18 @@ class Writer(ABC):
     """Whether constraints show the differences, which an animator can mute, move or remove."""
 
     @abstractmethod
-    def layout(self, source: Source) -> Layout:
-        """How the samples of a source lie in F-curves."""
+    def layout(self, source: Source, rate: int) -> Layout:
+        """How the samples of a source lie in F-curves, so many of them a frame."""
 
     @abstractmethod
-    def write(self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None) -> None:
-        """Replace the in-betweens of a transform by these samples, frame and value of each by turns.
+    def most_samples(self, source: Source) -> int:
+        """How many samples a frame there can be."""
+
+    @abstractmethod
+    def write(
+        self, place: SlotTransform, points: dict[Channel, np.ndarray], layout: Layout | None, pieces: Pieces
+    ) -> None:
+        """Replace the in-betweens of a transform by these samples, frame and value of each by turns, and these pieces.
 
         Channels that have none are taken out; without any, its users are to be released.
         """

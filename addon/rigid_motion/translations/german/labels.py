@@ -108,6 +108,7 @@ OF_OPERATORS = {
     "Push from In-Between of Mode": "Vom Zwischenbild des Modus wegschieben",
     "Relax to In-Between of Mode": "Zum Zwischenbild des Modus entspannen",
     "Restore Constraint": "Beschränkung wiederherstellen",
+    "Exact Between Frames": "Genau zwischen Einzelbildern",
     "Refresh In-Betweens": "Zwischenbilder aktualisieren",
     "Copy Pose on Screen": "Sichtbare Pose kopieren",
     "Create Pose Asset on Screen": "Posen-Asset der sichtbaren Pose erstellen",

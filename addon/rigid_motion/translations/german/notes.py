@@ -21,6 +21,9 @@ NOTES = {
         "In der Delta-Transformation sind die Zwischenbilder, daher hält diese Änderung nur bis zum nächsten "
         "Einzelbild. Damit sie bleibt, unten „Delta-Transformation“ bearbeiten"
     ),
+    "Subframes": "Dazwischen",
+    "Exact": "Genau",
+    "{distance} off": "{distance} daneben",
     "Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first": (
         "Hier werden Streifen überblendet, und die Zwischenbilder von Knochen sind solange nur ungefähr. "
         "Für genaue zuerst backen"

@@ -272,4 +272,7 @@ REFUSALS = {
     "{has}, its bones have: select those in Pose mode, and reduce theirs": (
         "{has}, aber seine Knochen haben welche: diese im Posenmodus auswählen und ihre reduzieren"
     ),
+    "{name} is a bone, and exact between frames anyway": (
+        "{name} ist ein Knochen, und zwischen Einzelbildern ohnehin genau"
+    ),
 }

@@ -24,6 +24,8 @@ REPORTS = {
         "die Schlüsselbilder von vor dem Reduzieren sind aus der Datei entfernt"
     ),
     "constraint restored": "Beschränkung wiederhergestellt",
+    "exact between frames": "genau zwischen Einzelbildern",
+    "exact on whole frames": "genau auf ganzen Einzelbildern",
     "{before} keys became {after}, largest error {error}": (
         "aus {before} Schlüsselbildern wurden {after}, größter Fehler {error}"
     ),

@@ -149,6 +149,14 @@ TOOLTIPS = {
         "Den ausgewählten Knochen die Beschränkung „Rigid Motion“ zurückgeben, die ihre Zwischenbilder zeigt: "
         "als erste im Stapel, nicht stumm, mit vollem Einfluss"
     ),
+    "Follow the modes between whole frames as well, for motion blur, strips in slow motion and fast moves: "
+    "by a constraint in place of delta transforms": (
+        "Den Modi auch zwischen ganzen Einzelbildern folgen, für Bewegungsunschärfe, Streifen in Zeitlupe und "
+        "schnelle Bewegungen: durch eine Beschränkung anstelle der Delta-Transformation"
+    ),
+    "Off, in-betweens are in delta transforms, which are right on whole frames": (
+        "Wenn aus, stehen die Zwischenbilder in der Delta-Transformation, die auf ganzen Einzelbildern stimmt"
+    ),
     # Baking
     "Put the in-betweens on location, rotation and scale as real keys of type Generated, in a copy of the Action, "
     "for hand-over to programs that read keys only. Un-Bake gives the original back": (
@@ -384,6 +392,7 @@ TOOLTIPS = {
     "The keys of these objects and bones are not reduced": (
         "Die Schlüsselbilder dieser Objekte und Knochen sind nicht reduziert"
     ),
+    "What is selected is exact between frames anyway": ("Was ausgewählt ist, ist zwischen Einzelbildern ohnehin genau"),
     "None of these objects lacks its constraint": "Keinem dieser Objekte fehlt seine Beschränkung",
     "None of these bones lacks its constraint": "Keinem dieser Knochen fehlt seine Beschränkung",
     "None of these objects and bones lacks its constraint": (

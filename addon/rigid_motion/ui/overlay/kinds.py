@@ -10,7 +10,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...animation.compute.sources import Source
-from ...animation.transforms import BoneTransform, ObjectTransform, Transform
+from ...animation.transforms import BoneTransform, ExactObjectTransform, ObjectTransform, Transform
 from .bones import axis_length_of_bone, followed, space_of_bone
 from .points import Followed, axis_length_of, space_of
 
@@ -30,8 +30,11 @@ class PathKind(NamedTuple):
     """How long its local axes are."""
 
 
+OBJECT = PathKind(lambda obj, depsgraph: (space_of(obj, depsgraph), None), lambda *_: None, axis_length_of)
+
 PATH_KINDS: dict[type[Transform], PathKind] = {
     BoneTransform: PathKind(space_of_bone, followed, axis_length_of_bone),
-    ObjectTransform: PathKind(lambda obj, depsgraph: (space_of(obj, depsgraph), None), lambda *_: None, axis_length_of),
+    ObjectTransform: OBJECT,
+    ExactObjectTransform: OBJECT,
 }
 """A row for each of the `transforms.KINDS`."""

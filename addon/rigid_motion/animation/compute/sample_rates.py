@@ -1,0 +1,108 @@
+"""How many samples a frame a motion needs for what is between them to be right as well."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .between_samples import MOST_SAMPLES, Samples, largest_errors
+from .components import ROTATION, ROWS
+from .differences import differences
+from .sources import Source
+
+
+class Need(NamedTuple):
+    """How exact a motion is to be between its samples."""
+
+    tolerance: float
+    """How far off it may be, in the units of its channels."""
+
+    reach: float
+    """How far the body reaches from its origin, in the same."""
+
+    fewest: int = 1
+    most: int = MOST_SAMPLES
+    """How many samples a frame there may be."""
+
+
+def sampled(
+    sources: Sequence[Source], needs: Sequence[Need], ranges: Sequence[tuple[int, int]] | None = None
+) -> list[Samples]:
+    """The differences of each source, with as few samples a frame as it needs, and the error that is left between them.
+
+    Parameters
+    ----------
+    sources, needs
+    ranges : sequence of pairs, optional
+        The first and last samples of each, counted from frame 0, in place of those of the source: then there are the
+        fewest a frame that may be.
+    """
+    found = _differences(sources, needs, ranges, [need.fewest for need in needs])
+    coarser: dict[int, Samples] = {}
+    pending = [number for number, (own, need) in enumerate(zip(found, needs, strict=True)) if _is_open(own, need)]
+    while pending:
+        rates = [_next_rate(found[number], needs[number]) for number in pending]
+        finer_ranges = (
+            None
+            if ranges is None
+            else [
+                tuple(end * rate // needs[number].fewest for end in ranges[number])
+                for number, rate in zip(pending, rates, strict=True)
+            ]
+        )
+        chosen = [sources[number] for number in pending], [needs[number] for number in pending]
+        open_still = []
+        for number, finer in zip(pending, _differences(*chosen, finer_ranges, rates), strict=True):
+            need, before = needs[number], found[number]
+            first = coarser.get(number, before)
+            if math.isinf(before.error):
+                # There were too few to tell: half as far apart, a curve is four times as near to the line.
+                guess = finer.error * (finer.rate / first.rate) ** 2
+                if math.isinf(guess):
+                    coarser[number], found[number] = first, finer
+                    open_still.append(number)
+                    continue
+                if guess <= need.tolerance or first.rate >= need.most:
+                    first.error, found[number] = guess, first
+                    continue
+            found[number] = finer
+            if _is_open(finer, need):
+                open_still.append(number)
+        pending = open_still
+    return found
+
+
+def error_of(source: Source, points: Mapping[int, np.ndarray], rate: int, reach: float) -> float:
+    """How far a body is off between samples, as `differences` returns them for all of a source's range."""
+    first, last = source.sample_range(rate)
+    delta = np.repeat(source.difference_at_keys[:, None], last - first + 1, axis=1)
+    if source.order is not None:
+        delta[ROWS[ROTATION]] = 0.0
+    for row, own in points.items():
+        delta[row] = own[1::2]
+    (error,) = largest_errors(delta, [(source, slice(0, last - first + 1))], [(first, last, rate)], [reach])
+    return float(error) if math.isfinite(error) else 0.0
+
+
+def _differences(
+    sources: Sequence[Source],
+    needs: Sequence[Need],
+    ranges: Sequence[tuple[int, int]] | None,
+    rates: Sequence[int],
+) -> list[Samples]:
+    return differences(sources, ranges, rates, [need.reach for need in needs])
+
+
+def _is_open(samples: Samples, need: Need) -> bool:
+    """Whether more samples may do better, or tell how far off it is."""
+    return math.isinf(samples.error) or (samples.error > need.tolerance and samples.rate < need.most)
+
+
+def _next_rate(samples: Samples, need: Need) -> int:
+    if math.isinf(samples.error):
+        return 2 * samples.rate
+    fit = math.ceil(math.log2(samples.error / need.tolerance) / 2.0)
+    return min(samples.rate << max(fit, 1), need.most)

@@ -1,0 +1,118 @@
+"""Keys between samples: the differences have corners there, which straight lines from sample to sample would cut off.
+
+What is missing at such a key is added by modifiers, each for a range of its own: up to what it lacks, and down again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ...motion.eulers import extrinsic_eulers_from_quaternions
+from ..compute.components import PART_OF, ROTATION, ROWS
+from ..compute.sample_rates import Need
+from ..compute.sources import FULL_TURN, SAME_FRAME, Source
+from .layout import Layout, Piece
+
+MOST_CORNERS = 64
+"""Keys that are reached in one F-curve. Blender asks all modifiers on every frame."""
+
+SHARE = 0.05
+"""What a corner makes of the tolerance at least to be worth a modifier."""
+
+
+class Corners(NamedTuple):
+    """What is added to the samples of a source."""
+
+    pieces: dict[int, list[Piece]]
+    """For the rows of components that lack anything."""
+
+    error: float
+    """How far off the body is at keys where nothing can be added."""
+
+
+def corners(source: Source, samples: Mapping[int, np.ndarray], layout: Layout, need: Need) -> Corners:
+    """What samples, as `differences` returns them, lack at the keys between them."""
+    keys = _keys(source, layout)
+    rows = list(samples)
+    if not len(keys) or not rows:
+        return Corners({}, 0.0)
+    values = np.stack([samples[row][1::2] for row in rows]).astype(np.float64)
+    at = np.floor(keys * layout.rate).astype(int) - layout.first
+    shares = keys * layout.rate - layout.first - at
+    lines = values[:, at] * (1.0 - shares) + values[:, at + 1] * shares
+    lacks = _at_keys(source, rows, lines) - lines
+    weights = np.array([2.0 * need.reach if PART_OF[row] == ROTATION else 1.0 for row in rows])
+    errors = np.abs(lacks * weights[:, None]).max(axis=0)
+    chosen = np.argsort(-errors)[:MOST_CORNERS]
+    chosen = np.sort(chosen[errors[chosen] > SHARE * need.tolerance])
+    if layout.is_ring or (layout.cycles is not None and not layout.is_apart):
+        chosen = chosen[:0]
+    left = np.delete(errors, chosen)
+    knots = _knots(keys[chosen], at[chosen] + layout.first, layout)
+    pieces = {row: list(_pieces(knots, lack[chosen], layout)) for row, lack in zip(rows, lacks, strict=True)}
+    return Corners({row: own for row, own in pieces.items() if own}, float(left.max(initial=0.0)))
+
+
+def _keys(source: Source, layout: Layout) -> np.ndarray:
+    """The frames of the keys between samples, (k,)."""
+    keys = source.key_frames
+    first, last = layout.first / layout.rate, layout.last / layout.rate
+    numbers = keys * layout.rate
+    modes = np.concatenate(((0,), source.modes, (0,)))
+    is_off = np.abs(numbers - np.rint(numbers)) > 0.5 * SAME_FRAME
+    return keys[is_off & (keys > first) & (keys < last) & ((modes[:-1] != 0) | (modes[1:] != 0))]
+
+
+def _at_keys(source: Source, rows: list[int], near: np.ndarray) -> np.ndarray:
+    """What the differences are at keys, shape (rows, k): the original ones, in the sign and turn near to these."""
+    original = np.array(source.difference_at_keys)
+    turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
+    found = np.repeat(original[rows, None], near.shape[1], axis=1)
+    if not turning:
+        return found
+    if source.order is None:
+        found[turning] *= np.where(np.einsum("rk,rk->k", found[turning], near[turning]) < 0.0, -1.0, 1.0)
+        return found
+    angles = extrinsic_eulers_from_quaternions(original[None, ROWS[ROTATION]], source.order)[0]
+    # The same rotation by other angles.
+    others = np.where(np.arange(3) == "XYZ".index(source.order[1]), np.pi - angles, angles + np.pi)
+    own = [row - ROWS[ROTATION].start for row in np.array(rows)[turning]]
+    candidates = []
+    for candidate in (angles, others):
+        turned = candidate[own, None]
+        candidates.append(turned + FULL_TURN * np.rint((near[turning] - turned) / FULL_TURN))
+    apart = [np.abs(candidate - near[turning]).max(axis=0) for candidate in candidates]
+    found[turning] = np.where(apart[0] <= apart[1], *candidates)
+    return found
+
+
+def _knots(keys: np.ndarray, before: np.ndarray, layout: Layout) -> list[tuple[float, int]]:
+    """Frames of the F-curve between which lines run, in order, each with the number of its key; -1 for a sample."""
+    knots: list[tuple[float, int]] = []
+    shift = layout.shift * layout.rate
+    for number, (key, sample) in enumerate(zip(keys.tolist(), before.tolist(), strict=True)):
+        start = float(sample + shift)
+        if knots and knots[-1] == (start + 1.0, -1):
+            knots.pop()
+        elif not knots or knots[-1] != (start, -1):
+            knots.append((start, -1))
+        knots += [(float(np.float32((key + layout.shift) * layout.rate)), number), (start + 1.0, -1)]
+    return knots
+
+
+def _pieces(knots: list[tuple[float, int]], lacks: np.ndarray, layout: Layout) -> Iterator[Piece]:
+    heights = [0.0 if number < 0 else float(lacks[number]) for _, number in knots]
+    begin, end = layout.outermost
+    for (first, _), (last, _), low, high in zip(knots, knots[1:], heights, heights[1:], strict=False):
+        if (low or high) and first >= begin and last <= end:
+            slope = (high - low) / (last - first)
+            start = low - slope * first
+            # On the frame where two meet Blender would add both; on the outermost key nothing is to be added.
+            if high:
+                last = float(np.nextafter(np.float32(last), np.float32(-np.inf)))
+            if low and first == begin:
+                first = float(np.nextafter(np.float32(first), np.float32(np.inf)))
+            yield Piece(first, last, start, slope)

@@ -1,0 +1,142 @@
+"""What is between whole frames: bones are where their modes have them, whatever the rotation, and keys are hit."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Quaternion
+
+from rigid_motion.animation import refresh, set_mode
+from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.bones.poses import expected_poses, shown_poses
+from tests.animation.bones.rigs import ORDERS, Rest, in_turn, key_all, moving_rig, new_rig, write_bone
+from tests.animation.oracle import curves_of, rotation_path
+from tests.animation.scenes import push_down
+
+PROMISE = 1e-4
+"""Metres."""
+
+EIGHTHS = np.arange(8 * 1.0, 8 * 40.0 + 1.0) / 8.0
+
+
+def largest_error(rig: bpy.types.Object, frames: np.ndarray, reach: float = 0.15) -> dict[str, float]:
+    """How far any bone's head, or a point so far from it along its axes, is off."""
+    (shown,) = shown_poses([rig], frames)
+    wanted = expected_poses(rig, frames)
+    found = {}
+    for name in wanted:
+        points = np.concatenate((np.zeros((1, 3)), reach * np.eye(3)))
+        one, other = (m[name][:, None, :3, :3] @ points[:, :, None] + m[name][:, None, :3, 3:] for m in (shown, wanted))
+        found[name] = float(np.linalg.norm(one - other, axis=2).max())
+    return found
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+def test_bones_are_right_between_frames(live_file, mode, order):
+    rig = key_all(new_rig(rotation_mode=order))
+    set_mode(list(rig.pose.bones), mode)
+    bpy.context.view_layer.update()
+    errors = largest_error(rig, EIGHTHS)
+    assert max(errors.values()) < PROMISE, errors
+
+
+OFF_WHOLE_FRAMES = (1.3, 10.5, 10.85, 16.4, 40.0)
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+def test_keys_off_whole_frames_are_hit(live_file, mode, order):
+    rig = key_all(new_rig(rotation_mode=order), OFF_WHOLE_FRAMES)
+    set_mode(list(rig.pose.bones), mode)
+    bpy.context.view_layer.update()
+    errors = largest_error(rig, np.array(OFF_WHOLE_FRAMES))
+    assert max(errors.values()) < 2e-5, errors
+    errors = largest_error(rig, EIGHTHS)
+    assert max(errors.values()) < PROMISE, errors
+
+
+def test_an_edit_of_a_key_off_whole_frames_is_followed(live_file):
+    rig = key_all(new_rig(), OFF_WHOLE_FRAMES)
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    bpy.context.view_layer.update()
+    for number, (frame, value) in enumerate(((16.4, 0.3), (12.3, 0.1), (12.0, 0.0), (16.6, 0.2))):
+        for bone in rig.pose.bones:
+            for (path, index), fcurve in curves_of(bone).items():
+                if path.endswith("location"):
+                    fcurve.keyframe_points[3].co_ui = frame, value * (index + 1)
+        bpy.context.view_layer.update()
+        errors = largest_error(rig, np.sort([*OFF_WHOLE_FRAMES, frame]))
+        assert max(errors.values()) < 2e-5, (number, errors)
+        assert refresh() == 0
+
+
+def test_more_samples_make_neither_the_action_longer_nor_a_strip(live_file):
+    rig = moving_rig()
+    bpy.context.view_layer.update()
+    action, slot = rig.animation_data.action, rig.animation_data.action_slot
+    assert max(record.rate for record in action.rigid_motion.slots) > 1
+    assert tuple(action.frame_range) == (1.0, 40.0)
+    rig.animation_data.action = None
+    strip = rig.animation_data.nla_tracks.new().strips.new("Strip", 1, action)
+    strip.action_slot = slot
+    assert (strip.action_frame_start, strip.action_frame_end) == (1.0, 40.0)
+
+
+def test_a_manual_frame_range_of_the_animators_stays_and_one_that_is_unticked_comes_back(live_file):
+    rig = moving_rig()
+    bpy.context.view_layer.update()
+    action = rig.animation_data.action
+
+    def edit() -> None:
+        curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += 0.1
+        bpy.context.view_layer.update()
+
+    action.use_frame_range = False
+    errors = largest_error(rig, EIGHTHS)
+    assert max(errors.values()) < PROMISE, "it is what strips and exports take, no more"
+    edit()
+    assert action.use_frame_range
+    assert tuple(action.frame_range) == (1.0, 40.0)
+    set_mode(list(rig.pose.bones), "BLENDER")
+    assert not action.use_frame_range
+    action.use_frame_range, action.frame_start, action.frame_end = True, 5.0, 30.0
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    edit()
+    assert tuple(action.frame_range) == (5.0, 30.0)
+    errors = largest_error(rig, EIGHTHS)
+    assert max(errors.values()) < PROMISE, errors
+
+
+def test_slow_motions_have_one_sample_a_frame(live_file):
+    rig = key_all(new_rig(), (1.0, 200.0, 400.0), amount=0.1)
+    set_mode(list(rig.pose.bones), "dq_sclerp")
+    action = rig.animation_data.action
+    assert {record.rate for record in action.rigid_motion.slots} == {1}
+    assert not action.use_frame_range
+    errors = largest_error(rig, np.arange(1.0, 400.0, 5.3))
+    assert max(errors.values()) < PROMISE, errors
+
+
+@pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+def test_a_swing_is_slowed_down_fourfold(live_file, mode, order):
+    arm = (
+        Rest("Upper", (0, 0, 0), (0.5, 0, 0)),
+        Rest("Lower", (0.5, 0, 0), (1, 0, 0), "Upper"),
+        Rest("Hand", (1, 0, 0), (1.5, 0, 0), "Lower"),
+    )
+    rig, frames = new_rig(bones=arm, rotation_mode=order), np.array((1.0, 13.0, 25.0))
+    for bone, share in zip(rig.pose.bones, (0.3, 0.4, 0.3), strict=True):
+        turns = [Quaternion((0.2, 0.9, 0.4), np.radians(150.0 * share * there)) for there in (0, 1, 0)]
+        rotations = [turn if order == "QUATERNION" else turn.to_euler(order) for turn in turns]
+        write_bone(bone, rotation_path(bone), frames, np.array(rotations), "BEZIER")
+    write_bone(rig.pose.bones["Hand"], "location", frames, 0.3 * np.outer((0, 1, 0), (2.0, -0.7, 1.0)), "BEZIER")
+    set_mode(list(rig.pose.bones), mode)
+    bpy.context.view_layer.update()
+    at = np.arange(1.0, 25.0, 1.0 / 32.0)
+    wanted = expected_poses(rig, at)["Hand"]
+    push_down(rig, scale=4.0)
+    (shown,) = shown_poses([rig], 1.0 + 4.0 * (at - 1.0))
+    points = np.concatenate((np.zeros((1, 3)), 0.5 * np.eye(3)))
+    one, other = (m[:, None, :3, :3] @ points[:, :, None] + m[:, None, :3, 3:] for m in (shown["Hand"], wanted))
+    assert np.linalg.norm(one - other, axis=2).max() < PROMISE

@@ -1,0 +1,162 @@
+"""Objects that are exact between frames: a constraint adds their differences, and delta transforms stay theirs."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion.animation import error_between_frames, refresh, set_exact, set_mode
+from rigid_motion.motion import KEYFRAME_MODES
+from tests.animation.bones.rigs import ORDERS, in_turn
+from tests.animation.oracle import Own, curves_of, expected_worlds, shown_worlds
+from tests.animation.scenes import give_own_deltas, key, new_object, own_deltas, push_down
+
+PROMISE = 1e-4
+"""Metres."""
+
+EIGHTHS = np.arange(8 * 1.0, 8 * 40.0 + 1.0) / 8.0
+
+POINTS = np.concatenate((np.zeros((1, 3)), 0.1 * np.eye(3)))
+
+
+def largest_error(obj: bpy.types.Object, frames: np.ndarray, own: Own | None = None) -> float:
+    """How far the object's origin, or a point ten centimetres away along its axes, is off."""
+    (shown,), wanted = shown_worlds([obj], frames), expected_worlds(obj, frames, {obj.name: own or Own()})
+    one, other = (m[:, None, :3, :3] @ POINTS[:, :, None] + m[:, None, :3, 3:] for m in (shown, wanted))
+    return float(np.linalg.norm(one - other, axis=2).max())
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+@pytest.mark.parametrize("parent", [False, True], ids=["no parent", "parent"])
+def test_an_object_is_right_between_frames(live_file, mode, order, parent):
+    obj = key(new_object("Tool", order))
+    if parent:
+        obj.parent = new_object("Parent", "XYZ")
+        obj.parent.location, obj.parent.rotation_euler = (1.0, 2.0, -0.5), (0.3, -0.4, 1.0)
+        obj.matrix_parent_inverse = obj.parent.matrix_basis.inverted() @ obj.parent.matrix_basis.inverted()
+    set_mode(obj, mode)
+    bpy.context.view_layer.update()
+    assert largest_error(obj, EIGHTHS) > 10.0 * PROMISE
+    assert error_between_frames(obj) > 10.0 * PROMISE
+    set_exact(obj)
+    bpy.context.view_layer.update()
+    assert largest_error(obj, EIGHTHS) < PROMISE
+    assert not any(path.startswith("delta_") for path, _ in curves_of(obj))
+    assert refresh() == 0
+    set_exact(obj, False)
+    bpy.context.view_layer.update()
+    assert len(obj.constraints) == 0
+    assert len(obj.animation_data.action.slots) == 1
+    assert largest_error(obj, np.arange(1.0, 41.0)) < 1e-4
+    assert any(path.startswith("delta_") for path, _ in curves_of(obj))
+
+
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+def test_delta_transforms_of_its_own_stay_the_objects(live_file, order):
+    obj = new_object("Tool", order)
+    own = give_own_deltas(obj)
+    set_mode(key(obj), "dq_sclerp")
+    set_exact(obj)
+    bpy.context.view_layer.update()
+    assert own_deltas(obj) == own
+    assert largest_error(obj, EIGHTHS, own) < PROMISE
+    set_exact(obj, False)
+    set_mode(obj, "BLENDER")
+    assert own_deltas(obj) == own
+
+
+def test_who_comes_to_share_the_action_is_exact_as_well(live_file):
+    obj, other = (set_up(name) for name in ("Tool", "Other"))
+    set_exact(obj)
+    other.animation_data.action = obj.animation_data.action
+    other.animation_data.action_slot = obj.animation_data.action_slot
+    bpy.context.view_layer.update()
+    for one in (obj, other):
+        assert largest_error(one, EIGHTHS) < PROMISE
+    set_exact(other, False)
+    bpy.context.view_layer.update()
+    for one in (obj, other):
+        assert not len(one.constraints)
+        assert largest_error(one, np.arange(1.0, 41.0)) < PROMISE
+    assert refresh() == 0
+
+
+def test_an_exact_action_that_comes_to_another_object_is_as_that_has_it(live_file):
+    obj, other = (set_up(name) for name in ("Tool", "Other"))
+    set_exact(obj)
+    action, slot = obj.animation_data.action, obj.animation_data.action_slot
+    obj.animation_data.action = None
+    bpy.context.view_layer.update()
+    assert not len(obj.constraints)
+    other.animation_data.action, other.animation_data.action_slot = action, slot
+    bpy.context.view_layer.update()
+    assert largest_error(other, np.arange(1.0, 41.0)) < PROMISE
+    assert not len(other.constraints)
+    assert len(action.slots) == 1
+    assert refresh() == 0
+
+
+def set_up(name: str) -> bpy.types.Object:
+    obj = key(new_object(name), seed=sum(map(ord, name)))
+    set_mode(obj, "dq_sclerp")
+    bpy.context.view_layer.update()
+    return obj
+
+
+def test_it_is_saved_undone_and_slowed_down(live_file, tmp_path):
+    set_up("Tool")
+    bpy.ops.ed.undo_push()
+    set_exact(bpy.data.objects["Tool"])
+    bpy.ops.ed.undo_push()
+    bpy.ops.ed.undo()
+    assert not len(bpy.data.objects["Tool"].constraints)
+    assert largest_error(bpy.data.objects["Tool"], np.arange(1.0, 41.0)) < PROMISE
+    bpy.ops.ed.redo()
+    assert largest_error(bpy.data.objects["Tool"], EIGHTHS) < PROMISE
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "exact.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "exact.blend"))
+    obj = bpy.data.objects["Tool"]
+    assert refresh() == 0
+    assert largest_error(obj, EIGHTHS) < PROMISE
+    assert tuple(obj.animation_data.action.frame_range) == (1.0, 40.0)
+    wanted = expected_worlds(obj, EIGHTHS)
+    push_down(obj, scale=4.0)
+    (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
+    assert np.abs(shown - wanted).max() < PROMISE
+    obj.parent = new_object("Parent")
+    obj.parent.location.x = 1.0
+    refresh()
+    bpy.context.view_layer.update()
+    (shown,) = shown_worlds([obj], 1.0 + 4.0 * (EIGHTHS - 1.0))
+    assert np.abs(shown[:, :3, 3] - (1.0, 0.0, 0.0) - wanted[:, :3, 3]).max() < PROMISE
+
+
+@pytest.mark.parametrize(("mode", "order"), in_turn(KEYFRAME_MODES, ORDERS))
+def test_delta_transforms_hit_keys_off_whole_frames_too(live_file, mode, order):
+    frames = (1.3, 10.5, 16.4, 40.0)
+    obj = new_object("Tool", order)
+    own = give_own_deltas(obj)
+    set_mode(key(obj, frames), mode)
+    bpy.context.view_layer.update()
+    assert largest_error(obj, np.array((*frames, *range(2, 40))), own) < PROMISE
+    for fcurve in curves_of(obj).values():
+        if len(fcurve.keyframe_points) > 2:
+            fcurve.keyframe_points[2].co_ui.x = 20.7
+    bpy.context.view_layer.update()
+    assert largest_error(obj, np.array((1.3, 10.5, 20.7, 40.0)), own) < PROMISE
+    assert refresh() == 0
+
+
+@pytest.mark.parametrize("is_exact", [False, True])
+def test_a_key_inserted_between_frames_keeps_the_pose(live_file, is_exact):
+    obj = set_up("Tool")
+    set_exact(obj, is_exact)
+    bpy.context.scene.frame_set(10, subframe=0.5)
+    bpy.context.view_layer.update()
+    (before,) = shown_worlds([obj], [10.5])
+    for path in ("location", "rotation_quaternion"):
+        obj.keyframe_insert(path, frame=10.5)
+    bpy.context.view_layer.update()
+    (after,) = shown_worlds([obj], [10.5])
+    assert np.abs(after - before).max() < 1e-5
