@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from rigid_motion.animation import set_mode
+from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.poses import shown_poses
 from tests.animation.bones.rig_editing import own_constraints
 from tests.animation.bones.rigs import key_all, new_rig, select_only
@@ -25,12 +25,13 @@ DEFAULTS: dict[str, object] = {"frame_start": 1, "frame_end": 40}
 """What an animator sees who presses the button: Blender fills in the frames, and Pose Mode the type."""
 
 
-def moving(order: str = "QUATERNION", *, own: bool = False) -> bpy.types.Object:
+def moving(order: str = "QUATERNION", *, own: bool = False, exact: bool = False) -> bpy.types.Object:
     obj = new_object("Tool", order)
     if own:
         give_own_deltas(obj)
     key(obj, scale="even")
     set_mode(obj, "cga_lerp")
+    set_exact(obj, exact)
     return obj
 
 
@@ -50,9 +51,10 @@ def assert_as_before(obj: bpy.types.Object, before: np.ndarray, frames: np.ndarr
 
 
 @pytest.mark.parametrize("settings", [{}, {"use_current_action": True}, {"visual_keying": True}], ids=str)
+@pytest.mark.parametrize("exact", [False, True], ids=["", "exact"])
 @pytest.mark.parametrize(("order", "own"), CASES)
-def test_a_baked_object_moves_as_before(live_file, order, own, settings):
-    obj = moving(order, own=own)
+def test_a_baked_object_moves_as_before(live_file, order, own, exact, settings):
+    obj = moving(order, own=own, exact=exact)
     before = shown_worlds([obj], PLAYED)[0]
     bake_object(obj, **settings)
     assert_as_before(obj, before)

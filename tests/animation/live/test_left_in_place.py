@@ -10,7 +10,7 @@ import pytest
 from mathutils import Euler, Matrix
 
 from rigid_motion import animation
-from rigid_motion.animation import set_mode
+from rigid_motion.animation import set_exact, set_mode
 from tests.animation.bones.rig_editing import own_constraints
 from tests.animation.bones.rigs import key_all, new_rig, select_only
 from tests.animation.oracle import curves_of
@@ -68,14 +68,16 @@ ENDS: dict[str, Callable[[bpy.types.Object], None]] = {
 }
 
 
+@pytest.mark.parametrize("exact", [False, True], ids=["", "exact"])
 @pytest.mark.parametrize("own", [False, True], ids=["", "own deltas"])
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("end", ENDS)
-def test_an_object_stays_where_it_is_seen(live_file, end, order, own):
+def test_an_object_stays_where_it_is_seen(live_file, end, order, own, exact):
     obj = new_object("Tool", order)
     before = give_own_deltas(obj) if own else own_deltas(obj)
     key(obj, scale="even")
     set_mode(obj, "cga_lerp")
+    set_exact(obj, exact)
     live_file.scene.frame_set(BETWEEN)
     seen = world()
     ENDS[end](obj)

@@ -33,7 +33,7 @@ class LeftInPlace:
     def notice_assignments(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
         """Keep what was set of an object and its bones since it was evaluated."""
         evaluated = obj.evaluated_get(depsgraph)
-        if any(obj.rigid_motion.filled) and obj.matrix_world == evaluated.matrix_world:
+        if (any(obj.rigid_motion.filled) or obj.rigid_motion.is_exact) and obj.matrix_world == evaluated.matrix_world:
             self._notice(transform_of(obj), evaluated)
         if obj.pose is not None and obj.rigid_motion.has_bones:
             for number in _set_bones(obj, evaluated):

@@ -149,10 +149,11 @@ def write_time(place: SlotTransform, layout: Layout) -> None:
     hide_fcurve(place.channelbag, place.kind.difference_group(place.prefix), fcurve)
 
 
-def write_line(place: SlotTransform, path: str, line: Line) -> None:
+def write_line(place: SlotTransform, path: str, line: Line) -> bpy.types.FCurve:
     """An F-curve beside those of a transform that is a line, without keys."""
     group = place.kind.difference_group(place.prefix)
-    place.curves[path, 0] = new_line(place.channelbag, group, (path, 0), line)
+    fcurve = place.curves[path, 0] = new_line(place.channelbag, group, (path, 0), line)
+    return fcurve
 
 
 def new_line(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, line: Line) -> bpy.types.FCurve:
