@@ -160,3 +160,19 @@ def test_a_key_inserted_between_frames_keeps_the_pose(live_file, is_exact):
     bpy.context.view_layer.update()
     (after,) = shown_worlds([obj], [10.5])
     assert np.abs(after - before).max() < 1e-5
+
+
+def test_a_driver_of_the_rotation_may_come_and_go(live_file):
+    obj = key(new_object("Tool"))
+    set_mode(obj, "cga_slerp")
+    set_exact(obj)
+    frames = np.arange(1.0, 41.0)
+    (before,) = shown_worlds([obj], frames)
+    obj.driver_add("rotation_quaternion", 2).driver.expression = "0.3"
+    bpy.context.view_layer.update()
+    (driven,) = shown_worlds([obj], frames)
+    assert np.abs(driven - before).max() > 0.1
+    obj.driver_remove("rotation_quaternion", 2)
+    bpy.context.view_layer.update()
+    (after,) = shown_worlds([obj], frames)
+    assert np.abs(after - before).max() < 1e-4

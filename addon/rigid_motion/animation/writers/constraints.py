@@ -75,6 +75,7 @@ class ConstraintWriter(Writer):
         present = place.filled
         if points:
             _avoid_names(place)
+            _make_room(place, points)
             curves, _ = replace_samples(
                 _channelbag(place), place.kind.difference_group(place.prefix), present, points, layout, pieces
             )
@@ -278,6 +279,21 @@ def _frame_of_a_key(place: SlotTransform) -> float:
     return min(frames, key=lambda frame: (abs(frame - round(frame)), frame), default=0.0)
 
 
+def _at_rest(channelbag: bpy.types.ActionChannelbag) -> dict[Channel, bpy.types.FCurve]:
+    """The F-curves that hold quaternions without samples."""
+    group = channelbag.groups.get(AT_REST)
+    return {} if group is None else {(one.data_path, one.array_index): one for one in group.channels}
+
+
+def _make_room(place: SlotTransform, points: Collection[Channel]) -> None:
+    """Take out what holds quaternions that get samples."""
+    channelbag = place.slot.bones_channelbag
+    if channelbag is not None:
+        present = _at_rest(channelbag)
+        for channel in present.keys() & points:
+            channelbag.fcurves.remove(present[channel])
+
+
 def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
     """Hold the quaternions that a slot of differences has no samples of.
 
@@ -291,8 +307,7 @@ def _keep_at_rest(place: SlotTransform, points: Collection[Channel]) -> None:
         held = {("delta_rotation_quaternion", 0)}
         if all(path != "rotation_quaternion" for path, _ in points):
             held.add(("rotation_quaternion", 0))
-    group = channelbag.groups.get(AT_REST)
-    present = {} if group is None else {(one.data_path, one.array_index): one for one in group.channels}
+    present = _at_rest(channelbag)
     for channel in present.keys() - held:
         channelbag.fcurves.remove(present[channel])
     remove_if_empty(channelbag, AT_REST)
