@@ -20,7 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .key_costs import Costs, Found, Recording
-from .key_links import least_keys, linked_keys, traded_keys
+from .key_links import linked_keys, traded_keys
+from .key_spread import moved_together, spread_keys
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
@@ -46,8 +47,22 @@ LOOSER = (1.6, 1.3, 1.15)
 START = {PEAK: 0.5, 2: 0.25}
 """Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
 
-LESS = 0.85
-"""How many times the error that a budget of keys has, the next try is to have; nearer to it where that fails."""
+SPREAD = 6, 8
+"""Candidates for each key of a budget, at least and at most, when its keys are first laid out anew."""
+
+SPARSER = 3
+"""How many times as few candidates there are from then on."""
+
+LONG = 20
+"""Samples for each key, from which on there is time for every step: segments as long are quick to look at."""
+
+ENOUGH = 8.0
+"""Where they are shorter: times the poses that the first keys have taken, after which no try begins."""
+
+TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
+"""How keys of a budget are moved together, by the reach of the mode: places for each, and how near to one another.
+
+Where there are few samples for each key the first two do."""
 
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
@@ -188,46 +203,52 @@ class Search:
         return self.reach <= 1 and len(self.recording.starts) == 1
 
     def within_budget(self, budget: int, tries: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found, never more than that of `_fewest`."""
-        best = self._fewest(budget)
-        least, found, factor = self._error(best), [best.indices], LESS
+        """So many samples that are keys with as small an error as can be found."""
+        count = len(self.recording.times)
+        least, most = (budget * spread for spread in SPREAD)
+        keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
+        candidates = keys.indices
+        keys = self.thinned(keys, math.inf, budget)
+        is_dense, looked = LONG * budget > count, self.costs.looked
+        if self.power == 2 or not (tries and is_dense):
+            keys = self._settled(keys)
+        if self.power == 2:
+            return self._within_budget_of_squares(keys, budget, tries)
+        best = samples = keys.indices
+        enough = ENOUGH * looked if is_dense else math.inf
+        for number in range(tries):
+            if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
+                break
+            laid_out = spread_keys(self.costs, candidates[:: SPARSER if number else 1], samples, budget)
+            samples = self._filled(self.measured(laid_out), budget).indices
+            for ways, part in TOGETHER[self.reach][: 2 if is_dense else None]:
+                samples = moved_together(self.costs, samples, ways, part)
+                best = min(best, samples, key=self.costs.peak)
+        return best
+
+    def _within_budget_of_squares(self, best: Keys, budget: int, tries: int) -> np.ndarray:
+        """The same for the mean square, from keys that are many enough."""
+        found = [best.indices]
         links = tries and self._is_linkable  # The last try.
-        for number in range(tries - bool(links)):
-            if least == 0.0:
-                return best.indices
-            # The first try begins anew; from the keys that there are, others take a part of its time.
-            if self.power == 2:
-                # Some more where the motion is off most, moved together.
-                keys = self._filled(self.measured(best.indices), math.ceil(SWAPPED * budget))
-            else:
-                keys = self._tightened(best, factor * least) if number else self._first(factor * least)
-            found.append(keys.indices)
-            best, better = self._least(best, keys, budget)
-            factor = factor if better else math.sqrt(factor)
-            least = self._error(best)
-        if links and least > 0.0:
-            if self.power == 2:
-                linked = traded_keys(self.costs, found, budget=budget)
-            else:
-                linked = least_keys(self.costs, best.indices, found, budget)
-            best, _ = self._least(best, self.measured(linked), budget)
+        for _ in range(tries - bool(links)):
+            # Some more where the motion is off most, moved together.
+            more = self.moved(self._filled(self.measured(best.indices), math.ceil(SWAPPED * budget)), math.inf)
+            found.append(more.indices)
+            best = self._least(best, more, budget)
+        if links:
+            best = self._least(best, self.measured(traded_keys(self.costs, found, budget=budget)), budget)
         return best.indices
 
-    def _tightened(self, keys: Keys, tolerance: float) -> Keys:
-        """Few keys that keep to a tolerance, from others that do not."""
-        return self.refined(self.densified(self.measured(keys.indices), tolerance), tolerance)
-
-    def _least(self, best: Keys, other: Keys, budget: int) -> tuple[Keys, bool]:
-        """Of keys and others, brought to the budget, those with the smaller error; and whether it is the others."""
+    def _least(self, best: Keys, other: Keys, budget: int) -> Keys:
+        """Of keys and others, brought to the budget, those with the smaller sum of squares."""
         keys = self.measured(other.indices)
         if len(keys.indices) > budget:
             keys = self.thinned(keys, math.inf, budget)
-        keys = self._filled(self.moved(keys, math.inf), budget)
-        return (keys, True) if self._error(keys) < self._error(best) else (best, False)
+        keys = self.moved(self._filled(self.moved(keys, math.inf), budget), math.inf)
+        return keys if keys.cost.sum() < best.cost.sum() else best
 
-    def _fewest(self, budget: int) -> Keys:
-        """What is left of all samples, down to the budget, moved to where the sum of the powers of errors is least."""
-        keys = self.thinned(self.measured(np.arange(len(self.recording.times))), math.inf, budget)
+    def _settled(self, keys: Keys) -> Keys:
+        """Keys moved to where the sum of the powers of errors is least."""
         for _ in range(ROUNDS):
             before = keys.cost.sum()
             keys = self.moved(keys, math.inf)
@@ -244,13 +265,9 @@ class Search:
             segments = np.searchsorted(keys.indices, order, side="right")
             # The first of each segment is where it is off most.
             worst = order[np.sort(np.unique(segments, return_index=True)[1])]
-            worst = worst[errors[worst] >= 0.0][:left]
-            keys = self.moved(self.measured(np.union1d(keys.indices, worst)), math.inf)
+            worst = worst[errors[worst] >= 0.0][: (left + 1) // 2]
+            keys = self.measured(np.union1d(keys.indices, worst))
         return keys
-
-    def _error(self, keys: Keys) -> float:
-        """The largest error between keys, or the root of its mean square."""
-        return math.sqrt(keys.cost.sum() / len(self.recording.times)) if self.power == 2 else float(keys.peak.max())
 
     def measured(self, indices: np.ndarray) -> Keys:
         """Keys at these samples, rising, the outermost of each track among them, and everything between them."""

@@ -42,16 +42,17 @@ def reduce_keys(
     radius : float
         Of the shell, in the unit of the positions; not below zero.
     budget : int, optional
-        The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find. In most cases
-        it is within a twentieth of what bisecting the tolerance reaches, in some up to a third above it; it takes about
-        the time of two or three searches, where bisecting takes that of eight or more.
+        The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find, mostly no
+        larger than what bisecting the tolerance reaches, and seldom more than a twentieth above it. With `rms` it may
+        be up to a third above it.
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
         How many more searches there are, up to three: what they have found is put together. Each begins with fewer keys
         than the tolerance allows, and puts some back where the motion is off, which takes about half as long as the
         first search; under `rms` it keeps to another tolerance, and takes as long. With a budget, 0 is the first
-        search alone, and every try goes on from there with a smaller tolerance.
+        search alone, and every try lays the keys out anew; there are fewer tries where there is a key for less than 20
+        samples.
 
     Returns
     -------
