@@ -20,7 +20,10 @@ import numpy as np
 from .key_costs import Costs
 
 FIRST = 0.7
-"""Of the largest error of keys: what the next ones are first asked for."""
+"""Of the largest error of keys: what the next ones are first asked for, and less where that is easy."""
+
+LEAST = 1e-6
+"""Of it: no less is asked for, where some keys leave no error at all."""
 
 RAISED = 1.15
 """How many times as large the error may be each time that there is no way with few enough keys."""
@@ -72,14 +75,20 @@ def spread_keys(costs: Costs, candidates: np.ndarray, keys: np.ndarray, budget: 
     """
     ways = _Ways(costs, np.union1d(candidates, keys), keys)
     worst = costs.peak(keys)
-    low, high, best = RAISED * FIRST * worst, FIRST * worst, None
+    high = FIRST * worst
+    ways.look(high)
+    best = ways.fewest(high, budget)
+    low = high
     while best is None:
-        low, high = high / RAISED, min(high, worst)
+        if high >= worst:
+            return keys
+        low, high = high, min(RAISED * high, worst)
         ways.look(high)
         best = ways.fewest(high, budget)
-        if best is None and high >= worst:
-            return keys
-        high = high if best is not None else high * RAISED
+    while low == high and low > LEAST * worst:
+        low = high / RAISED
+        better = ways.fewest(low, budget)
+        best, high = (best, high) if better is None else (better, low)
     for _ in range(HALVINGS):
         middle = math.sqrt(low * high)
         better = ways.fewest(middle, budget)
