@@ -108,7 +108,8 @@ class _Ways:
         places = np.interp(candidates, keys, number) + np.array(
             [way for way in range(-costs.reach, costs.reach + 1) if way]
         ).reshape(-1, 1)
-        near = np.rint(np.interp(places, number, keys)).astype(np.int64)
+        # Halves all go up, so that keys stay a sample apart; the last digits are left out, which could say otherwise.
+        near = np.floor(np.round(np.interp(places, number, keys), 6) + 0.5).astype(np.int64)
         near = np.where((places < 0) | (places > number[-1]), -1, near)
         self._before, self._after = near[: costs.reach], near[costs.reach :]
         # How far each candidate has been looked at, and the error that has ended that.
