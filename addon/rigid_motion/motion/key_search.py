@@ -21,7 +21,6 @@ import numpy as np
 
 from .key_costs import Costs, Found, Recording
 from .key_links import linked_keys, traded_keys
-from .key_spread import moved_together, spread_keys
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
@@ -46,26 +45,6 @@ LOOSER = (1.6, 1.3, 1.15)
 
 START = {PEAK: 0.5, 2: 0.25}
 """Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
-
-SPREAD = 6, 8
-"""Candidates for each key of a budget, at least and at most, when its keys are first laid out anew."""
-
-SPARSER = 3
-"""How many times as few candidates there are from then on."""
-
-LONG = 20
-"""Samples for each key, from which on there is time for every step: segments as long are quick to look at."""
-
-ENOUGH = 8.0
-"""Where they are shorter: times the poses that the first keys have taken, after which no try begins."""
-
-TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
-"""How keys of a budget are moved together, by the reach of the mode: places for each, and how near to one another.
-
-Where there are few samples for each key the first two do."""
-
-SWAPPED = 1.15
-"""How many times the budget keys may be in between, for the mean square, to find better places."""
 
 OTHERS = (0.9, 1.1, 1.25)
 """Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
@@ -142,7 +121,7 @@ class Search:
             keys = self.refined(self.densified(fewer, 1.0))
             best = self._better(best, keys)
             found.append(keys.indices)
-        if self._is_linkable and tries:
+        if self.is_linkable and tries:
             linked = linked_keys(self.costs, found)
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
@@ -189,7 +168,7 @@ class Search:
 
     def _traded(self, best: Keys, tries: int) -> Keys:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
-        if not (self._is_linkable and tries):
+        if not (self.is_linkable and tries):
             return best
         found = [best.indices]
         for other in OTHERS[:tries]:
@@ -198,81 +177,14 @@ class Search:
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     @property
-    def _is_linkable(self) -> bool:
+    def is_linkable(self) -> bool:
         """Whether keys of several searches can be put together."""
         return self.reach <= 1 and len(self.recording.starts) == 1
-
-    def within_budget(self, budget: int, tries: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found."""
-        count = len(self.recording.times)
-        least, most = (budget * spread for spread in SPREAD)
-        keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
-        candidates = keys.indices
-        keys = self.thinned(keys, math.inf, budget)
-        is_dense, looked = LONG * budget > count, self.costs.looked
-        if self.power == 2 or not (tries and is_dense):
-            keys = self._settled(keys)
-        if self.power == 2:
-            return self._within_budget_of_squares(keys, budget, tries)
-        best = samples = keys.indices
-        enough = ENOUGH * looked if is_dense else math.inf
-        for number in range(tries):
-            if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
-                break
-            laid_out = spread_keys(self.costs, candidates[:: SPARSER if number else 1], samples, budget)
-            samples = self._filled(self.measured(laid_out), budget).indices
-            for ways, part in TOGETHER[self.reach][: 2 if is_dense else None]:
-                samples = moved_together(self.costs, samples, ways, part)
-                best = min(best, samples, key=self.costs.peak)
-        return best
-
-    def _within_budget_of_squares(self, best: Keys, budget: int, tries: int) -> np.ndarray:
-        """The same for the mean square, from keys that are many enough."""
-        found = [best.indices]
-        links = tries and self._is_linkable  # The last try.
-        for _ in range(tries - bool(links)):
-            # Some more where the motion is off most, moved together.
-            more = self.moved(self._filled(self.measured(best.indices), math.ceil(SWAPPED * budget)), math.inf)
-            found.append(more.indices)
-            best = self._least(best, more, budget)
-        if links:
-            best = self._least(best, self.measured(traded_keys(self.costs, found, budget=budget)), budget)
-        return best.indices
-
-    def _least(self, best: Keys, other: Keys, budget: int) -> Keys:
-        """Of keys and others, brought to the budget, those with the smaller sum of squares."""
-        keys = self.measured(other.indices)
-        if len(keys.indices) > budget:
-            keys = self.thinned(keys, math.inf, budget)
-        keys = self.moved(self._filled(self.moved(keys, math.inf), budget), math.inf)
-        return keys if keys.cost.sum() < best.cost.sum() else best
-
-    def _settled(self, keys: Keys) -> Keys:
-        """Keys moved to where the sum of the powers of errors is least."""
-        for _ in range(ROUNDS):
-            before = keys.cost.sum()
-            keys = self.moved(keys, math.inf)
-            if not keys.cost.sum() < 0.99 * before:
-                break
-        return keys
-
-    def _filled(self, keys: Keys, budget: int) -> Keys:
-        """Keys with more of them where the motion is off most, as many as the budget has left."""
-        while (left := min(budget, len(self.recording.times)) - len(keys.indices)) > 0:
-            errors = self.costs.errors(self._segments(keys)[1])
-            errors[keys.indices] = -1.0
-            order = np.argsort(-errors, kind="stable")
-            segments = np.searchsorted(keys.indices, order, side="right")
-            # The first of each segment is where it is off most.
-            worst = order[np.sort(np.unique(segments, return_index=True)[1])]
-            worst = worst[errors[worst] >= 0.0][: (left + 1) // 2]
-            keys = self.measured(np.union1d(keys.indices, worst))
-        return keys
 
     def measured(self, indices: np.ndarray) -> Keys:
         """Keys at these samples, rising, the outermost of each track among them, and everything between them."""
         keys = self._at(indices)
-        numbers, segments = self._segments(keys)
+        numbers, segments = self.segments(keys)
         keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
         return keys
 
@@ -285,7 +197,7 @@ class Search:
             indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
         )
 
-    def _segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
+    def segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
         """The numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
@@ -293,7 +205,7 @@ class Search:
     def densified(self, keys: Keys, tolerance: float) -> Keys:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
         while keys.peak.max() > tolerance:
-            errors = self.costs.errors(self._segments(keys)[1])
+            errors = self.costs.errors(self.segments(keys)[1])
             of_segments = np.maximum.reduceat(errors, keys.indices)
             counts = np.diff(keys.indices, append=len(errors))
             worst = (errors == of_segments.repeat(counts)) & (errors > tolerance)
