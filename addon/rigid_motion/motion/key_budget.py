@@ -21,14 +21,14 @@ SPREAD = 6, 8
 SPARSER = 3
 """How many times as few candidates there are from then on."""
 
-MIDDLE = 12, 50
+MIDDLE = 10, 50
 """Samples for each key, between which there is time for every step.
 
 Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
 at samples takes so long that another try is worth more.
 """
 
-ENOUGH = 8.0, 10.0, 15.0
+ENOUGH = 7.5, 10.0, 15.0
 """Times the poses that the first keys have taken, after which no try begins: below the middle, there and above."""
 
 TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
