@@ -101,7 +101,7 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
     Returns
     -------
     Result
-        What became of the bones that move; of those that were left, all keys have the mode.
+        What became of the bones that move; those that were left play straight from sample to sample.
     """
     rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
     rig = Rig(name, rest, clip.figure.joints, bpy.context.scene.collection)
@@ -111,7 +111,4 @@ def key_body(clip: Clip, frames: np.ndarray, wishes: Wishes, name: str) -> Resul
     keyed = [transform_of(bone) for bone in rig.obj.pose.bones if len(animation.key_frames(bone))]
     if not keyed:
         return Result()
-    result = reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
-    if result.left:
-        animation.set_mode(list(result.left), wishes.mode)
-    return result
+    return reduced(keyed, replace(wishes, discard=True))  # The recording has the dense keys.
