@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rigid_motion.animation import write_channel
-from rigid_motion.animation.transforms import transform_of
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
 from rigid_motion_batch import reduce
@@ -60,7 +59,7 @@ def key_densely(carrier: bpy.types.Object | bpy.types.PoseBone, poses: Poses, fr
     """A key of location and rotation on every frame, as a simulation or motion capture leaves them."""
     carrier.rotation_mode = "QUATERNION"
     animated = carrier.id_data
-    prefix = transform_of(carrier).prefix
+    prefix = "" if carrier == animated else f"{carrier.path_from_id()}."
     write_channel(animated, f"{prefix}location", frames, poses.positions)
     write_channel(animated, f"{prefix}rotation_quaternion", frames, poses.quaternions)
 

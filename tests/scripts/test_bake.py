@@ -42,7 +42,7 @@ PLAYED = np.arange(0.0, LAST + 1.0)
 BAKED = ("Arm", "Camera", "Own", "Strips", "Tool", "Wheel")
 REFUSED = {
     "Axis": "set its rotation mode to Quaternion first",
-    "Crane": "Location X is driven: remove the driver",
+    "Crane": "Delta Location X is driven: remove the driver",
     "Future": "has no mode that this version knows",
     "Huge": "key 2 of Location X has the value 3e+38, which no motion can be computed from: delete it",
     "Noisy": "has a modifier of type Noise",
@@ -81,7 +81,7 @@ def fill_shot() -> None:
     for obj in refused.values():
         set_mode(obj, "dq_sclerp", FRAMES[:2])
     refused["Axis"].rotation_mode = "AXIS_ANGLE"
-    refused["Crane"].driver_add("location", 0).driver.expression = "frame"
+    refused["Crane"].driver_add("delta_location", 0).driver.expression = "frame"
     curves_of(refused["Future"])["rigid_motion.mode", 0].keyframe_points[1].co.y = 42.0
     curves_of(refused["Huge"])["location", 0].keyframe_points[1].co_ui.y = 3e38
     curves_of(refused["Noisy"])["location", 0].modifiers.new("NOISE").blend_type = "MULTIPLY"

@@ -183,7 +183,9 @@ def test_few_bones_are_named(tmp_path, capsys):
 def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp_path, capsys):
     def edit(rig: bpy.types.Object) -> None:
         rig.pose.bones["Index"].rotation_mode = "AXIS_ANGLE"
-        rig.driver_add(rig.pose.bones["Hand"].path_from_id("location"), 1).driver.expression = "frame"
+        for name in ("location", "rotation_quaternion", "scale"):
+            for one in rig.driver_add(rig.pose.bones["Hand"].path_from_id(name)):
+                one.driver.expression = "frame"
         for point in curves_of(rig)[rig.pose.bones["Arm"].path_from_id("location"), 0].keyframe_points:
             point.co_ui.x -= 100.0
 
@@ -192,7 +194,7 @@ def test_what_cannot_be_baked_of_a_rig_is_named_by_bone_and_the_others_go_on(tmp
     lines = capsys.readouterr().err.splitlines()
     refused = {line.removeprefix(f"{path}: Rig/").partition(":")[0]: line for line in lines if "not baked" in line}
     assert list(refused) == ["Hand", "Index"]
-    assert "Location Y is driven" in refused["Hand"]
+    assert "Location X is driven" in refused["Hand"]
     assert "set its rotation mode to Quaternion first" in refused["Index"]
     assert f"{path}: Rig: 2 bones baked, " in "\n".join(lines)
     assert lines[-1] == "2 bones baked, 2 not; 1 file: 1 written."

@@ -295,9 +295,9 @@ def test_an_infinite_key_is_named_with_its_object_its_channel_and_the_way_out(tm
 
 
 def test_other_reasons_are_told_as_they_are(tmp_path, capsys):
-    path = one_object_file(tmp_path / "shot.blend", lambda obj: obj.driver_add("location", 0))
+    path = one_object_file(tmp_path / "shot.blend", lambda obj: obj.driver_add("delta_location", 0))
     assert run(path) == 1
-    assert "Tool: not baked: Location X is driven: remove the driver" in capsys.readouterr().err
+    assert "Tool: not baked: Delta Location X is driven: remove the driver" in capsys.readouterr().err
 
 
 # Nothing to do

@@ -53,7 +53,7 @@ def messages() -> set[Message]:
         found |= set(of_class(cls))
         found |= set(of_properties(cls))
     found |= {(DEFAULT, spoken_of(text, "bones")) for text in DESCRIPTIONS.values()}
-    found |= {(DEFAULT, label) for label in SHORT_LABELS.values()}
+    found |= {(OWN_WORDS, label) for label in SHORT_LABELS.values()}
     return {(context, text) for context, text in found if text}
 
 

@@ -54,6 +54,11 @@ def test_every_property_that_is_drawn_has_a_page(cls, extension):
 def test_the_page_is_the_one_on_what_was_pointed_at(extension):
     assert page("rigid_motion.set_mode").endswith("animators.md#which-mode-is-good-for-what")
     assert page("RIGID_MOTION_OT_reduce_keys.tolerance").endswith("reduction.md")
+    assert page("rigid_motion.restore_keys").endswith("animators.md#reduce-keys")
+    assert page("RIGID_MOTION_OT_bake.step").endswith("animators.md#bake")
+    assert page("rigid_motion.unbake").endswith("animators.md#bake")
+    assert page("rigid_motion.push").endswith("animators.md#breakdown-push-and-relax")
+    assert page("rigid_motion.copy_pose").endswith("animators.md#edit")
     assert page("BoneMotion.mode").endswith("animators.md#rigs")
 
 

@@ -73,6 +73,7 @@ class SlotRecord(bpy.types.PropertyGroup):
         description="What the body turns about by whole turns more, in all segments of its Action",
         items=TURN_AXIS_ITEMS,
         options=set(),
+        translation_context=OWN_WORDS,
         update=_on_turns_axis,
     )
     constraint: StringProperty(

@@ -103,6 +103,8 @@ class Costs:
         """How many segments beyond the two next to it a key influences, on either side."""
         self.keys = 2 + 2 * self.reach
         """How many keys have a say in a segment. A segment is a row of them: samples, -1 where there is none."""
+        self.looked = 0.0
+        """How many poses have been looked at so far."""
         self._memory = _Memory(self.keys, min(REMEMBERED, REMEMBERED_EACH * len(recording.times)))
 
     def of(self, segments: np.ndarray) -> Found:
@@ -117,13 +119,14 @@ class Costs:
 
     def total(self, keys: np.ndarray) -> float:
         """Return the cost of all segments between keys (k,) of a recording of one track."""
-        return float(self._of_track(keys)[0].sum())
+        return float(self.of_keys(keys)[0].sum())
 
     def peak(self, keys: np.ndarray) -> float:
         """Return the largest error between keys (k,) of a recording of one track."""
-        return float(self._of_track(keys)[1].max())
+        return float(self.of_keys(keys)[1].max())
 
-    def _of_track(self, keys: np.ndarray) -> Found:
+    def of_keys(self, keys: np.ndarray) -> Found:
+        """Costs and peaks (k - 1,) of the segments between keys (k,) of a recording of one track."""
         ended = np.pad(keys, self.reach, constant_values=-1)
         return self.of(np.lib.stride_tricks.sliding_window_view(ended, self.keys))
 
@@ -142,6 +145,7 @@ class Costs:
     def _work_out(self, rows: np.ndarray) -> np.ndarray:
         """Costs beside peaks, shape (s, 2), of segments (s, keys) with samples in them."""
         out, done = np.empty((len(rows), 2)), 0
+        self.looked += self.effort(rows)
         for batch, counts in self._batches(rows):
             _, errors = self._errors(batch, counts)
             found, begins = out[done : done + len(batch)], np.cumsum(counts) - counts

@@ -46,12 +46,6 @@ PRICES = 8.0
 PRICE_STEPS = 10
 """Of bisection for the price."""
 
-LEAST = 0.7
-"""Of the largest error of keys: so small it may become with as many others."""
-
-LEAST_STEPS = 7
-"""Of bisection for it."""
-
 
 def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
     """The fewest keys that candidates allow, or the fewest that were found; at all costs that are too high.
@@ -71,40 +65,6 @@ def linked_keys(costs: Costs, found: list[np.ndarray]) -> np.ndarray:
             links = links[peak <= WITHIN]
             return _fewest(links, candidates)
     return min(found, key=len)
-
-
-def least_keys(costs: Costs, best: np.ndarray, found: list[np.ndarray], budget: int) -> np.ndarray:
-    """The keys with the smallest largest error that candidates allow, as many as a budget at most.
-
-    Parameters
-    ----------
-    costs : Costs
-        As for `linked_keys`.
-    best : array of int
-        Keys within the budget, from the first sample to the last; they are the result where there are none better.
-    found : list of array of int
-        Others, as few or more, that are candidates.
-    budget : int
-    """
-    width = WIDTHS[0][0 if costs.recording.poses_each == 1.0 else 1]
-    candidates = np.union1d(_beside(costs, [best], width if costs.reach == 0 else 0), np.concatenate(found))
-    worst = costs.peak(best) * WITHIN
-    wider = ALIVE if costs.reach else 1.0
-    links = _links(costs, candidates, [best], wider * worst, wider**2 * worst)
-    if links is None:
-        return best
-    _, peak = costs.of(links)
-    low, high = LEAST * worst, worst
-    for _ in range(LEAST_STEPS):
-        middle = math.sqrt(low * high)
-        keys = _fewest(links[peak <= middle], candidates)
-        if keys is None or len(keys) > budget:
-            low = middle
-        else:
-            best, high = keys, min(middle, costs.peak(keys))
-        if low >= high:
-            break
-    return best
 
 
 def traded_keys(costs: Costs, found: list[np.ndarray], *, budget: int | None = None) -> np.ndarray:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .key_costs import Costs, Found, Recording
-from .key_links import least_keys, linked_keys, traded_keys
+from .key_links import linked_keys, traded_keys
 
 PEAK = 8
 """The power of errors whose sum stands for the largest of them: one of two."""
@@ -45,12 +45,6 @@ LOOSER = (1.6, 1.3, 1.15)
 
 START = {PEAK: 0.5, 2: 0.25}
 """Of the tolerance: a stretch that is off by this at most begins with a key in its middle."""
-
-LESS = 0.85
-"""How many times the error that a budget of keys has, the next try is to have; nearer to it where that fails."""
-
-SWAPPED = 1.15
-"""How many times the budget keys may be in between, for the mean square, to find better places."""
 
 OTHERS = (0.9, 1.1, 1.25)
 """Of how many times the tolerance keys are found, whose places may be better for the mean square, too."""
@@ -127,7 +121,7 @@ class Search:
             keys = self.refined(self.densified(fewer, 1.0))
             best = self._better(best, keys)
             found.append(keys.indices)
-        if self._is_linkable and tries:
+        if self.is_linkable and tries:
             linked = linked_keys(self.costs, found)
             if len(linked) < len(best.indices):
                 best = self.refined(self.measured(linked))
@@ -174,7 +168,7 @@ class Search:
 
     def _traded(self, best: Keys, tries: int) -> Keys:
         """Keys put together from those of several tolerances, where they are fewer than the best of this one."""
-        if not (self._is_linkable and tries):
+        if not (self.is_linkable and tries):
             return best
         found = [best.indices]
         for other in OTHERS[:tries]:
@@ -183,79 +177,14 @@ class Search:
         return self.refined(self.measured(traded)) if len(traded) < len(best.indices) else best
 
     @property
-    def _is_linkable(self) -> bool:
+    def is_linkable(self) -> bool:
         """Whether keys of several searches can be put together."""
         return self.reach <= 1 and len(self.recording.starts) == 1
-
-    def within_budget(self, budget: int, tries: int) -> np.ndarray:
-        """So many samples that are keys with as small an error as can be found, never more than that of `_fewest`."""
-        best = self._fewest(budget)
-        least, found, factor = self._error(best), [best.indices], LESS
-        links = tries and self._is_linkable  # The last try.
-        for number in range(tries - bool(links)):
-            if least == 0.0:
-                return best.indices
-            # The first try begins anew; from the keys that there are, others take a part of its time.
-            if self.power == 2:
-                # Some more where the motion is off most, moved together.
-                keys = self._filled(self.measured(best.indices), math.ceil(SWAPPED * budget))
-            else:
-                keys = self._tightened(best, factor * least) if number else self._first(factor * least)
-            found.append(keys.indices)
-            best, better = self._least(best, keys, budget)
-            factor = factor if better else math.sqrt(factor)
-            least = self._error(best)
-        if links and least > 0.0:
-            if self.power == 2:
-                linked = traded_keys(self.costs, found, budget=budget)
-            else:
-                linked = least_keys(self.costs, best.indices, found, budget)
-            best, _ = self._least(best, self.measured(linked), budget)
-        return best.indices
-
-    def _tightened(self, keys: Keys, tolerance: float) -> Keys:
-        """Few keys that keep to a tolerance, from others that do not."""
-        return self.refined(self.densified(self.measured(keys.indices), tolerance), tolerance)
-
-    def _least(self, best: Keys, other: Keys, budget: int) -> tuple[Keys, bool]:
-        """Of keys and others, brought to the budget, those with the smaller error; and whether it is the others."""
-        keys = self.measured(other.indices)
-        if len(keys.indices) > budget:
-            keys = self.thinned(keys, math.inf, budget)
-        keys = self._filled(self.moved(keys, math.inf), budget)
-        return (keys, True) if self._error(keys) < self._error(best) else (best, False)
-
-    def _fewest(self, budget: int) -> Keys:
-        """What is left of all samples, down to the budget, moved to where the sum of the powers of errors is least."""
-        keys = self.thinned(self.measured(np.arange(len(self.recording.times))), math.inf, budget)
-        for _ in range(ROUNDS):
-            before = keys.cost.sum()
-            keys = self.moved(keys, math.inf)
-            if not keys.cost.sum() < 0.99 * before:
-                break
-        return keys
-
-    def _filled(self, keys: Keys, budget: int) -> Keys:
-        """Keys with more of them where the motion is off most, as many as the budget has left."""
-        while (left := min(budget, len(self.recording.times)) - len(keys.indices)) > 0:
-            errors = self.costs.errors(self._segments(keys)[1])
-            errors[keys.indices] = -1.0
-            order = np.argsort(-errors, kind="stable")
-            segments = np.searchsorted(keys.indices, order, side="right")
-            # The first of each segment is where it is off most.
-            worst = order[np.sort(np.unique(segments, return_index=True)[1])]
-            worst = worst[errors[worst] >= 0.0][:left]
-            keys = self.moved(self.measured(np.union1d(keys.indices, worst)), math.inf)
-        return keys
-
-    def _error(self, keys: Keys) -> float:
-        """The largest error between keys, or the root of its mean square."""
-        return math.sqrt(keys.cost.sum() / len(self.recording.times)) if self.power == 2 else float(keys.peak.max())
 
     def measured(self, indices: np.ndarray) -> Keys:
         """Keys at these samples, rising, the outermost of each track among them, and everything between them."""
         keys = self._at(indices)
-        numbers, segments = self._segments(keys)
+        numbers, segments = self.segments(keys)
         keys.cost[numbers], keys.peak[numbers] = self.costs.of(segments)
         return keys
 
@@ -268,7 +197,7 @@ class Search:
             indices, np.repeat(first, counts), np.repeat(end, counts), *np.zeros((2, len(indices))), indices >= 0
         )
 
-    def _segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
+    def segments(self, keys: Keys) -> tuple[np.ndarray, np.ndarray]:
         """The numbers of the keys that segments begin at, (s,), and the samples of all keys with a say in each."""
         numbers = np.flatnonzero(np.arange(len(keys.indices)) < keys.last)
         return numbers, keys.windows(numbers, np.arange(-self.reach, 2 + self.reach))
@@ -276,7 +205,7 @@ class Search:
     def densified(self, keys: Keys, tolerance: float) -> Keys:
         """Keys with more of them where the motion is off, each where it is so most, until it keeps to the tolerance."""
         while keys.peak.max() > tolerance:
-            errors = self.costs.errors(self._segments(keys)[1])
+            errors = self.costs.errors(self.segments(keys)[1])
             of_segments = np.maximum.reduceat(errors, keys.indices)
             counts = np.diff(keys.indices, append=len(errors))
             worst = (errors == of_segments.repeat(counts)) & (errors > tolerance)

@@ -1,6 +1,7 @@
 """Key reduction: the few samples of a recording that, as keys of a mode, reproduce its motion.
 
-A key is a pose: all channels together. What is promised of them, and checked; `key_search` finds them.
+A key is a pose: all channels together. What is promised of them, and checked; `key_search` finds them, and
+`key_budget` so many of them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import check_flag, check_radius, check_recording, check_wishes
+from .key_budget import BudgetSearch
 from .key_search import Recording, Search
 from .modes import mode_named
 from .poses import Poses, numbers
@@ -42,16 +44,16 @@ def reduce_keys(
     radius : float
         Of the shell, in the unit of the positions; not below zero.
     budget : int, optional
-        The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find. In most cases
-        it is within a twentieth of what bisecting the tolerance reaches, in some up to a third above it; it takes about
-        the time of two or three searches, where bisecting takes that of eight or more.
+        The most keys, at least 2, instead of a tolerance: the error is then as small as a few tries find, mostly no
+        larger than what bisecting the tolerance reaches, and seldom more than a twentieth above it. With `rms` it may
+        be up to a third above it.
     rms : bool
         Go by the root mean square of the shell error instead of the largest.
     tries : int
         How many more searches there are, up to three: what they have found is put together. Each begins with fewer keys
         than the tolerance allows, and puts some back where the motion is off, which takes about half as long as the
         first search; under `rms` it keeps to another tolerance, and takes as long. With a budget, 0 is the first
-        search alone, and every try goes on from there with a smaller tolerance.
+        search alone, and every try lays the keys out anew; none begins once these have taken much longer than it.
 
     Returns
     -------
@@ -105,5 +107,7 @@ def reduce_keys(
     if len(times) <= 2:
         return np.arange(len(times))
     poses = Poses(poses.positions, align_signs(poses.quaternions), poses.scales)
-    search = Search(Recording(times, poses, mode, radius, tolerance or 1.0), rms=rms)
-    return search.within(tries) if tolerance is not None else search.within_budget(budget, tries)
+    recording = Recording(times, poses, mode, radius, tolerance or 1.0)
+    if tolerance is not None:
+        return Search(recording, rms=rms).within(tries)
+    return BudgetSearch(recording, budget, rms=rms).least(tries)

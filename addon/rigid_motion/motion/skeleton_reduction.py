@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from .bodies import Body
 from .checks import check_body, check_flag, check_poses, check_wishes
+from .key_budget import BudgetSearch
 from .key_costs import Recording
 from .key_search import Keys, Search
 from .modes import mode_named
@@ -78,8 +79,8 @@ def reduce_skeleton_keys(
         Key poses: all joints have keys at the same samples. Otherwise each has its own, the fewest in all.
     budget : int, optional
         The most keys, instead of a tolerance: key poses, at least 2, or keys of all joints together, at least 2 for
-        each. The error is then as small as can be found: for key poses as `reduce_keys` does, in two or three times
-        the time of one search; for keys of their own by bisecting the tolerance, in that of ten or so.
+        each. The error is then as small as can be found: for key poses as `reduce_keys` does, for keys of their own by
+        bisecting the tolerance, which takes the time of ten searches or so.
     weights : array-like, shape (joints,) or (joints, n), optional
         How many times the error of each joint counts, at each sample: more for feet that stand (see `standing`) and
         hands that hold, 0 for joints that do not matter. With a tolerance, a joint of weight 2 keeps to half of it.
@@ -162,8 +163,8 @@ def reduce_skeleton_keys(
 def _key_poses(body: Body, tolerance: float | None, budget: int | None, tries: int) -> np.ndarray:
     if len(body.times) <= 2:
         return np.arange(len(body.times))
-    search = Search(_WholeBody(body, tolerance or 1.0))
-    return search.within(tries) if tolerance is not None else search.within_budget(budget, tries)
+    recording = _WholeBody(body, tolerance or 1.0)
+    return Search(recording).within(tries) if tolerance is not None else BudgetSearch(recording, budget).least(tries)
 
 
 def _own_keys_within(body: Body, budget: int) -> tuple[np.ndarray, ...]:

@@ -12,7 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty
 
 from .. import animation
-from ..animation.transforms import Refused, Transform
+from ..animation.transforms import OWN_WORDS, Refused, Transform
 from ..animation.transforms.reaches import metres_per_unit
 from .on_targets import OnTargets
 from .rows import labelled
@@ -66,7 +66,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, target: Transfo
     text = iface_("Exact")
     if is_off:
         text = iface_("{distance} off").format(distance=length(scene, error / metres_per_unit(scene), precision=2))
-    row = labelled(layout, iface_("Subframes"))
+    row = labelled(layout, iface_("Subframes", OWN_WORDS))
     if target.is_part:
         row.label(text=text, translate=False)
     else:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 
+from ..animation.transforms import OWN_WORDS
 from .pose_operators import RIGID_MOTION_OT_copy_pose, RIGID_MOTION_OT_create_pose_asset
 from .targets import CURRENT, SELECTED, WHOLE, active_target, is_posing, modes_meant
 from .wording import LABELS, SHORT_LABELS
@@ -28,7 +29,7 @@ def _draw_modes(
     for mode in modes:
         # One tick where all is one; dots where modes are mixed.
         icon = no_icon if mode not in present else "CHECKMARK" if len(present) == 1 else "DOT"
-        text = iface_(labels[mode])
+        text = iface_(labels[mode], OWN_WORDS) if labels is SHORT_LABELS else iface_(labels[mode])
         properties = layout.operator("rigid_motion.set_mode", text=text, icon=icon, translate=False)
         properties.mode, properties.on = mode, scope
 

@@ -22,7 +22,7 @@ LABELS = {name: label for name, label, *_ in MODE_ITEMS}
 """Each mode as menus show it."""
 
 SHORT_LABELS = {name: KEYFRAME_MODES[name].short_label if name in KEYFRAME_MODES else LABELS[name] for name in LABELS}
-"""The same without the algebra, for pies and lists."""
+"""The same without the algebra, for pies and lists. Translated as `OWN_WORDS`: Blender has another Screw."""
 
 ALGEBRAS = {
     "Dual Quaternion": n_("Algebra: dual quaternions"),
@@ -111,11 +111,10 @@ def degrees(angle: float) -> str:
 
 
 def turn(segment: SegmentFacts) -> str:
-    """By how much a segment turns, to be read."""
-    angle = degrees(segment.turn)
+    """By how much a segment turns, to be read: in turns where there are whole ones, else in degrees."""
     if not segment.turns:
-        return angle
-    return iface_("{angle} ({turns} turns)").format(angle=angle, turns=f"{segment.turn / math.tau:.4g}")
+        return degrees(segment.turn)
+    return iface_("{turns} turns").format(turns=f"{segment.turn / math.tau:.3g}")
 
 
 def length(scene: bpy.types.Scene, units: float, precision: int = 4) -> str:
@@ -191,7 +190,8 @@ def _slides(scene: bpy.types.Scene, rig: WholeRig) -> str | None:
 def counted_modes(segments: Mapping[str, int]) -> list[str]:
     """Each mode with how many segments have it, most of them first."""
     return [
-        f"{count} {iface_(SHORT_LABELS[mode])}" for mode, count in sorted(segments.items(), key=lambda item: -item[1])
+        f"{count} {iface_(SHORT_LABELS[mode], OWN_WORDS)}"
+        for mode, count in sorted(segments.items(), key=lambda item: -item[1])
     ]
 
 

@@ -42,10 +42,15 @@ def scenario(hand: Hand) -> Steps[None]:
 
 def error() -> float:
     """How far any corner of the cube is off, at any eighth of a frame."""
+    return error_of(cube(), EIGHTHS)
+
+
+def error_of(obj: bpy.types.Object, frames: np.ndarray) -> float:
+    """How far any corner of an object is off, on any of these frames."""
     bpy.context.view_layer.update()
-    corners = np.array(cube().bound_box)[:, :, None]
+    corners = np.array(obj.bound_box)[:, :, None]
     places_of = [
         worlds[:, None, :3, :3] @ corners + worlds[:, None, :3, 3:]
-        for worlds in (shown_worlds([cube()], EIGHTHS)[0], expected_worlds(cube(), EIGHTHS))
+        for worlds in (shown_worlds([obj], frames)[0], expected_worlds(obj, frames))
     ]
     return float(np.linalg.norm(np.subtract(*places_of), axis=2).max())

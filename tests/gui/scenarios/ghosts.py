@@ -30,24 +30,20 @@ def bluish(hand: Hand, view: bpy.types.Area, name: str) -> Steps[int]:
 
 
 def scenario(hand: Hand) -> Steps[None]:
-    hand.window.workspace = bpy.data.workspaces["Animation"]
-    yield from hand.wait_until(lambda: hand.window.screen.name == "Animation", "the Animation workspace opens")
     view = hand.area("VIEW_3D")
     space = view.spaces.active.region_3d
     space.view_distance = 16.0
     settings = bpy.context.scene.rigid_motion_overlay
     sword_on_an_arm()
-    # The sidebar there has room for the unfolded panel.
-    sheet = hand.area("DOPESHEET_EDITOR")
-    yield from hand.open_sidebar(sheet, "Animation")
+    yield from hand.open_sidebar(view, "Animation")
     without = yield from bluish(hand, view, "without")
-    show = yield from hand.find_button(sheet, "UI", "show_paths", narrow=True)
+    show = yield from hand.find_button(view, "UI", "show_paths", narrow=True)
     yield from hand.click(show)
     assert settings.show_paths
     yield from hand.click((show[0] + 60, show[1]))  # the header, to unfold the panel
     path = yield from bluish(hand, view, "path-in-the-world")
     assert path > without + 200, (path, without)
-    ghosts = yield from hand.find_button(sheet, "UI", "show_ghosts", narrow=True)
+    ghosts = yield from hand.find_button(view, "UI", "show_ghosts", narrow=True)
     yield from hand.click(ghosts)
     assert settings.show_ghosts
     both = yield from bluish(hand, view, "ghosts")

@@ -124,7 +124,7 @@ def in_the_dope_sheet(hand: Hand, sheet: bpy.types.Area) -> Steps[None]:
     yield from hand.open_menu(sheet, "DOPESHEET_MT_key")
     yield from hand.press("UP_ARROW")
     yield from hand.press("RIGHT_ARROW")
-    yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 120, 920, 520))
+    yield from hand.picture("menu", (sheet.x, sheet.y + sheet.height - 120, 920, 620))
     yield from hand.choose("Screw (Dual Quaternion)")
     yield from hand.picture("panel-of-keys", places.box(places.region(sheet, "UI")))
     assert_modes({1: 2, 20: 0})

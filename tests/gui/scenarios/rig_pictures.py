@@ -1,4 +1,4 @@
-"""Rigify's human at a lever, twice, in Pose mode: what the chapter on rigs shows of a window, and that it is so."""
+"""Rigify's human at a lever, twice, in Pose Mode, with motion paths: the hand with Screw goes along an arc."""
 
 from __future__ import annotations
 

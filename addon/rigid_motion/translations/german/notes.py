@@ -21,7 +21,6 @@ NOTES = {
         "In der Delta-Transformation sind die Zwischenbilder, daher hält diese Änderung nur bis zum nächsten "
         "Einzelbild. Damit sie bleibt, unten „Delta-Transformation“ bearbeiten"
     ),
-    "Subframes": "Dazwischen",
     "Exact": "Genau",
     "{distance} off": "{distance} daneben",
     "Strips are blended here, and in-betweens of bones are approximate meanwhile. For exact ones, bake first": (
@@ -49,7 +48,7 @@ NOTES = {
     "Blender turns this segment by more than half a turn; the mode takes the short way. "
     "With Turns set to -1 it takes the long one": (
         "Blender dreht in diesem Segment um mehr als eine halbe Umdrehung; der Modus nimmt den kurzen Weg. "
-        "Für den langen Weg die Umdrehungen auf -1 setzen"
+        "Für den langen Weg die Runden auf -1 setzen"
     ),
     "Two angles go by more than half a turn here; whole turns are made about the axis of the larger one. "
     "For both, set a key in between": (
@@ -66,7 +65,7 @@ NOTES = {
     ),
     "Hidden by Viewport Overlays": "Durch die Überlagerungen des Ansichtsfensters ausgeblendet",
     # Rows
-    "{angle} ({turns} turns)": "{angle} ({turns} Umdrehungen)",
+    "{turns} turns": "{turns} Runden",
     "{error} at most": "höchstens {error}",
     "{before} to {after} keys": "{before} auf {after} Schlüsselbilder",
     "{frames} with keys": "{frames} mit Schlüsselbildern",

@@ -1,0 +1,121 @@
+"""The search for so many keys that are as near to a recording as can be.
+
+Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times;
+for its mean square some more are put in, moved, and as many taken out.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .key_costs import Recording
+from .key_links import traded_keys
+from .key_search import ROUNDS, Keys, Search
+from .key_spread import moved_together, spread_keys
+
+SPREAD = 6, 8
+"""Candidates for each key of a budget, at least and at most, when its keys are first laid out anew."""
+
+SPARSER = 3
+"""How many times as few candidates there are from then on."""
+
+MIDDLE = 10, 50
+"""Samples for each key, between which there is time for every step.
+
+Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
+at samples takes so long that another try is worth more.
+"""
+
+ENOUGH = 7.5, 10.0, 15.0
+"""Times the poses that the first keys have taken, after which no try begins: below the middle, there and above."""
+
+TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
+"""How keys are moved together, by the reach of the mode: places for each, and how near to one another.
+
+Outside the middle the first two are done.
+"""
+
+SWAPPED = 1.15
+"""How many times the budget keys may be in between, for the mean square, to find better places."""
+
+
+class BudgetSearch(Search):
+    """The search for a number of keys, under one mode: for the largest error, or with `rms` for its mean square."""
+
+    def __init__(self, recording: Recording, budget: int, *, rms: bool = False) -> None:
+        super().__init__(recording, rms=rms)
+        self.budget = budget
+
+    def least(self, tries: int) -> np.ndarray:
+        """So many samples that are keys with as small an error as can be found."""
+        count = len(self.recording.times)
+        least, most = (self.budget * spread for spread in SPREAD)
+        keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
+        candidates = keys.indices
+        keys = self.thinned(keys, math.inf, self.budget)
+        if self.power == 2:
+            return self._least_squares(self._settled(keys), tries)
+        return self._least_peak(keys, candidates, tries) if tries else self._settled(keys).indices
+
+    def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
+        """The keys with the smallest largest error of all that tries lead to from some."""
+        length = int(np.searchsorted(MIDDLE, len(self.recording.times) / self.budget, side="right"))
+        enough, is_middle = ENOUGH[length] * self.costs.looked, length == 1
+        best = samples = (self.moved(keys, math.inf) if is_middle else keys).indices
+        for number in range(tries):
+            if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
+                break
+            laid_out = spread_keys(self.costs, candidates[:: SPARSER if number else 1], samples, self.budget)
+            samples = self._filled(self.measured(laid_out)).indices
+            for ways, part in TOGETHER[self.reach][: None if is_middle else 2]:
+                samples = moved_together(self.costs, samples, ways, part)
+                best = min(best, samples, key=self.costs.peak)
+        return best
+
+    def _least_squares(self, best: Keys, tries: int) -> np.ndarray:
+        """The same for the mean square, from keys that are many enough."""
+        found = [best.indices]
+        links = tries and self.is_linkable  # The last try.
+        for _ in range(tries - bool(links)):
+            # Some more where the motion is off most, moved together.
+            more = self._filled(self.measured(best.indices), math.ceil(SWAPPED * self.budget))
+            more = self.moved(more, math.inf)
+            found.append(more.indices)
+            best = self._better_of(best, more)
+        if links:
+            traded = traded_keys(self.costs, found, budget=self.budget)
+            best = self._better_of(best, self.measured(traded))
+        return best.indices
+
+    def _better_of(self, best: Keys, other: Keys) -> Keys:
+        """Of keys and others, brought to the budget, those with the smaller sum of squares."""
+        keys = self.measured(other.indices)
+        if len(keys.indices) > self.budget:
+            keys = self.thinned(keys, math.inf, self.budget)
+        keys = self.moved(self._filled(self.moved(keys, math.inf)), math.inf)
+        return keys if keys.cost.sum() < best.cost.sum() else best
+
+    def _settled(self, keys: Keys) -> Keys:
+        """Keys moved to where the sum of the powers of errors is least."""
+        for _ in range(ROUNDS):
+            before = keys.cost.sum()
+            keys = self.moved(keys, math.inf)
+            if not keys.cost.sum() < 0.99 * before:
+                break
+        return keys
+
+    def _filled(self, keys: Keys, most: int | None = None) -> Keys:
+        """Keys with more of them where the motion is off most, as many as the budget, or this, has left."""
+        most = min(most or self.budget, len(self.recording.times))
+        while (left := most - len(keys.indices)) > 0:
+            errors = self.costs.errors(self.segments(keys)[1])
+            errors[keys.indices] = -1.0
+            order = np.argsort(-errors, kind="stable")
+            segments = np.searchsorted(keys.indices, order, side="right")
+            # The first of each segment is where it is off most.
+            worst = order[np.sort(np.unique(segments, return_index=True)[1])]
+            worst = worst[errors[worst] >= 0.0][: (left + 1) // 2]
+            keys = self.measured(np.union1d(keys.indices, worst))
+        return keys
