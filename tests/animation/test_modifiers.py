@@ -435,3 +435,22 @@ def test_the_mode_channel_may_be_stepped_along_with_the_others(live_file):
     shown = shown_worlds([obj], PLAYED)[0]
     muted.mute = True
     assert_same(shown, expected(obj, at))
+
+
+@pytest.mark.parametrize("kind", ["stepped", "noise"])
+def test_a_bake_has_every_round_of_cycles_as_it_was_seen(live_file, kind):
+    obj = key(new_object(), seed=3)
+    set_mode(obj, "dq_sclerp")
+    modify(channels(obj), "CYCLES", mode_before="MIRROR")
+    if kind == "stepped":
+        modify(channels(obj), "STEPPED", frame_step=7.0)
+    else:
+        modify([curves_of(obj)["location", 0]], "NOISE", strength=0.5, scale=6.0)
+    bpy.context.scene.frame_end = 90
+    bpy.context.view_layer.update()
+    frames = np.arange(1.0, 91.0)
+    (before,), keyed = shown_worlds([obj], frames), snapshot(obj)
+    bake(obj)
+    assert_same(shown_worlds([obj], frames)[0], before)
+    unbake(obj)
+    assert snapshot(obj) == keyed

@@ -188,7 +188,7 @@ def is_baked(target: Target) -> bool:
 def _widened(transform: Transform, source: Source, first: float | None, last: float | None) -> tuple[float, float]:
     """The range from key to key that has the frames from first to last in it, and what hangs together with them."""
     keys = source.key_frames
-    if source.repeats:
+    if _may_repeat(source):
         # Cycles go on from the outermost keys: what lies in between is baked as a whole.
         return source.keyed_range
     if source.goes_on:
@@ -213,6 +213,11 @@ def _widened(transform: Transform, source: Source, first: float | None, last: fl
     return float(keys[begin]), float(keys[end])
 
 
+def _may_repeat(source: Source) -> bool:
+    """Whether cycles of what is baked show every round: holds and what is added need not be alike in all of them."""
+    return source.repeats and not source.steps and not source.modified
+
+
 def _frames(source: Source, begin: float, end: float, step: float) -> np.ndarray:
     """Every step from begin to end, and the keys in between."""
     keys = source.key_frames
@@ -231,7 +236,7 @@ def _bake_place(
     copy = move_by_copy(transform, place, BAKED)
     fcurves = copy.channelbag.fcurves
     driven = {transform.channels[row] for row in source.driven}
-    cycles = source.cyclic.cycles if source.cyclic is not None and source.repeats else None
+    cycles = source.cyclic.cycles if source.cyclic is not None and _may_repeat(source) else None
     for path, values in channel_values(transform, source, motion, added).items():
         for index, column in enumerate(values.T):
             if (path, index) in driven:

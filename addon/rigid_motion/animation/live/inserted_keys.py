@@ -40,7 +40,7 @@ from ..compute.turning import needs_turning
 from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Transform
 from ..writers.table import writer_of
-from .kept_timing import Insertion, keep_timing, mark_breakdown
+from .kept_timing import Insertion, keep_timing, mark_breakdown, nearest_key
 from .operators import Operators
 
 MOST_INSERTED = 256
@@ -277,13 +277,11 @@ def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: 
 
 def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
     """Give a key this value, handles along with it; insert one that the channel lacks."""
-    keys = fcurve.keyframe_points
-    for key in keys:
-        if abs(key.co.x - frame) < SAME_FRAME:
-            key.co_ui.y = value
-            break
+    keys, (number, times) = fcurve.keyframe_points, nearest_key(fcurve, frame)
+    if len(times) and abs(times[number] - frame) < SAME_FRAME:
+        keys[number].co_ui.y = value
     else:
-        before = max((key for key in keys if key.co.x < frame), key=lambda key: key.co.x, default=None)
+        before = keys[int(np.where(times < frame, times, -np.inf).argmax())] if (times < frame).any() else None
         # Read first: an insertion moves the other keys elsewhere in memory.
         eased = None if before is None else (before.interpolation, before.easing)
         key = keys.insert(frame, value)

@@ -63,13 +63,21 @@ class _Channel:
         (before.handle_right, new.handle_left), (new.handle_right, behind.handle_left) = inner
 
 
+def nearest_key(fcurve: bpy.types.FCurve, frame: float) -> tuple[int, np.ndarray]:
+    """Return the number of the key that is nearest to a frame, 0 where there is none, and the times of all (n,)."""
+    points = np.empty(2 * len(fcurve.keyframe_points), np.float32)
+    fcurve.keyframe_points.foreach_get("co", points)
+    times = points[::2]
+    return int(np.abs(times - frame).argmin()) if len(times) else 0, times
+
+
 def mark_breakdown(curves: Iterable[bpy.types.FCurve], old: Source, frame: float) -> None:
     """Make a new key a breakdown, where the path would be another one with a key more that shapes it."""
     if old.cyclic is None and old.mode_at(frame) in DEPENDS_ON_KEYS:
         for fcurve in curves:
-            for key in fcurve.keyframe_points:
-                if abs(key.co.x - frame) < SAME_FRAME:
-                    key.type = "BREAKDOWN"
+            number, times = nearest_key(fcurve, frame)
+            if len(times) and abs(times[number] - frame) < SAME_FRAME:
+                fcurve.keyframe_points[number].type = "BREAKDOWN"
 
 
 @dataclass(frozen=True)
@@ -147,11 +155,10 @@ def _keep_timing(inserted: Insertion, progress: np.ndarray) -> None:
 
 def _keys_on(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[bpy.types.Keyframe] | None:
     """The keys on three frames, if there are any and none between them."""
-    points = fcurve.keyframe_points
-    at = min(range(len(points)), key=lambda place: abs(points[place].co.x - frames[1]))
-    keys = points[max(at - 1, 0) : at + 2]
-    apart = (abs(key.co.x - frame) for key, frame in zip(keys, frames, strict=False))
-    return keys if len(keys) == 3 and max(apart) < SAME_FRAME else None
+    at, times = nearest_key(fcurve, frames[1])
+    beside = slice(max(at - 1, 0), at + 2)
+    is_beside = len(times[beside]) == 3 and np.abs(times[beside] - frames).max() < SAME_FRAME
+    return fcurve.keyframe_points[beside] if is_beside else None
 
 
 def _handles_of(keys: Keys, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

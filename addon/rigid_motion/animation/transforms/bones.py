@@ -37,8 +37,8 @@ class BoneTransform(Transform):
         "{name} is linked from another file: make an override of it first (Object > Library Override > Make)"
     )
     differing_text = n_(
-        "{name} moves by the same Action slot as {leader}, but has another rotation mode or Local Location; the "
-        "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+        "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver or Local Location; "
+        "the in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
     )
     placed_by = ("TRANSFORM_OT_",)
     stored_by = (

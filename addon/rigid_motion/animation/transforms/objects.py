@@ -49,8 +49,8 @@ class ObjectTransform(Transform):
     plural = "objects"
     linked_text = LINKED
     differing_text = n_(
-        "{name} moves by the same Action slot as {leader}, but has another rotation mode or delta transform; the "
-        "in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
+        "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver or delta transform; "
+        "the in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)"
     )
     placed_by = ("TRANSFORM_OT_", "VIEW3D_OT_snap_", "OBJECT_OT_align")
     stored_by = ()

@@ -65,17 +65,17 @@ REFUSALS = {
         "{name} ist aus einer anderen Datei verknüpft: zuerst überschreiben "
         "(Objekt > Bibliothek überschreiben > Erstellen)"
     ),
-    "{name} moves by the same Action slot as {leader}, but has another rotation mode or delta transform; "
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver or delta transform; "
     "the in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)": (
-        "{name} wird von demselben Slot einer Aktion bewegt wie {leader}, hat aber einen anderen Rotationsmodus oder "
-        "eine andere Delta-Transformation; die Zwischenbilder sind die von {leader}: eine eigene Aktion geben "
-        "(Objekt > Beziehungen > Einzelnen Benutzer erstellen)"
+        "{name} wird von demselben Slot einer Aktion bewegt wie {leader}, hat aber einen anderen Rotationsmodus, "
+        "einen anderen Treiber oder eine andere Delta-Transformation; die Zwischenbilder sind die von {leader}: "
+        "eine eigene Aktion geben (Objekt > Beziehungen > Einzelnen Benutzer erstellen)"
     ),
-    "{name} moves by the same Action slot as {leader}, but has another rotation mode or Local Location; "
+    "{name} moves by the same Action slot as {leader}, but has another rotation mode, driver or Local Location; "
     "the in-betweens are those of {leader}: give it an Action of its own (Object > Relations > Make Single User)": (
-        "{name} wird von demselben Slot einer Aktion bewegt wie {leader}, hat aber einen anderen Rotationsmodus oder "
-        "eine andere „Lokale Position“; die Zwischenbilder sind die von {leader}: eine eigene Aktion geben "
-        "(Objekt > Beziehungen > Einzelnen Benutzer erstellen)"
+        "{name} wird von demselben Slot einer Aktion bewegt wie {leader}, hat aber einen anderen Rotationsmodus, "
+        "einen anderen Treiber oder eine andere „Lokale Position“; die Zwischenbilder sind die von {leader}: "
+        "eine eigene Aktion geben (Objekt > Beziehungen > Einzelnen Benutzer erstellen)"
     ),
     # Channels that rigid in-betweens cannot follow
     "{name} turns by axis and angle, which has no rigid in-betweens: "
