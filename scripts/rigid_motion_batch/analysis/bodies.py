@@ -115,6 +115,12 @@ class BodyErrors:
     slide: float
     """The farthest that a joint which stands on the ground in the recording gets from where it began to stand."""
 
+    largest: np.ndarray
+    """The largest error of any joint in position, in metres, and in rotation, in degrees, shape (2, n)."""
+
+    places: np.ndarray
+    """Where the mode puts the joints, in metres with z up, single precision, shape (joints, n, 3)."""
+
     @property
     def worst(self) -> tuple[int, int]:
         """The joint and the sample of the largest error."""
@@ -184,12 +190,16 @@ def measure_body(made: BodyReconstruction, mode: str, radius: float | np.ndarray
     shell = np.empty((len(made.skeleton), stop - start))
     squares = np.zeros((3, len(made.skeleton)))
     feet = np.empty((len(ground.joints), stop - start, 3))
+    largest = np.empty((2, stop - start))
+    places = np.empty((len(made.skeleton), stop - start, 3), dtype=np.float32)
     for block in _blocks(made.samples, overlap=1):
         times = made.clip.times[block]
         shown = made.shown(mode, times)
         errors = measure(times, shown, made.truth(block), radius)
         own = slice(block.start - start, block.stop - start)
-        shell[:, own], feet[:, own] = errors.shell, _upright(made, shown[ground.joints])
+        places[:, own] = upright = _upright(made, shown)
+        shell[:, own], feet[:, own] = errors.shell, upright[ground.joints]
+        largest[:, own] = errors.position.max(axis=0), np.degrees(errors.rotation).max(axis=0)
         # The first sample of a block is the last of the one before, where velocities begin.
         new = slice(int(block.start > start), None)
         squares += [
@@ -197,7 +207,7 @@ def measure_body(made: BodyReconstruction, mode: str, radius: float | np.ndarray
         ]
     counts = np.array([stop - start, stop - start, stop - start - 1.0])
     position, rotation, velocity = np.sqrt(squares / counts[:, None])
-    return BodyErrors(shell, position, rotation, velocity, slide(feet, ground.stands))
+    return BodyErrors(shell, position, rotation, velocity, slide(feet, ground.stands), largest, places)
 
 
 def moving(clip: Clip) -> np.ndarray:

@@ -107,15 +107,16 @@ def measure_modes(made: BodyReconstruction, radius: Radii) -> MeasuredBody:
     shown: dict[str, ModeOfBody] = {}
     for mode in made.keys:
         errors = measure_body(made, mode, radius, ground)
-        rows[mode] = _row_of(made, mode, errors, ground)
-        joints[mode] = tuple(_rows_of_joints(made, mode, errors))
+        rows[mode] = row_of_body(made, mode, errors, ground)
+        joints[mode] = tuple(joint_rows(made, mode, errors))
         if mode in (group[0] for group in groups):
             shown[mode] = _shown_of(made, mode, errors)
     every = tuple(row for mode in made.keys for row in joints[mode])
     return MeasuredBody(made, tuple(rows.values()), every, groups, shown)
 
 
-def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
+def row_of_body(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
+    """Return the row of a mode in `metrics.csv`."""
     clip, choice, times = made.clip, made.choice, made.times
     duration = float(times[-1] - times[0])
     keys = made.keys[mode]
@@ -148,7 +149,8 @@ def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Gro
     )
 
 
-def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
+def joint_rows(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
+    """Return the rows of a mode in `metrics_joints.csv`."""
     clip, choice, times = made.clip, made.choice, made.times
     worst = errors.shell.argmax(axis=1)
     root_mean_squares = np.sqrt(np.mean(np.square(errors.shell), axis=1))

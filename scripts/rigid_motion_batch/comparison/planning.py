@@ -21,8 +21,8 @@ from rigid_motion_batch.analysis.choices import Choice, choice_parts, fewest_key
 from rigid_motion_batch.analysis.metrics import body_table_names, table_names
 from rigid_motion_batch.analysis.modes import single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
-from rigid_motion_batch.analysis.storage import ClipReference, file_names, read_facts, read_times
 from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.comparison.storage import ClipReference, file_names, read_facts, read_times
 from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS

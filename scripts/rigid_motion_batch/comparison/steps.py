@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigid_motion_batch.analysis.choices import Choice, choice_from
-from rigid_motion_batch.analysis.storage import (
+from rigid_motion_batch.comparison.storage import (
     ClipReference,
     file_names,
     read_clip,
@@ -25,7 +25,7 @@ from rigid_motion_batch.workplan import Job, TaskError, step
 if TYPE_CHECKING:
     from rigid_motion_batch.analysis.metrics import Metrics
     from rigid_motion_batch.analysis.needed import KeysNeeded, Ways
-    from rigid_motion_batch.analysis.results import ClipResults
+    from rigid_motion_batch.comparison.results import ClipResults
 
     from .report.clip_section import Films
 
@@ -155,7 +155,7 @@ def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: 
     """Choose keys of a clip, let the modes fill them in, and measure what was lost."""
     from rigid_motion_batch.analysis.metrics import write_reconstruction
     from rigid_motion_batch.analysis.reconstructions import reconstruct
-    from rigid_motion_batch.analysis.results import Result, write_result
+    from rigid_motion_batch.comparison.results import Result, write_result
 
     from .report.error_charts import errors_over_time
 
@@ -183,10 +183,10 @@ def measure_body(
     """Choose keys of a whole body, let the modes fill them in, and measure what was lost."""
     from rigid_motion_batch.analysis.bodies import reconstruct_body
     from rigid_motion_batch.analysis.body_metrics import measure_modes, write_joint_metrics, write_key_tables
-    from rigid_motion_batch.analysis.body_storage import write_body_keys
     from rigid_motion_batch.analysis.metrics import body_table_names
     from rigid_motion_batch.analysis.radii import Radii
-    from rigid_motion_batch.analysis.results import Result, write_result
+    from rigid_motion_batch.comparison.body_storage import write_body_keys
+    from rigid_motion_batch.comparison.results import Result, write_result
 
     from .report.body_charts import body_charts, body_curves
 
@@ -212,9 +212,9 @@ def decimate_body(
 ) -> None:
     """See what Blender's Decimate needs to be as good as the keys of a whole body under each mode."""
     from rigid_motion_batch.analysis.body_decimated import write_keys_of_bodies
-    from rigid_motion_batch.analysis.body_storage import read_body_keys
     from rigid_motion_batch.analysis.radii import Radii
-    from rigid_motion_batch.analysis.results import read_numbers
+    from rigid_motion_batch.comparison.body_storage import read_body_keys
+    from rigid_motion_batch.comparison.results import read_numbers
     from rigid_motion_batch.scenes.decimating import beside_decimate
 
     from .report.decimated_table import decimated_table
@@ -348,8 +348,8 @@ def build_body(
     stage: Mapping[str, Any],
 ) -> None:
     """Build the stage of a film of whole bodies, and save it."""
-    from rigid_motion_batch.analysis.body_storage import read_body_keys
     from rigid_motion_batch.analysis.radii import Radii
+    from rigid_motion_batch.comparison.body_storage import read_body_keys
     from rigid_motion_batch.scenes.body_scene import build_body_stage
     from rigid_motion_batch.scenes.film import save_blend
     from rigid_motion_batch.scenes.settings import StageSettings
@@ -413,7 +413,7 @@ class Clips:
         self._studies = [(clip, [choice_from(*choice) for choice in choices]) for clip, choices in studies]
 
     def __iter__(self) -> Iterator[ClipResults]:
-        from rigid_motion_batch.analysis.results import ClipResults, read_result
+        from rigid_motion_batch.comparison.results import ClipResults, read_result
 
         for clip, choices in self._studies:
             read = [

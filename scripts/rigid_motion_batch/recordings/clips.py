@@ -14,6 +14,18 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.recordings.figures import Figure
 
 
+@dataclass(frozen=True)
+class ClipWarning:
+    """What changes the meaning of the numbers, and what to do about it."""
+
+    text: str
+    way_out: str
+    start_s: float | None = None
+    """Where in the recording that is, in seconds of its times; None where it is everywhere."""
+
+    end_s: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Clip:
     """One body of one recording, of n samples."""
@@ -47,6 +59,8 @@ class Clip:
 
     rate: float | None = None
     """Samples a second, where there may be more between these."""
+
+    warnings: tuple[ClipWarning, ...] = ()
 
     @property
     def samples_a_second(self) -> float:

@@ -23,9 +23,9 @@ from rigid_motion_batch.analysis.body_metrics import (
     write_joint_metrics,
     write_key_tables,
 )
-from rigid_motion_batch.analysis.body_storage import read_body_keys, write_body_keys
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import body_table_names, write_metrics
+from rigid_motion_batch.comparison.body_storage import read_body_keys, write_body_keys
 from rigid_motion_batch.rows import meant
 from tests.scripts.comparison.bodies import JOINTS, swinging_body
 

@@ -21,7 +21,6 @@ from rigid_motion_batch.analysis.choices import (
 )
 from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.reconstructions import reconstruct
-from rigid_motion_batch.analysis.storage import ClipReference, file_names, write_recording
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.planning import (
     MOST_POSES,
@@ -34,6 +33,7 @@ from rigid_motion_batch.comparison.planning import (
     without_films,
 )
 from rigid_motion_batch.comparison.report.pages import ON_ONE_PAGE, Settings
+from rigid_motion_batch.comparison.storage import ClipReference, file_names, write_recording
 from rigid_motion_batch.recordings import ReadingOptions
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.clips import Clip

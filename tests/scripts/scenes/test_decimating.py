@@ -17,13 +17,13 @@ from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_b
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED, KeysOfBody
 from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
-from rigid_motion_batch.analysis.storage import ClipReference
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.cli import compare
 from rigid_motion_batch.cli.job_bundle import _kind_of
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.planning import MOST_DECIMATED, Study, comparison_tasks, reading_tasks
 from rigid_motion_batch.comparison.report.decimated_table import decimated_table
+from rigid_motion_batch.comparison.storage import ClipReference
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure
 from rigid_motion_batch.scenes import decimated_bodies, graph_decimate

@@ -15,7 +15,7 @@ from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import NOTHING, Metrics
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.reconstructions import joint_groups
-from rigid_motion_batch.analysis.results import ClipResults, Result, SegmentModes
+from rigid_motion_batch.comparison.results import ClipResults, Result, SegmentModes
 
 from .charts import axis_over, line_chart
 from .elements import curve, heading, is_best, label, mode_cell, number_cell, rate_axis, rounded, table

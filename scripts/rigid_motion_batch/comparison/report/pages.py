@@ -24,7 +24,7 @@ from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.modes import REFERENCE, description_of, label_of, single_modes
 from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.radii import JOINT
-from rigid_motion_batch.analysis.results import ClipResults, Result
+from rigid_motion_batch.comparison.results import ClipResults, Result
 from rigid_motion_batch.files import replacing
 
 from .clip_section import Films, clip_section, film_name

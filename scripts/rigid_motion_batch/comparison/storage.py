@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion import Poses
+from rigid_motion_batch.analysis.choices import Choice
+from rigid_motion_batch.analysis.reconstructions import Reconstruction, fill_in
 from rigid_motion_batch.files import write_text, written_beside
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure, Skin
-
-from .choices import Choice
-from .reconstructions import Reconstruction, fill_in
 
 SEGMENT_MODES = "segment modes"
 """Among the names of modes, none of which has a blank."""

@@ -10,7 +10,7 @@ from rigid_motion.motion import MODES, Poses
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
-from rigid_motion_batch.analysis.storage import (
+from rigid_motion_batch.comparison.storage import (
     ClipReference,
     file_names,
     read_clip,

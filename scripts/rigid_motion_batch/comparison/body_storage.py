@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rigid_motion_batch.analysis.bodies import BodyReconstruction
+from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.files import written_beside
 from rigid_motion_batch.recordings.clips import Clip
-
-from .bodies import BodyReconstruction
-from .choices import Choice
 
 COUNTS = "counts"
 """Behind the name of a mode and a blank: how many keys each joint has."""

@@ -7,7 +7,7 @@ from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.needed import OfRigidBody, from_json, keys_needed, to_json, write_keys_needed
 from rigid_motion_batch.analysis.reconstructions import joint_groups, reconstruct
-from rigid_motion_batch.analysis.results import ClipFacts, Result, read_result, write_result
+from rigid_motion_batch.comparison.results import ClipFacts, Result, read_result, write_result
 from tests.scripts.comparison.recordings import swinging_clip
 
 
