@@ -205,12 +205,12 @@ def _is_passed(obj: Carrier, keys: np.ndarray, number: int) -> bool:
     before, mode = (mode_at(obj, frame) for frame in keys[[number - 1, number]])
     curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
     curves = [curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute]
-    if not 0 < number < len(keys) - 1 or before != mode or _may_spin(obj):
+    if not 0 < number < len(keys) - 1 or before != mode or may_spin(obj):
         return False
     return lies_on_path(curves, keys[number], mode)
 
 
-def _may_spin(obj: Carrier) -> bool:
+def may_spin(obj: Carrier) -> bool:
     """Whether it has turns, or an angle that goes by half a turn or more from one of its keys to the next."""
     turns = curve_of(obj, "rigid_motion.turns")
     if turns is not None and len(turns.keyframe_points) and not turns.mute:
