@@ -116,6 +116,11 @@ def shapes_path(carrier: Carrier, frame: float) -> bool:
     return mode_at(carrier, frame) in DEPENDS_ON_KEYS and may_spin(carrier)
 
 
+def is_seen_exactly(carrier: Carrier, frame: float) -> bool:
+    """Whether it is seen where it has to be on this frame: objects are between frames only where that is asked for."""
+    return frame % 1.0 == 0.0 or isinstance(carrier, bpy.types.PoseBone) or carrier.rigid_motion.is_exact
+
+
 class Editing(RuleBasedStateMachine):
     """An animator at work on carriers of keys. What they are, machines say that are derived from it."""
 
@@ -228,7 +233,7 @@ class Editing(RuleBasedStateMachine):
         keys = key_frames(obj)
         held, settable = self._holds_pose(obj, frame), self._has_keys_for_any_pose(obj)
         goes_on_as_before = held and not posed and is_timed_together(obj, frame) and not shapes_path(obj, frame)
-        goes_by = np.arange(keys[0], keys[-1], 0.5) if goes_on_as_before else ()
+        goes_by = np.arange(keys[0], keys[-1], 0.5) if goes_on_as_before and is_seen_exactly(obj, frame) else ()
         before = expected_bases(obj, goes_by, self.owns.get(name))
         moved = self._is_posed(obj)
         if posed:

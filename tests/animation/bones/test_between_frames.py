@@ -56,7 +56,7 @@ def test_keys_off_whole_frames_are_hit(live_file, mode, order):
 
 
 @pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
-@pytest.mark.parametrize("part", [0, 2, 3])
+@pytest.mark.parametrize("part", range(len(OFF_WHOLE_FRAMES) - 1))
 def test_a_single_segment_with_a_mode_may_begin_and_end_off_whole_frames(live_file, part, order):
     rig = key_all(new_rig(rotation_mode=order), OFF_WHOLE_FRAMES)
     set_mode(list(rig.pose.bones), "dq_sclerp", [OFF_WHOLE_FRAMES[part]])
