@@ -59,6 +59,8 @@ def refresh_places(
         keyed = dict(zip(with_modes, keyed_in(with_modes), strict=True))
         sources = [keyed.get(place) for place in places]
     stale, idle, emptied, keyed_anew = [], [], [], []
+    read = [(recorded_digest(place), source) for place, source in zip(places, sources, strict=True)]
+    inserted.look_at(((before, source) for before, source in read if isinstance(source, Source)), frame)
     for place, source in zip(places, sources, strict=True):
         if place.slot.action.is_editable:
             leave_other_way(place)

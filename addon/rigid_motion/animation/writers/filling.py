@@ -259,7 +259,7 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
                 else:
                     begin, end = min(begin, first), max(end, last)
         # Those of a draft are going to lie outside again.
-        if begin <= end and (is_draft(action) or any(_is_outside(fcurve, begin, end) for fcurve in samples)):
+        if begin <= end and ((samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)):
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
@@ -268,7 +268,7 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
         elif was_set_for_samples:
             action.use_frame_range = motion.range_is_ours = False
         if not samples and motion.has_longer:
-            motion.has_longer = False
+            motion.has_longer = motion.is_draft = False
 
 
 def _has_range(fcurve: bpy.types.FCurve) -> bool:
