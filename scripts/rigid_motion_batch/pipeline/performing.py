@@ -166,6 +166,12 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     return done
 
 
+def write_progress(order: Order, share: float, doing: str) -> None:
+    """Say how far an order is to whoever asks `progress_of`."""
+    with suppress(OSError):
+        Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
+
+
 def progress_of(order: Order) -> tuple[float, str] | None:
     """How far an order is that is done elsewhere, and what is being done; None where nothing is known."""
     try:
@@ -191,8 +197,7 @@ def _writing(order: Order) -> Callable[[float, str], None]:
         nonlocal said_at
         if time.monotonic() - said_at >= INTERVAL:
             said_at = time.monotonic()
-            with suppress(OSError):
-                Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
+            write_progress(order, share, doing)
 
     return tell
 
