@@ -114,7 +114,7 @@ class ExecutorError(Exception):
     """Why nothing can be done by these means, and the way out, in one line."""
 
 
-def perform(order: Order, tell: Callable[[float, str], object] | None = None) -> Made | Failed:
+def perform(order: Order, tell: Callable[[float, str], object] | None = None) -> Made | Failed | Lost:
     """Do a task. Its folder is there afterwards if it was made, and only then.
 
     Parameters
@@ -130,7 +130,7 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         tell or _writing(order),
     )
     started = time.perf_counter()
-    done: Made | Failed | None = None
+    done: Made | Failed | Lost | None = None
     try:
         for one in order.inputs:
             if os.path.exists(one.path) and not os.path.isfile(one.path):
@@ -149,6 +149,8 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         done = Made(order.folder, index, job.notes)
     except TaskError as error:
         done = Failed(str(error), notes=job.notes)
+    except ChildProcessError as error:
+        done = Lost(str(error))
     except OSError as error:
         where = f"{_shown(error.filename, order)}: " if error.filename else ""
         own = str(error.filename or "").startswith(order.output)
