@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch import reproduce_paper
+from research import reproduce_paper
+from research.paper import bodies
+from research.paper.bodies import FILES
+from research.paper.bodies_section import HEADING
+from research.paper.motions import recordings_in
+from research.paper.steps import plan, plan_bodies
 from rigid_motion_batch.comparison.version import READER
-from rigid_motion_batch.paper import bodies
-from rigid_motion_batch.paper.bodies import FILES
-from rigid_motion_batch.paper.bodies_section import HEADING
-from rigid_motion_batch.paper.motions import recordings_in
-from rigid_motion_batch.paper.steps import plan, plan_bodies
 from tests.recordings import RECORDINGS
 from tests.scripts.bvh_bodies import write_body
 
@@ -173,14 +173,14 @@ def test_of_other_peoples_bodies_hands_feet_and_heads_are_found() -> None:
 
 
 def test_what_takes_long_is_not_done_again_for_another_wording() -> None:
-    used = READER.sources_of("rigid_motion_batch.paper.body_steps:count_key_poses").files
-    assert "rigid_motion_batch/paper/bodies.py" in used
-    assert "rigid_motion_batch/comparison/study/body_needed.py" in used
+    used = READER.sources_of("research.paper.body_steps:count_key_poses").files
+    assert "research/paper/bodies.py" in used
+    assert "rigid_motion_batch/analysis/body_needed.py" in used
     assert (
         not {
-            "rigid_motion_batch/paper/bodies_section.py",
-            "rigid_motion_batch/paper/page.py",
-            "rigid_motion_batch/paper/steps.py",
+            "research/paper/bodies_section.py",
+            "research/paper/page.py",
+            "research/paper/steps.py",
         }
         & used
     )

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from research import reproduce_paper
+from research.paper import sending, steps, table, timing
 from rigid_motion.motion import MODES
-from rigid_motion_batch import reproduce_paper
-from rigid_motion_batch.paper import sending, steps, table, timing
 from rigid_motion_batch.streaming import TWISTS
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
