@@ -291,7 +291,8 @@ class DaskExecutor:
         while self._workers and self._waiting:
             order = self._waiting.pop(0)
             key = f"{order.step.function.__name__}-{uuid.uuid4().hex[:8]}"
-            future = self._client.submit(do, order, self._session, key=key, workers=self.workers, pure=False)
+            asked = replace(order, here=os.getcwd())
+            future = self._client.submit(do, asked, self._session, key=key, workers=self.workers, pure=False)
             self._at_work[future] = order, frozenset(self._workers)
             future.add_done_callback(self._ended.put)
 

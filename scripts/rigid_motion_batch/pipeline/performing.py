@@ -51,6 +51,9 @@ class Order:
     blender: str = ""
     """The program that does it, if that is not to be this one."""
 
+    here: str = ""
+    """The folder that relative inputs start from, where that is not the current one."""
+
 
 @dataclass(frozen=True)
 class Told:
@@ -132,6 +135,8 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     started = time.perf_counter()
     done: Made | Failed | Lost | None = None
     try:
+        if order.here and os.path.isdir(order.here):
+            os.chdir(order.here)
         for one in order.inputs:
             if os.path.exists(one.path) and not os.path.isfile(one.path):
                 raise TaskError(f"{one.path}: this is no file, but a folder, pipe or device; give a file")
@@ -143,7 +148,7 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         files = {path.relative_to(job.folder).as_posix(): path for path in sorted(job.folder.rglob("*"))}
         files = {name: _state_of(path) for name, path in files.items() if not path.is_dir()}
         for name, shown in order.wanted.items():
-            if name not in files:
+            if not name.endswith("/") and name not in files:
                 raise TaskError(f"{shown}: this was to be made, and was not")
         index = {"files": files, "seconds": time.perf_counter() - started, "facts": dict(facts or {})}
         done = Made(order.folder, index, job.notes)

@@ -289,7 +289,8 @@ class Store:
 
     def is_published(self, task: Task, result: Result) -> bool:
         """Whether all files that a task publishes are in place, and are those of this result."""
-        return all(self._is_same(f"{result.folder}/{name}", path) for name, path in task.publish.items())
+        files = task.published(result.index["files"])
+        return all(self._is_same(f"{result.folder}/{name}", path) for name, path in files)
 
     def strangers(self, task: Task, result: Result | None) -> list[str]:
         """The paths where a task would replace a file that this program has not written, or that was edited since.
@@ -301,7 +302,7 @@ class Store:
         """
         return [
             path
-            for name, path in task.publish.items()
+            for name, path in task.published(result.index["files"] if result else ())
             if not (result and self._is_same(f"{result.folder}/{name}", path)) and not self._is_ours(path)
         ]
 
@@ -316,7 +317,7 @@ class Store:
         """
         if not self.overwrite and (found := self.strangers(task, result)):
             raise OutputError(not_written([os.fspath(self.output / path) for path in found]))
-        for name, path in task.publish.items():
+        for name, path in task.published(result.index["files"]):
             original, target = result.folder / name, self.output / path
             if self._is_same(os.fspath(original), path):
                 continue
