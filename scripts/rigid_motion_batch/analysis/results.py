@@ -124,8 +124,9 @@ class ChoiceResult:
 
     @property
     def rows(self) -> list[Metrics]:
-        """The rows of all modes."""
-        return [row for motion in self.motions for row in motion.metrics]
+        """The rows of all modes, in the order of these."""
+        rows = {row.mode: row for motion in self.motions for row in motion.metrics}
+        return [rows[mode] for mode in self.keys]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +234,7 @@ def of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
     groups = identical_body_modes(made)
     for mode in made.keys:
         found = measure_body(made, mode, radii, ground)
-        rows[mode] = rowof_body(made, mode, found, ground)
+        rows[mode] = row_of_body(made, mode, found, ground)
         joints += joint_rows(made, mode, found)
         if mode in (group[0] for group in groups):
             errors[mode] = found
