@@ -23,9 +23,10 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import align_signs
-from rigid_motion_batch.recordings.figures import Figure
 
+from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
+from .figures import Figure
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .tables import lines_of, parse_rows
 
@@ -273,7 +274,7 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
     return channels
 
 
-def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[str, ...]]:
+def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[ClipWarning, ...]]:
     """What is behind the line `motion`.
 
     Returns
@@ -281,7 +282,7 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
     values : array, shape (frames, channels)
     frame_time : float
         Seconds between frames.
-    warnings : tuple of str
+    warnings : tuple of ClipWarning
         Where there are more or fewer frames than the file says.
     """
     cut: list[tuple[int, str]] = []
@@ -303,10 +304,11 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
             lost = len(values) + 1 < count
             values = values if lost else np.concatenate((values, last))
         if lost:
-            warnings.append(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out")
+            warnings.append(ClipWarning(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out"))
     if count != len(values):
         told = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
-        warnings.append(f"{path.name}:{settings[0][0]}: {told}; export the BVH again if that is not all")
+        way_out = "export the BVH again if that is not all"
+        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {told}", way_out))
     return values, frame_time, tuple(warnings)
 
 
