@@ -29,6 +29,7 @@ from .euler import quaternions_from_intrinsic_eulers
 from .figures import Figure
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .tables import lines_of, parse_rows
+from .vector_cells import is_number
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
@@ -326,15 +327,7 @@ def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]
 def _is_cut_off(row: str, width: int) -> bool:
     """Whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
     *cells, last = row.split()
-    return all(map(_is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not _is_number(last))
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+    return all(map(is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not is_number(last))
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:

@@ -65,7 +65,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     taken = set(selection.of([body.name for body in bodies]))
     wanted = [body for body in bodies if body.name in taken]
     columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
-    table = Table(path, header.separator, columns, width, line)
+    table = Table(path, header.separator, columns, width, line, header.vectors)
     kind = kind_of_times(table)
     if kind and (options.time_unit or options.frame_rate):
         given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
@@ -108,7 +108,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
     Where none does, TrajectoryError says what the nearest lacks.
     """
     problems: list[tuple[ColumnProblem, int]] = []
-    for line in header_lines(path):
+    for line in (line.of_rows(path) for line in header_lines(path)):
         try:
             return line, layout_of(line.cells, options)
         except ColumnProblem as problem:
@@ -134,7 +134,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
 def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
     """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
     columns = {f"device {index}": index for index in layout.devices}
-    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number), named)
+    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number, header.vectors), named)
     bodies = [
         (f"{device} {prefix}".strip() or path.stem, prefix, columns, rows)
         for device, rows in groups.items()
