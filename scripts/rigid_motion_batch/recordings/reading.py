@@ -53,6 +53,9 @@ class Format:
     in_metres: bool = True
     """Whether its files say, or are bound, how long the unit of a body is. It may be wrong nevertheless."""
 
+    says_unit: bool = True
+    """Whether it has a unit for lengths, or its files always say theirs."""
+
 
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
 # takes the rest, and says what is wrong with it.
@@ -65,6 +68,7 @@ FORMATS = (
         (".csv", ".tsv", ".txt"),
         named_csv.read,
         honours=("columns", "time_unit", "frame_rate", "euler", "degrees"),
+        says_unit=False,
     ),
     Format("A-Frame recording", (".json",), aframe.read),
     Format("BVH", (".bvh",), bvh.read, axes="opengl", in_metres=False),
@@ -106,7 +110,7 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     path, body = split_source(source)
     selection = Selection(path, body)
     try:
-        found = _format_of(path)
+        found = format_of(path)
         trajectories = _read(found, path, selection, options)
     except OSError as error:
         problem = f"this file cannot be read ({error.strerror})"
@@ -229,7 +233,8 @@ def _what_is_no_file(path: str) -> tuple[str, str] | None:
     return next((told for is_kind, told in kinds.items() if is_kind(mode)), None)
 
 
-def _format_of(path: Path) -> Format:
+def format_of(path: Path) -> Format:
+    """The format that reads a file, by its name and, where several share that, by how it begins."""
     candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
     if not candidates:
         extensions = dict.fromkeys(extension for known in FORMATS for extension in known.extensions)
