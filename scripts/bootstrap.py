@@ -2,6 +2,7 @@
 
     python scripts/bootstrap.py compare                     compare the modes, on the recordings in assets/
     python scripts/bootstrap.py compare hand.csv --axes unity --output renders/hand
+    python scripts/bootstrap.py inspect hand.csv            look into a recording: units, rate, what looks wrong
     python scripts/bootstrap.py paper                       reproduce the paper's figures and its table
     python scripts/bootstrap.py test                        run the tests
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
@@ -38,6 +39,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
+    "inspect": (["-m", "rigid_motion_batch", "inspect"], ()),
     "paper": ([ROOT / "scripts" / "research", "paper"], ()),
     "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "research", "benchmark"], ("benchmark",)),
@@ -83,7 +85,7 @@ def main(arguments: list[str]) -> int:
     # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
     folder = ROOT if command == "test" else None
     variables = environment(os.environ)
-    if command in ("dask", "tasks"):
+    if command in ("dask", "tasks", "inspect"):
         variables["PYTHONPATH"] = os.pathsep.join([str(ROOT / "scripts"), *filter(None, [variables.get("PYTHONPATH")])])
     return _become([python, *run, *rest], folder, variables)
 

@@ -31,7 +31,7 @@ def test_help_shows_the_commands(arguments):
 def test_an_unknown_command_is_refused_with_the_known_ones():
     done = run("render")
     assert done.returncode == 2
-    assert "compare, paper, test, benchmark" in done.stderr
+    assert "compare, inspect, paper, test, benchmark" in done.stderr
 
 
 def test_every_script_is_found_from_whatever_folder():

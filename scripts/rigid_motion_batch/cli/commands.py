@@ -41,6 +41,7 @@ RESEARCH = {
 
 COMMANDS = {
     "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
+    "inspect": Command("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
     "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "reduce": Command("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
     "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
@@ -143,6 +144,7 @@ Rigid-motion interpolation for keyframes, measured, baked, streamed and rendered
 
 examples:
   {INSTALLED} compare                                  the motions that come with the program
+  {INSTALLED} inspect hand.csv
   {INSTALLED} compare hand.csv --axes unity
   {INSTALLED} compare take.csv --decimate adaptive --tolerance 5mm --no-video
   {INSTALLED} bake shot.blend
