@@ -15,8 +15,8 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from research.markup import Markup, element
 from rigid_motion.motion import MODES, Poses, interpolate
-from rigid_motion_batch.comparison.report.markup import Markup, element
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.palette import THEMES, colour_of, colour_on
 

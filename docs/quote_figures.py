@@ -24,6 +24,7 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
 from research.markdown_tables import numbers, tables, tables_of, titled
 from research.paper.table import RADIUS
+from research.phrases import listed
 from research.summaries import SUMMARIES, with_summary
 from research.summaries.paper import TABLE_1, percent_saved
 from rigid_motion.motion import KEYFRAME_MODES
@@ -31,7 +32,6 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.metrics import measure_reconstruction
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
-from rigid_motion_batch.comparison.report.findings import listed
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigid_motion_batch.comparison.report.findings import listed
+from research.phrases import listed
 
 from . import claims
 from .bows import FORMULA

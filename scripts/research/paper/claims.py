@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rigid_motion_batch.comparison.report.findings import UPDATES_IN_THE_PAPER
+from research.phrases import UPDATES_IN_THE_PAPER
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rigid_motion_batch.comparison.report.findings import listed
+from research.phrases import listed
 from rigid_motion_batch.streaming.packets import HEADER
 
 from . import claims

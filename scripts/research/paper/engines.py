@@ -10,8 +10,8 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 
+from research.markup import Markup, element
 from rigid_motion.motion import MODES
-from rigid_motion_batch.comparison.report.markup import Markup, element
 from rigid_motion_batch.palette import colour_of
 from rigid_motion_batch.streaming import PACKINGS
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from research.markup import Content, Markup, element
 from rigid_motion.motion import Poses, shell_error
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion_batch.comparison.report.markup import Content, Markup, element
 
 from .table import RADIUS
 
