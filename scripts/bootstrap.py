@@ -17,6 +17,7 @@
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
+    python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
     python scripts/bootstrap.py completion bash             print what has a shell complete `rigid-motion`
 
 The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
@@ -33,7 +34,6 @@ import os
 import shutil
 import subprocess
 import sys
-import venv
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -60,6 +60,9 @@ COMMANDS = {
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
 
+ENVIRONMENT = "environment"
+"""Sets up all but Blender, and prints the folder."""
+
 WITHOUT_BLENDER = ("inspect", "stream", "tasks", "dask", "openjd", "completion")
 """Need no Blender."""
 
@@ -74,13 +77,17 @@ def main(arguments: list[str]) -> int:
         print(__doc__.strip())
         return 0
     command, *rest = arguments
-    if command not in COMMANDS:
-        near = difflib.get_close_matches(command, COMMANDS, n=1)
+    if command not in (*COMMANDS, ENVIRONMENT):
+        near = difflib.get_close_matches(command, (*COMMANDS, ENVIRONMENT), n=1)
         meant = f": did you mean {near[0]}?" if near else ""
         return _fail(f"there is no command {command!r}{meant}\nThe commands are {', '.join(COMMANDS)}.")
     if sys.version_info < (3, 11):  # noqa: UP036 - whoever starts it with another Python is to read why
         return _fail(f"Python {PYTHON} is too old: run this with Python 3.11 or 3.13")
     project = _project()
+    if command == ENVIRONMENT:
+        python = install(None, _requirements(project, None, ()), Path(rest[0]) if rest else None)
+        print(*([python.parents[1]] if python else []), sep="\n")
+        return int(python is None)
     known = project["tool"]["rigid-motion"]["blender"]
     here = known.get(PYTHON, [])
     blender = here[0] if here else None
@@ -132,9 +139,13 @@ def _is_program(arguments: list[str]) -> bool:
     return bool(named) and not named[0].replace(".", "").isdecimal()
 
 
-def install(blender: str | None, requirements: list[str]) -> Path | None:
-    """The Python of an environment with these requirements, made or completed where it has to be; None on failure."""
-    folder = ROOT / ".venv" / f"{f'blender-{blender}-' if blender else ''}python-{PYTHON}"
+def install(blender: str | None, requirements: list[str], folder: Path | None = None) -> Path | None:
+    """The Python of an environment with these requirements, made or completed where it has to be; None on failure.
+
+    It is in `.venv/` unless a folder is given.
+    """
+    name = f"blender-{blender}-python-{PYTHON}" if blender else f"python-{PYTHON}"
+    folder = folder.absolute() if folder else ROOT / ".venv" / name
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / "installed.json"
     wanted = hashlib.sha256("\n".join([sys.version, *requirements]).encode()).hexdigest()
@@ -144,10 +155,21 @@ def install(blender: str | None, requirements: list[str]) -> Path | None:
     what = f"Blender {blender}" if blender else "what is needed without Blender"
     print(f"Setting up {what} for Python {PYTHON} in {folder} ...", file=sys.stderr, flush=True)
     if not python.exists():
+        if folder.exists() and not (folder / "pyvenv.cfg").exists() and any(folder.iterdir()):
+            _fail(f"{folder} is there, and no environment: choose another folder")
+            return None
         shutil.rmtree(folder, ignore_errors=True)
-        venv.create(folder, with_pip=True)
+        try:
+            import ensurepip  # noqa: F401 - Debian has it in a package of its own
+            import venv
+
+            venv.create(folder, with_pip=True)
+        except (ImportError, subprocess.CalledProcessError) as error:
+            _fail(f"this Python cannot make an environment ({error}): install its modules venv and ensurepip")
+            return None
+    # Standard output is for what the command prints.
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *requirements]
-    if subprocess.call(pip, cwd=ROOT) != 0:
+    if subprocess.call(pip, cwd=ROOT, stdout=sys.stderr) != 0:
         _fail("the packages above could not be installed; with the network back, the same command goes on")
         return None
     stamp.write_text(json.dumps([*installed, wanted]))

@@ -15,6 +15,8 @@ from rigid_motion_batch.places import NAMED, manifest
 from rigid_motion_batch.supervising import begin_child, ended_at_once, stop_signals, supervise
 from rigid_motion_batch.system_libraries import way_out
 
+from .in_blender import NoEnvironment, become, blender_program, elsewhere
+
 
 @dataclass(frozen=True)
 class Command:
@@ -51,6 +53,10 @@ COMMANDS = {
 }
 
 
+ON_LIBRARIES = ("compare.py", "job_bundle.py")
+"""Scripts that need packages which Blender's own Python has not."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run `rigid-motion COMMAND ...`, and return the exit code.
 
@@ -66,8 +72,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def launch(script: str) -> None:
     """Run the command of a script, given its `__file__`, and end with its exit code."""
-    name = Path(script).name
-    sys.exit(_as_program(program_of(name), lambda: _run(f".{Path(script).stem}", own_arguments(script))))
+    name, arguments = Path(script).name, own_arguments(script)
+    if name in ON_LIBRARIES and blender_program():
+        try:
+            if command := elsewhere(script, arguments):
+                sys.exit(become(command))
+        except NoEnvironment as error:
+            print(f"{name}: {error}", file=sys.stderr)
+            sys.exit(2)
+    sys.exit(_as_program(program_of(name), lambda: _run(f".{Path(script).stem}", arguments)))
 
 
 def launch_research(arguments: Sequence[str]) -> None:
