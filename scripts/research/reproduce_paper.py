@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from rigid_motion_batch.command_line import complain, parser_of, path_line, program_of
@@ -20,34 +21,20 @@ PROGRAM = program_of(SCRIPT)
 
 require_blender(SCRIPT)
 
-import bpy
-import numpy as np
-
 from research.paper.bodies import body_files
 from research.paper.motions import recordings_in
 from research.paper.page import with_section
 from research.paper.steps import PAGE, SECTIONS, plan, plan_bodies, plan_sending
 from research.paper.timing import ROUNDS
+from research.study import Study
 from rigid_motion_batch.files import write_text, written_beside
+from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.running import Outcome, Progress, State, run
+from rigid_motion_batch.pipeline.steps import Task
+from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
 from rigid_motion_batch.places import ASSETS, CHECKOUT, from_here, output_folder
-from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.supervising import report
-from rigid_motion_batch.workplan import FolderInUse, Outcome, Plan, SerialExecutor, State, Workspace, code_version, run
-from rigid_motion_batch.workplan.manifest import ManifestError
-
-CODE = (
-    *("rigid_motion/animation", "rigid_motion/motion", "assets/models.blend"),
-    *(f"research/{part}" for part in ("making", "markdown_tables.py", "paper", "summaries")),
-    *(
-        f"rigid_motion_batch/{part}"
-        for part in (
-            *("analysis", "axes.py", "command_line.py", "comparison", "files.py", "palette.py", "places.py"),
-            *("recordings", "rows.py", "scenes", "streaming"),
-        )
-    ),
-)
-"""What the results depend on."""
 
 EPILOG = """
 examples:
@@ -110,21 +97,25 @@ def main(arguments: list[str]) -> int:
     if missing:
         print(f"{PROGRAM}: {way_out(missing)}\nOr go without pictures: --no-pictures", file=sys.stderr)
         return 2
+    page = options.output / SECTIONS.get(options.only, PAGE)
     try:
-        work = _plan(options)
         if options.only and options.docs and not (options.docs / PAGE).is_file():
             raise ValueError(f"{options.docs / PAGE}: there is no page to put the section into; leave --docs out")
-        with Workspace(options.output) as workspace, Progress() as progress, SerialExecutor() as executor:
-            outcome = run(work, workspace, executor, force=options.force, progress=progress, title="Reproducing")
-        page = options.output / SECTIONS.get(options.only, PAGE)
-        if options.docs and outcome.states[work.order[-1]].there:
+        with Store(options.output) as store, SerialExecutor() as executor:
+            tasks = list(_studied(options, store).tasks.values())
+            if options.force:
+                for task in tasks:
+                    store.discard(task.key)
+            outcome = run(lambda: tasks, store, executor, progress=Notes())
+            there = [path for task in tasks if store.result(task.key) for path in task.publish]
+        if options.docs and not (outcome.interrupted or outcome.problem):
             if options.only:
                 section, whole = page.read_text(encoding="utf-8"), (options.docs / PAGE).read_text(encoding="utf-8")
                 write_text(options.docs / PAGE, with_section(whole, section))
             else:
-                copy_page(work, outcome, options.output, options.docs)
+                copy_page([*there, PAGE], options.output, options.docs)
             page = options.docs / PAGE
-    except (TrajectoryError, ValueError, FolderInUse, ManifestError) as error:
+    except (TrajectoryError, ValueError, FolderInUse, OutputError) as error:
         complain(PROGRAM, error)
         return 2
     except OSError as error:
@@ -133,38 +124,37 @@ def main(arguments: list[str]) -> int:
     return _report(outcome, page)
 
 
-def copy_page(work: Plan, outcome: Outcome, output: Path, docs: Path) -> None:
-    """Copy the page, and the pictures that it shows, to another folder."""
-    shown = [
-        path
-        for name, task in work.tasks.items()
-        if outcome.states[name].there
-        for path in task.outputs
-        if path == PAGE or path.startswith("paper/")
-    ]
-    for path in shown:
-        with written_beside(docs / path) as beside:
-            shutil.copyfile(output / path, beside)
+class Notes(Progress):
+    """Says on the standard error what is done."""
+
+    def note(self, text: str) -> None:
+        print(f"{PROGRAM}: {text}", file=sys.stderr)
+
+    def finish(self, task: Task, state: State, problem: str) -> None:
+        print(f"{task.name}: {problem or state.value}", file=sys.stderr)
 
 
-def _plan(options: argparse.Namespace) -> Plan:
+def copy_page(there: Iterable[str], output: Path, docs: Path) -> None:
+    """Copy the page, and the pictures that it shows, of the files that are there, to another folder."""
+    for path in dict.fromkeys(there):
+        if path == PAGE or path.startswith("paper/"):
+            with written_beside(docs / path) as beside:
+                shutil.copyfile(output / path, beside)
+
+
+def _studied(options: argparse.Namespace, store: Store) -> Study:
+    study = Study(store)
     recordings = recordings_in(options.recordings) if options.recordings else []
     bodies = body_files(options.bodies)
-    version = f"{code_version(*CODE)} Blender {bpy.app.version_string} NumPy {np.__version__}"
     own = sorted(from_here(ASSETS).glob("*.csv"))
     if options.only == "bodies":
-        return plan_bodies(recordings, bodies, version=version)
-    if options.only == "sending":
-        return plan_sending(own, recordings, version=version)
-    return plan(
-        own,
-        recordings,
-        bodies,
-        pictures=not options.no_pictures,
-        film=not options.no_video,
-        rounds=options.rounds,
-        version=version,
-    )
+        plan_bodies(study, recordings, bodies)
+    elif options.only == "sending":
+        plan_sending(study, own, recordings)
+    else:
+        rendered, film = not options.no_pictures, not options.no_video
+        plan(study, own, recordings, bodies, rendered=rendered, film=film, rounds=options.rounds)
+    return study
 
 
 def _report(outcome: Outcome, page: Path) -> int:
@@ -180,7 +170,7 @@ def _report(outcome: Outcome, page: Path) -> int:
         print("Stopped; the same call goes on from here.", file=sys.stderr)
     if page.is_file():
         print(path_line(page.resolve()), flush=True)
-    return 130 if outcome.interrupted else int(outcome.count(State.FAILED) > 0)
+    return 130 if outcome.interrupted else int(bool(outcome.failures))
 
 
 def _count(text: str) -> int:

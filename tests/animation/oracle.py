@@ -20,7 +20,7 @@ from mathutils import Euler, Quaternion
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, normalise
 from tests.animation.modified import acting, held_frames, without_modifiers
-from tests.animation.path_oracle import beside_path, lies_on_path
+from tests.animation.path_oracle import DEPENDS_ON_KEYS, beside_path, lies_on_path
 from tests.animation.smooth_oracle import share_of, with_tangents
 from tests.animation.spin_oracle import Spin, spin_and_end
 
@@ -204,10 +204,10 @@ class Path:
 def _is_passed(obj: Carrier, keys: np.ndarray, number: int) -> bool:
     """Whether a key lies on a path that it does not shape."""
     before, mode = (mode_at(obj, frame) for frame in keys[[number - 1, number]])
+    if not 0 < number < len(keys) - 1 or before != mode or mode not in DEPENDS_ON_KEYS or may_spin(obj):
+        return False
     curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
     curves = [curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute]
-    if not 0 < number < len(keys) - 1 or before != mode or may_spin(obj):
-        return False
     return lies_on_path(curves, keys[number], mode)
 
 

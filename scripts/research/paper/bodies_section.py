@@ -64,10 +64,10 @@ class BodyResults:
     apart: Sequence[Apart] = ()
 
     @classmethod
-    def read(cls, folder: Path, there: Iterable[str]) -> BodyResults:
-        """Read those of the files that are there."""
+    def read(cls, reads: Callable[[str], Path], there: Iterable[str]) -> BodyResults:
+        """Read those of the files that are there; `reads` takes a name to where the file is."""
         files = frozenset(there)
-        return cls(*(read_rows(folder / name, kind) if name in files else [] for name, kind in FILES.items()))
+        return cls(*(read_rows(reads(name), kind) if name in files else [] for name, kind in FILES.items()))
 
     @property
     def counted(self) -> list[Body]:

@@ -1,16 +1,15 @@
-"""The steps on whole bodies that take long, apart from the others: done again where what they use has changed."""
+"""The study of whole bodies, as tasks."""
 
 from __future__ import annotations
 
+from research.study import Files
 from rigid_motion_batch.analysis.needed import RATES
 from rigid_motion_batch.rows import write_rows
-from rigid_motion_batch.workplan import Job, step
 
 from .bodies import FILES, KeysOfBody, apart_of, errors_of, limbs_of, needed_of, read_body
 
 
-@step
-def measure_body(job: Job, *, name: str, source: str) -> None:
+def measure_body(job: Files, *, name: str, source: str) -> None:
     """Read a body, find its limbs, and measure what is quickly measured. One that cannot be read is noted."""
     body, clip = read_body(source, name)
     limbs, errors, apart = [], [], []
@@ -23,8 +22,7 @@ def measure_body(job: Job, *, name: str, source: str) -> None:
         write_rows(job.writes(f"bodies/{name}/{table_of}"), FILES[table_of], rows)
 
 
-@step
-def count_key_poses(job: Job, *, name: str, source: str) -> None:
+def count_key_poses(job: Files, *, name: str, source: str) -> None:
     """Find the key poses that every mode needs on a body, and the keys on its limbs alone."""
     _, clip = read_body(source, name)
     rows = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -42,15 +42,15 @@ class Results:
     sending: list[SentNeeded] = field(default_factory=list)
 
     @classmethod
-    def read(cls, folder: Path, there: Iterable[str]) -> Results:
-        """Read the files of a run, of which these are there: paths below the folder."""
+    def read(cls, reads: Callable[[str], Path], there: Iterable[str]) -> Results:
+        """Read the files of a run, of which these are there; `reads` takes a name to where the file is."""
         files = frozenset(there)
 
         def rows(name: str, kind: type) -> list:
-            return read_rows(folder / name, kind) if name in files else []
+            return read_rows(reads(name), kind) if name in files else []
 
         return cls(
-            run=json.loads((folder / "run.json").read_text(encoding="utf-8")) if "run.json" in files else {},
+            run=json.loads(reads("run.json").read_text(encoding="utf-8")) if "run.json" in files else {},
             motions=rows("clips.csv", Motion),
             needed=rows("table.csv", Needed),
             look_ahead=rows("look_ahead.csv", LookAhead),
@@ -61,7 +61,7 @@ class Results:
             steps=rows("triangle.csv", triangle.Step),
             instants=rows("strips.csv", strips.Instant),
             pictures=frozenset(name for name in files if name.endswith((".png", ".svg", ".mp4"))),
-            of_bodies=BodyResults.read(folder, files),
+            of_bodies=BodyResults.read(reads, files),
             sending=rows("sending.csv", SentNeeded),
         )
 

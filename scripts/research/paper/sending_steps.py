@@ -1,16 +1,15 @@
-"""The steps of the study of streams that are sent when needed, for a work plan."""
+"""The study of streams that are sent when needed, as tasks."""
 
 from __future__ import annotations
 
+from research.study import Files
 from rigid_motion_batch.rows import read_all_rows, write_rows
-from rigid_motion_batch.workplan import Job, step
 
 from . import sending, table
 from .motions import ASSETS, RECORDINGS, Motion, read_motion
 
 
-@step
-def measure_sending(job: Job, *, name: str, source: str, of: str) -> None:
+def measure_sending(job: Files, *, name: str, source: str, of: str) -> None:
     """Send a clip in every way. One that cannot be read, or is at rest, is noted and does not count."""
     motion, clip = read_motion(source, name, of)
     even, sent = [], []
@@ -25,8 +24,7 @@ def measure_sending(job: Job, *, name: str, source: str, of: str) -> None:
     write_rows(job.writes(f"sending/{name}/sent.csv"), sending.Sent, sent)
 
 
-@step
-def gather_sending(job: Job, *, names: list[str]) -> None:
+def gather_sending(job: Files, *, names: list[str]) -> None:
     """Bring the clips together, and find what each needs."""
 
     def gathered(part: str, kind: type) -> list:

@@ -1,4 +1,4 @@
-"""The steps of the reproduction, for a work plan: each reads files, calls a room beside this one, and writes files.
+"""The tasks of the reproduction: each reads files, calls a module beside this one, and writes files.
 
 What is on the page comes from these files and from nowhere else. Paths are below the output folder.
 """
@@ -9,20 +9,18 @@ import json
 import platform
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import bpy
 import numpy as np
 
+from research.study import Files, Study, page, pictures
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.modes import REFERENCE
-from rigid_motion_batch.comparison.version import step_versions
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.recordings.clip_reading import folder_names, read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.rows import read_all_rows, read_rows, write_rows
 from rigid_motion_batch.scenes.film import render_film, render_still
-from rigid_motion_batch.workplan import Job, Plan, Task, step
 
 from . import (
     bodies,
@@ -57,30 +55,29 @@ ALL = "all clips"
 
 
 def plan(
+    study: Study,
     assets: Sequence[Path],
     recordings: Sequence[Path],
     bodies: Sequence[Path] = (),
     *,
-    pictures: bool,
+    rendered: bool,
     film: bool,
     rounds: int,
-    version: str,
-) -> Plan:
-    """Everything that is to be done.
+) -> None:
+    """Add everything that is to be done to a study.
 
     Parameters
     ----------
+    study : Study
     assets, recordings : sequence of Path
         Files, each with a motion. The figures take `throw` and `reach` among the assets. Whole bodies among the
         recordings are studied as such as well.
     bodies : sequence of Path
         Files, each with a whole body.
-    pictures, film : bool
-        Whether to render them.
+    rendered, film : bool
+        Whether to render pictures, and a film.
     rounds : int
         Of the races.
-    version : str
-        Of the program.
 
     Raises
     ------
@@ -92,76 +89,66 @@ def plan(
         if wanted not in asset:
             raise ValueError(f"{wanted}.csv is not among the assets; python assets/make_assets.py makes it")
     files, names = _clips(assets, recordings)
-    tasks = [_measuring(name, path, of) for name, (path, of) in zip(names, files, strict=True)]
-    measuring = tuple(task.name for task in tasks)
-    tables = ("table.csv", "errors.csv", "bows.csv", "look_ahead.csv", "clips.csv", "run.json")
-    tasks += [
-        _task("Table 1", "tabulate", tables, measuring, arguments={"names": names}),
-        _task(
-            "running time",
-            "race",
-            ("timing.csv",),
-            ("Table 1",),
-            source=asset["reach"],
-            arguments={"rounds": rounds},
-            weight=40.0,
-        ),
-        _task("bytes", "count_bytes", ("bandwidth.csv",), source=asset["reach"]),
-        _task("catching", "view_catching", ("catching.csv",), source=asset["throw"]),
-        _task("engines", "draw_engines", ("paper/engines.svg",)),
-        _task("shell error", "draw_shell_error", ("paper/shell_error.svg",)),
-        _task("figures in numbers", "count_figures", ("triangle.csv", "strips.csv")),
-    ]
-    if pictures:
-        tasks += [
-            _task("triangle", "render_triangle", ("paper/triangle.png",), weight=5.0),
-            _task("strips", "render_strips", ("paper/strips.png",), weight=5.0),
-            _task(
-                "catching, a still", "render_catching", ("paper/catching.png",), ("catching",), source=asset["throw"]
-            ),
-        ]
-    if pictures and film:
-        outputs = ("paper/catching.mp4",)
-        tasks.append(
-            _task("catching, a film", "film_catching", outputs, ("catching",), source=asset["throw"], weight=90.0)
+    measuring = [
+        study.add(
+            f"measuring {name}",
+            measure,
+            [f"clips/{name}/{part}" for part in ("clip.csv", "errors.csv", "bows.csv")],
+            source=str(path),
+            arguments={"name": name, "of": of},
+            # A recording takes about 50 bytes to say a sample, and a second for 500 of them.
+            weight=1.0 + path.stat().st_size / 25_000.0,
         )
-    studied, sent = _studying(recordings, bodies), _sending(assets, recordings)
-    tasks += [*sent, *studied]
-    partly = [*sent[:-1], *studied[:-1]]
-    before = {task.name: tuple(task.outputs) for task in tasks if task.name not in measuring and task not in partly}
-    tasks.append(_task("page", "write", (PAGE,), tuple(before), arguments={"files": before}, partial=True))
-    return _planned(tasks, version)
+        for name, (path, of) in zip(names, files, strict=True)
+    ]
+    tables = ("table.csv", "errors.csv", "bows.csv", "look_ahead.csv", "clips.csv", "run.json")
+    study.add("Table 1", tabulate, tables, after=measuring, arguments={"names": names})
+    shown = ["Table 1"]
+
+    def show(name: str, function, outputs: Sequence[str], **options) -> None:
+        shown.append(study.add(name, function, outputs, **options))
+
+    reach, throw = asset["reach"], asset["throw"]
+    timed = {"source": reach, "arguments": {"rounds": rounds}, "after": ["Table 1"], "weight": 40.0}
+    show("running time", race, ["timing.csv"], **timed)
+    show("bytes", count_bytes, ["bandwidth.csv"], source=reach)
+    show("catching", view_catching, ["catching.csv"], source=throw)
+    show("engines", draw_engines, ["paper/engines.svg"])
+    show("shell error", draw_shell_error, ["paper/shell_error.svg"])
+    show("figures in numbers", count_figures, ["triangle.csv", "strips.csv"])
+    if rendered:
+        caught = {"after": ["catching"], "source": throw, "step": pictures}
+        show("triangle", render_triangle, ["paper/triangle.png"], step=pictures, weight=5.0)
+        show("strips", render_strips, ["paper/strips.png"], step=pictures, weight=5.0)
+        show("catching, a still", render_catching, ["paper/catching.png"], **caught)
+        if film:
+            show("catching, a film", film_catching, ["paper/catching.mp4"], **caught, weight=90.0)
+    shown += filter(None, (_sending(study, assets, recordings), _studying(study, recordings, bodies)))
+    before = {name: list(study.tasks[name].publish) for name in shown}
+    study.add("page", write, [PAGE], after=shown, arguments={"files": before}, step=page)
 
 
-def plan_bodies(recordings: Sequence[Path], bodies: Sequence[Path], *, version: str) -> Plan:
-    """What is to be done for the section on bodies alone; as in `plan`, of which it is a part but for the last task.
+def plan_bodies(study: Study, recordings: Sequence[Path], bodies: Sequence[Path]) -> None:
+    """Add what is to be done for the section on bodies alone; as in `plan`, of which it is a part.
 
     Raises
     ------
     ValueError
         Where no file may hold a body.
     """
-    tasks = _studying(recordings, bodies)
-    if not tasks:
+    last = _studying(study, recordings, bodies)
+    if not last:
         raise ValueError("there is no whole body to study; give --bodies FILE_OR_FOLDER")
-    return _planned([*tasks, _writing("bodies", tasks[-1])], version)
+    _writing(study, "bodies", last)
 
 
-def plan_sending(assets: Sequence[Path], recordings: Sequence[Path], *, version: str) -> Plan:
-    """What is to be done for the section on streams that are sent when needed alone; as in `plan`."""
-    tasks = _sending(assets, recordings)
-    return _planned([*tasks, _writing("sending", tasks[-1])], version)
+def plan_sending(study: Study, assets: Sequence[Path], recordings: Sequence[Path]) -> None:
+    """Add what is to be done for the section on streams that are sent when needed alone; as in `plan`."""
+    _writing(study, "sending", _sending(study, assets, recordings))
 
 
-def _writing(section: str, after: Task) -> Task:
-    return _task("section", "write_section", (SECTIONS[section],), (after.name,), arguments={"section": section})
-
-
-def _planned(tasks: Sequence[Task], version: str) -> Plan:
-    # These take minutes: they are done again where what they use has changed, and nothing else.
-    modules = (body_steps.__name__, sending_steps.__name__)
-    slow = {task.function for task in tasks if task.function.startswith(modules)}
-    return Plan(tasks, version, versions=step_versions(sorted(slow)))
+def _writing(study: Study, section: str, after: str) -> None:
+    study.add("section", write_section, [SECTIONS[section]], after=[after], arguments={"section": section}, step=page)
 
 
 def _clips(assets: Sequence[Path], recordings: Sequence[Path]) -> tuple[list[tuple[Path, str]], list[str]]:
@@ -170,97 +157,49 @@ def _clips(assets: Sequence[Path], recordings: Sequence[Path]) -> tuple[list[tup
     return files, folder_names(path.stem for path, _ in files)
 
 
-def _sending(assets: Sequence[Path], recordings: Sequence[Path]) -> list[Task]:
-    """The tasks of a study of streams that are sent when needed, the last of which brings them together."""
+def _sending(study: Study, assets: Sequence[Path], recordings: Sequence[Path]) -> str:
+    """Add the study of streams that are sent when needed, and return the task that brings it together."""
     files, names = _clips(assets, recordings)
-    tasks = [
-        _task(
+    before = [
+        study.add(
             f"sending {name}",
-            "measure_sending",
-            tuple(f"sending/{name}/{part}" for part in ("clip.csv", "even.csv", "sent.csv")),
+            sending_steps.measure_sending,
+            [f"sending/{name}/{part}" for part in ("clip.csv", "even.csv", "sent.csv")],
             source=str(path),
             arguments={"name": name, "of": of},
-            module=sending_steps.__name__,
             weight=1.0 + path.stat().st_size / 1000.0,
         )
         for name, (path, of) in zip(names, files, strict=True)
     ]
-    before = tuple(task.name for task in tasks)
-    outputs = ("sent.csv", "sending.csv")
-    gathering = _task(
-        "sending", "gather_sending", outputs, before, arguments={"names": names}, module=sending_steps.__name__
-    )
-    return [*tasks, gathering]
+    outputs = ["sent.csv", "sending.csv"]
+    return study.add("sending", sending_steps.gather_sending, outputs, after=before, arguments={"names": names})
 
 
-def _studying(recordings: Sequence[Path], wanted: Sequence[Path]) -> list[Task]:
-    """The tasks of a study of bodies, the last of which brings them together; none where there is no body."""
+def _studying(study: Study, recordings: Sequence[Path], wanted: Sequence[Path]) -> str:
+    """Add the study of bodies, and return the task that brings it together; empty where there is no body."""
     # A file that is given in both ways may be called differently.
     given = {path.resolve(): path for path in [*recordings, *wanted] if path in wanted or bodies.may_hold_a_body(path)}
     files = list(given.values())
     if not files:
-        return []
+        return ""
     names = folder_names(path.stem for path in files)
-    tasks = []
+    needed = "bodies_needed.csv"
+    before = []
     for name, path in zip(names, files, strict=True):
-        arguments = {"name": name}
-        outputs = tuple(f"bodies/{name}/{part}" for part in bodies.FILES if part != "bodies_needed.csv")
-        tasks += [
-            _task(
-                f"errors of {name}",
-                "measure_body",
-                outputs,
-                source=str(path),
-                arguments=arguments,
-                module=body_steps.__name__,
-                weight=5.0,
-            ),
-            _task(
-                f"key poses of {name}",
-                "count_key_poses",
-                (f"bodies/{name}/bodies_needed.csv",),
-                source=str(path),
-                arguments=arguments,
-                module=body_steps.__name__,
-                weight=60.0,
-            ),
-        ]
+        outputs = [f"bodies/{name}/{part}" for part in bodies.FILES if part != needed]
+        read = {"source": str(path), "arguments": {"name": name}}
+        before.append(study.add(f"errors of {name}", body_steps.measure_body, outputs, **read, weight=5.0))
+        found = [f"bodies/{name}/{needed}"]
+        before.append(study.add(f"key poses of {name}", body_steps.count_key_poses, found, **read, weight=60.0))
     asked = [name for name, path in zip(names, files, strict=True) if path in wanted]
     arguments = {"names": names, "asked": asked}
-    before = tuple(task.name for task in tasks)
-    return [*tasks, _task("bodies", "gather_bodies", tuple(bodies.FILES), before, arguments=arguments)]
-
-
-def _task(
-    name: str,
-    function: str,
-    outputs: tuple[str, ...],
-    after: tuple[str, ...] = (),
-    *,
-    source: str = "",
-    arguments: dict[str, Any] | None = None,
-    module: str = __name__,
-    **options: Any,
-) -> Task:
-    """A task of this module, or of another, that may read a clip."""
-    given = {"source": source} if source else {}
-    inputs = (source,) if source else ()
-    return Task(name, f"{module}:{function}", given | (arguments or {}), inputs, outputs, after, **options)
-
-
-def _measuring(name: str, path: Path, of: str) -> Task:
-    outputs = tuple(f"clips/{name}/{part}" for part in ("clip.csv", "errors.csv", "bows.csv"))
-    # A recording takes about 50 bytes to say a sample, and a second for 500 of them.
-    weight = 1.0 + path.stat().st_size / 25_000.0
-    arguments = {"name": name, "of": of}
-    return _task(f"measuring {name}", "measure", outputs, source=str(path), arguments=arguments, weight=weight)
+    return study.add("bodies", gather_bodies, list(bodies.FILES), after=before, arguments=arguments)
 
 
 # -- the table ---------------------------------------------------------------------------------------------------------
 
 
-@step
-def measure(job: Job, *, name: str, source: str, of: str) -> None:
+def measure(job: Files, *, name: str, source: str, of: str) -> None:
     """Read a clip and measure all modes on it. One that cannot be read, or is at rest, is noted and does not count."""
     motion, clip = read_motion(source, name, of)
     points, found = [], []
@@ -276,8 +215,7 @@ def measure(job: Job, *, name: str, source: str, of: str) -> None:
     write_rows(job.writes(f"clips/{name}/bows.csv"), bows.Bow, found)
 
 
-@step
-def tabulate(job: Job, *, names: list[str]) -> None:
+def tabulate(job: Files, *, names: list[str]) -> None:
     """Bring the clips together, and find what each mode needs."""
 
     def gathered(part: str, kind: type) -> list:
@@ -300,8 +238,7 @@ def tabulate(job: Job, *, names: list[str]) -> None:
     write_text(job.writes("run.json"), json.dumps(run, indent=1) + "\n")
 
 
-@step
-def race(job: Job, *, source: str, rounds: int) -> None:
+def race(job: Files, *, source: str, rounds: int) -> None:
     """Race the engines, at equal rates, at those of the table, and at those of the paper."""
     cells = read_rows(job.reads("table.csv"), table.Needed)
     needed: dict[int, dict[str, float]] = {}
@@ -318,8 +255,7 @@ def race(job: Job, *, source: str, rounds: int) -> None:
 # -- bodies ------------------------------------------------------------------------------------------------------------
 
 
-@step
-def gather_bodies(job: Job, *, names: list[str], asked: list[str]) -> None:
+def gather_bodies(job: Files, *, names: list[str], asked: list[str]) -> None:
     """Bring the bodies together. Recordings that are none are not spoken of, unless they were given for bodies."""
     looked_at = {name: read_rows(job.reads(f"bodies/{name}/bodies.csv"), bodies.Body) for name in names}
     kept = [name for name in names if name in asked or not looked_at[name][0].left_out]
@@ -333,76 +269,65 @@ def gather_bodies(job: Job, *, names: list[str], asked: list[str]) -> None:
 # -- the figures -------------------------------------------------------------------------------------------------------
 
 
-@step
-def count_bytes(job: Job, *, source: str) -> None:
+def count_bytes(job: Files, *, source: str) -> None:
     """The example of the text."""
     write_rows(job.writes("bandwidth.csv"), Bandwidth, bandwidths(_asset(source)))
 
 
-@step
-def count_figures(job: Job) -> None:
+def count_figures(job: Files) -> None:
     """The first two figures in numbers."""
     write_rows(job.writes("triangle.csv"), triangle.Step, triangle.steps())
     write_rows(job.writes("strips.csv"), strips.Instant, strips.instants())
 
 
-@step
-def draw_engines(job: Job) -> None:
+def draw_engines(job: Files) -> None:
     """The sequence diagram."""
     write_text(job.writes("paper/engines.svg"), engines.draw())
 
 
-@step
-def draw_shell_error(job: Job) -> None:
+def draw_shell_error(job: Files) -> None:
     """What errors are measured by."""
     write_text(job.writes("paper/shell_error.svg"), shell.draw())
 
 
-@step
-def view_catching(job: Job, *, source: str) -> None:
+def view_catching(job: Files, *, source: str) -> None:
     """The last figure in numbers."""
     write_rows(job.writes("catching.csv"), catching.View, catching.views(_asset(source)))
 
 
-@step
-def render_triangle(job: Job) -> None:
+def render_triangle(job: Files) -> None:
     """The triangle."""
     render_still(triangle.build(), job.writes("paper/triangle.png"))
 
 
-@step
-def render_strips(job: Job) -> None:
+def render_strips(job: Files) -> None:
     """The drill in strips."""
     render_still(strips.build(), job.writes("paper/strips.png"))
 
 
-@step
-def render_catching(job: Job, *, source: str) -> None:
+def render_catching(job: Files, *, source: str) -> None:
     """The catch."""
     views = read_rows(job.reads("catching.csv"), catching.View)
     render_still(catching.build(_asset(source), views, film=False), job.writes("paper/catching.png"))
 
 
-@step
-def film_catching(job: Job, *, source: str) -> None:
+def film_catching(job: Files, *, source: str) -> None:
     """The throw and the catch."""
     views = read_rows(job.reads("catching.csv"), catching.View)
     scene = catching.build(_asset(source), views, film=True)
     render_film(scene, job.writes("paper/catching.mp4"), lambda done, of: job.progress(done, of, f"{done}/{of}"))
 
 
-@step
-def write(job: Job, *, files: dict[str, list[str]]) -> None:
+def write(job: Files, *, files: dict[str, list[str]]) -> None:
     """The page, of the files that there are: those of each task before this one that is done."""
     there = [path for task, paths in files.items() if task in job.finished for path in paths]
-    write_text(job.writes(PAGE), write_page(Results.read(job.output, there)))
+    write_text(job.writes(PAGE), write_page(Results.read(job.reads, there)))
 
 
-@step
-def write_section(job: Job, *, section: str) -> None:
+def write_section(job: Files, *, section: str) -> None:
     """A section alone."""
     if section == "bodies":
-        lines = bodies_section.bodies_section(bodies_section.BodyResults.read(job.output, bodies.FILES))
+        lines = bodies_section.bodies_section(bodies_section.BodyResults.read(job.reads, bodies.FILES))
     else:
         lines = sending_section.sending_section(
             read_rows(job.reads("sending.csv"), sending.SentNeeded), (RECORDINGS, ASSETS)

@@ -63,9 +63,7 @@ def _differences(before: Any, now: Any, values: bool = True, name: str = "") -> 
     if isinstance(before, dict) and isinstance(now, Mapping):
         prefix = f"{name}." if name else ""
         names = [key for key in {**before, **now} if key != "$"]
-        return [
-            one for key in names for one in _differences(before.get(key), now.get(key), values, f"{prefix}{key}")
-        ]
+        return [one for key in names for one in _differences(before.get(key), now.get(key), values, f"{prefix}{key}")]
     if before == now:
         return []
     shown = f"{before} -> {now}"

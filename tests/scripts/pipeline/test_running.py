@@ -375,9 +375,7 @@ def test_ctrl_c_leaves_what_is_done_and_a_report_of_it(output: Path, executor: s
     assert not (output / OWN / "scratch").exists()
 
 
-def test_ctrl_c_does_not_wait_for_a_report_that_takes_long(
-    output: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_does_not_wait_for_a_report_that_takes_long(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(running, "AFTER_CTRL_C", -1.0)
     first, slow = writing("a", "1"), task("slow", steps.write, Write("2", seconds=60.0))
     interrupt_when((output / "a.txt").exists)

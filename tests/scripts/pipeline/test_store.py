@@ -133,7 +133,20 @@ def test_the_folder_of_a_comparison_tells_what_it_is_of(output: Path, tmp_path: 
 
 @pytest.mark.parametrize(
     "path",
-    ["../a", "/a", "a/../../b", "C:/a", "a\\b", "a//b", "", ".", "a\0b", ".rigid-motion/lock", ".Rigid-Motion/x", "a:b"],
+    [
+        "../a",
+        "/a",
+        "a/../../b",
+        "C:/a",
+        "a\\b",
+        "a//b",
+        "",
+        ".",
+        "a\0b",
+        ".rigid-motion/lock",
+        ".Rigid-Motion/x",
+        "a:b",
+    ],
 )
 def test_no_path_leads_out_of_the_folder(path: str) -> None:
     with pytest.raises(ValueError, match="is no path below the output folder|keeps its own files"):
@@ -312,7 +325,7 @@ def test_workers_with_a_part_are_not_refused(output: Path) -> None:
         assert states(run_in(output, writing("a"), alone=False)) == {"done": 1}
 
 
-KILLED = f"""
+KILLED = """
 import os, sys, time
 from pathlib import Path
 from rigid_motion_batch.pipeline.executors import ProcessExecutor

@@ -260,9 +260,9 @@ def test_a_body_too_slow_for_everything_says_so():
 def test_files_are_read_back_as_they_were_written(tmp_path: Path):
     for (name, kind), rows in zip(FILES.items(), ROWS.values(), strict=True):
         write_rows(tmp_path / name, kind, rows)
-    assert "\n".join(bodies_section(BodyResults.read(tmp_path, FILES))) == section()
-    assert bodies_section(BodyResults.read(tmp_path, [])) == []
-    assert HEADING in write_page(Results.read(tmp_path, FILES))
+    assert "\n".join(bodies_section(BodyResults.read(tmp_path.joinpath, FILES))) == section()
+    assert bodies_section(BodyResults.read(tmp_path.joinpath, [])) == []
+    assert HEADING in write_page(Results.read(tmp_path.joinpath, FILES))
 
 
 # -- in a page ---------------------------------------------------------------------------------------------------------

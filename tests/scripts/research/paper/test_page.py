@@ -97,7 +97,7 @@ def written(folder: Path, **changed: list) -> str:
     for name, (kind, rows) in FILES.items():
         write_rows(folder / name, kind, changed.get(name.partition(".")[0], rows))
     (folder / "run.json").write_text(json.dumps({"Blender": "9.9.9"}), encoding="utf-8")
-    return write_page(Results.read(folder, [*FILES, "run.json", *PICTURES]))
+    return write_page(Results.read(folder.joinpath, [*FILES, "run.json", *PICTURES]))
 
 
 def test_numbers_of_the_files_are_on_the_page(tmp_path: Path):
@@ -185,7 +185,7 @@ def test_a_page_of_a_run_in_which_nothing_could_be_measured_still_is_one():
 
 def test_pictures_that_are_not_there_are_not_shown(tmp_path: Path):
     written(tmp_path)
-    text = write_page(Results.read(tmp_path, FILES))
+    text = write_page(Results.read(tmp_path.joinpath, FILES))
     assert "![" not in text
     assert "catching.mp4" not in text
     assert "2.5; 45.6; 78.9" in text

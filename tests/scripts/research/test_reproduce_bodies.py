@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import shutil
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from research.paper.bodies import FILES
 from research.paper.bodies_section import HEADING
 from research.paper.motions import recordings_in
 from research.paper.steps import plan, plan_bodies
-from rigid_motion_batch.comparison.version import READER
+from research.study import Study
+from rigid_motion_batch.pipeline.store import Store
 from tests.recordings import RECORDINGS
 from tests.scripts.bvh_bodies import write_body
 
@@ -137,23 +139,29 @@ def test_recordings_that_may_hold_a_body_are_studied_as_such_and_others_are_not_
     assert not (output / "bodies" / "hand").exists()
 
 
-def test_the_whole_plan_has_the_study_before_the_page() -> None:
-    assets = sorted((Path(__file__).resolve().parents[2] / "assets").glob("*.csv"))
-    body = Path("somewhere") / "walk.bvh"
-    whole = plan(assets, [], [body], pictures=False, film=False, rounds=2, version="")
-    assert {"errors of walk", "key poses of walk", "bodies"} <= set(whole.tasks)
-    page = whole.tasks["page"]
-    assert page.partial
-    assert "bodies" in page.after
-    assert page.arguments["files"]["bodies"] == [*FILES]
-    assert "bodies" not in plan(assets, [], pictures=False, film=False, rounds=2, version="").tasks
+def test_the_whole_plan_has_the_study_before_the_page(folder: Path, tmp_path: Path) -> None:
+    assets = sorted((Path(__file__).resolve().parents[3] / "assets").glob("*.csv"))
+    with Store(tmp_path / "out") as store:
+        study, without = Study(store), Study(store)
+        plan(study, assets, [], [folder / "walk.bvh"], rendered=False, film=False, rounds=2)
+        plan(without, assets, [], rendered=False, film=False, rounds=2)
+    assert {"errors of walk", "key poses of walk", "bodies"} <= set(study.tasks)
+    page = study.tasks["page"]
+    assert page.step.partial
+    assert "bodies" in page.parameters.after
+    assert json.loads(page.parameters.arguments)["files"]["bodies"] == [*FILES]
+    assert "bodies" not in without.tasks
 
 
-def test_a_body_that_is_given_twice_is_studied_once(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_body_that_is_given_twice_is_studied_once(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(folder)
-    tasks = plan_bodies([folder / "walk.bvh"], [Path("walk.bvh")], version="").tasks
-    assert [*tasks] == ["errors of walk", "key poses of walk", "bodies", "section"]
-    assert tasks["bodies"].arguments["asked"] == ["walk"]
+    with Store(tmp_path / "out") as store:
+        study = Study(store)
+        plan_bodies(study, [folder / "walk.bvh"], [Path("walk.bvh")])
+    assert [*study.tasks] == ["errors of walk", "key poses of walk", "bodies", "section"]
+    assert json.loads(study.tasks["bodies"].parameters.arguments)["asked"] == ["walk"]
 
 
 @pytest.mark.recordings
@@ -169,18 +177,4 @@ def test_of_other_peoples_bodies_hands_feet_and_heads_are_found() -> None:
             found[path.stem] = [limb.limb for limb in bodies.limbs_of(clip)]
     assert found == dict.fromkeys(
         ("beat_saber_body", "cmu_01_01", "freebvh", "pab_run", "pab_walk"), ["hands"] * 2 + ["feet"] * 2 + ["heads"]
-    )
-
-
-def test_what_takes_long_is_not_done_again_for_another_wording() -> None:
-    used = READER.sources_of("research.paper.body_steps:count_key_poses").files
-    assert "research/paper/bodies.py" in used
-    assert "rigid_motion_batch/analysis/body_needed.py" in used
-    assert (
-        not {
-            "research/paper/bodies_section.py",
-            "research/paper/page.py",
-            "research/paper/steps.py",
-        }
-        & used
     )

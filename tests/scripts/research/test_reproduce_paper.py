@@ -10,14 +10,16 @@ import pytest
 
 from research import reproduce_paper
 from research.paper import sending, steps, table, timing
+from research.study import Study
 from rigid_motion.motion import MODES
+from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.streaming import TWISTS
 
-ASSETS = Path(__file__).resolve().parents[2] / "assets"
+ASSETS = Path(__file__).resolve().parents[3] / "assets"
 
 QUICK = ("--no-pictures", "--rounds", "2")
 
-TIMED = {"timing.csv", "paper.md", "manifest.json"}
+TIMED = {"timing.csv", "paper.md"}
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +69,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in TIMED and ".workplan" not in path.parts
+        if path.is_file() and path.name not in TIMED and ".rigid-motion" not in path.parts
     }
 
 
@@ -163,17 +165,19 @@ def test_the_page_can_be_copied_to_the_docs(done: Path, tmp_path: Path, capfd: p
     assert capfd.readouterr().out.splitlines()[-1] == str((docs / "paper.md").resolve())
 
 
-def test_pictures_and_film_are_in_the_plan_unless_they_are_not_wanted(root: Path):
+def test_pictures_and_film_are_in_the_plan_unless_they_are_not_wanted(root: Path, tmp_path: Path):
     def outputs(**options: bool) -> set[str]:
         assets = sorted((root / "assets").glob("*.csv"))
-        plan = steps.plan(assets, [], rounds=2, version="", **options)
-        return {output for task in plan.tasks.values() for output in task.outputs if output.startswith("paper/")}
+        with Store(tmp_path / "out") as store:
+            study = Study(store)
+            steps.plan(study, assets, [], rounds=2, **options)
+        return {output for task in study.tasks.values() for output in task.publish if output.startswith("paper/")}
 
     drawings = {"paper/engines.svg", "paper/shell_error.svg"}
-    assert outputs(pictures=False, film=True) == drawings
+    assert outputs(rendered=False, film=True) == drawings
     stills = drawings | {"paper/triangle.png", "paper/strips.png", "paper/catching.png"}
-    assert outputs(pictures=True, film=False) == stills
-    assert outputs(pictures=True, film=True) == stills | {"paper/catching.mp4"}
+    assert outputs(rendered=True, film=False) == stills
+    assert outputs(rendered=True, film=True) == stills | {"paper/catching.mp4"}
 
 
 @pytest.mark.parametrize(
@@ -223,7 +227,7 @@ def test_the_section_on_streams_alone_is_written_and_put_into_a_page(tmp_path: P
     assert "**RMS shell error, assets**" in page
     assert capfd.readouterr().out.splitlines()[-1] == str((tmp_path / "docs" / "paper.md").resolve())
     written = {path.name for path in (tmp_path / "out").iterdir() if path.is_file()}
-    assert written == {"sending.md", "sending.csv", "sent.csv", "manifest.json"}
+    assert written == {"sending.md", "sending.csv", "sent.csv"}
     assert reproduce_paper.main(arguments) == 0
     assert "up to date" in capfd.readouterr().err
 
