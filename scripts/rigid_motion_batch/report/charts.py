@@ -1,4 +1,4 @@
-"""Charts of the report but for the viewer's: Vega-Lite specifications, made into SVG that takes its colours from the page.
+"""Charts of the report but for the viewer's: Vega-Lite specifications, as SVG that takes its colours from the page.
 
 A new chart is a function here that returns a specification, or None where there is nothing to draw, a row of `CHARTS`,
 and its `chart(...)` in a template.
@@ -34,6 +34,12 @@ STYLE: Specification = {
         "titleFontSize": 12,
     },
     "legend": {"labelColor": "var(--soft)", "titleColor": "var(--soft)", "labelFontSize": 12, "symbolType": "stroke"},
+}
+
+DASHES: Specification = {
+    "field": "keys",
+    "legend": {"title": "Keys", "orient": "bottom", "symbolStrokeColor": "var(--ink)"},
+    "scale": {"domain": ["where needed", "evenly spaced"], "range": [[1, 0], [4, 3]]},
 }
 
 
@@ -82,8 +88,6 @@ def _lines(
     if len(rows) < 2:
         return None
     groups = list(groups)
-    several = len({row["keys"] for row in rows}) > 1
-    dashes = {"scale": {"domain": ["where needed", "evenly spaced"], "range": [[1, 0], [4, 3]]}}
     return {
         "width": 400,
         "height": 210,
@@ -113,11 +117,7 @@ def _lines(
                     "range": [f"var(--m{numbers.modes.index(group[0])})" for group in groups],
                 },
             },
-            **(
-                {"strokeDash": {"field": "keys", "legend": {"title": "Keys", "orient": "bottom", "symbolStrokeColor": "var(--ink)"}, **dashes}}
-                if several
-                else {}
-            ),
+            **({"strokeDash": DASHES} if len({row["keys"] for row in rows}) > 1 else {}),
         },
     }
 

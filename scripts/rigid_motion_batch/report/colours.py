@@ -1,4 +1,4 @@
-"""Colours of the modes on the page, the same in every run: text of them has a contrast of 4.5 or more (WCAG 2.2, AA)."""
+"""Colours of the modes on the page, the same in every run: as text they have a contrast of 4.5 or more (WCAG 2.2)."""
 
 from __future__ import annotations
 

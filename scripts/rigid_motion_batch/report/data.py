@@ -16,6 +16,7 @@ import base64
 import gzip
 import json
 from collections.abc import Callable
+from math import floor, log10
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,12 @@ FEWEST_SEEN = 300
 
 MOST_CHARTED = 50_000
 """Samples of an error over time; of longer ones the largest of every few are kept."""
+
+FACTORS = (1000, 500, 200, 100, 50, 30, 20, 10, 5, 3, 2, 1)
+"""By which deviations are magnified."""
+
+SEEN_AS = {True: 0.15, False: 0.34}
+"""How large the largest deviation may look, as a share of the size of a whole body, or else of the object."""
 
 Description = list[float]
 
@@ -64,15 +71,17 @@ class Block:
         return base64.b64encode(gzip.compress(b"".join(self._parts), mtime=0)).decode("ascii")
 
 
-def clip_data(clip: ClipResult, label: Callable[[str], str]) -> dict[str, Any]:
+def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict[str, Any]:
     """What the page has of a clip: names, warnings, and a block of numbers for the recording and for each choice.
 
-    `label` gives the name of a mode.
+    `label` gives the name of a mode; the mesh is what a single rigid body moves.
     """
     block, body = Block(), clip.parents is not None
     begin = float(clip.times[0])
     seen = _seen(clip)
     truth = _joints(clip.truth)[:, seen]
+    size = (_extent(truth) if body else mesh.size) or 1.0
+    cell = _nice(0.3 * size)
     recording = {
         "times": block.put(clip.times - begin, 4, 1e-6),
         "seen": block.put(seen, 4, 1.0),
@@ -86,25 +95,34 @@ def clip_data(clip: ClipResult, label: Callable[[str], str]) -> dict[str, Any]:
         "name": clip.facts.name,
         "joints": short_names(clip.joint_names) if body else [],
         "parents": _drawn_from(clip.parents) if body else [],
-        "extent": _extent(truth) if body else 0.0,
+        "size": size,
+        "cell": cell,
+        "grid": f"{1e3 * cell:g} mm" if cell < 0.01 else f"{100 * cell:g} cm" if cell < 1.0 else f"{cell:g} m",
         "box": [truth.min(axis=(0, 1)).tolist(), truth.max(axis=(0, 1)).tolist()],
         "warnings": [
-            {"text": one.text, "from": one.start_s and one.start_s - begin, "to": one.end_s and one.end_s - begin}
+            {
+                "from": None if one.start_s is None else one.start_s - begin,
+                "to": None if one.end_s is None else one.end_s - begin,
+            }
             for one in clip.warnings
         ],
         "recording": recording | {"block": block.text()},
-        "choices": [_choice_data(clip, result, seen, label) for result in clip.choices],
+        "choices": [_choice_data(clip, result, seen, label, size) for result in clip.choices],
     }
 
 
 def _choice_data(
-    clip: ClipResult, result: ChoiceResult, seen: np.ndarray, label: Callable[[str], str]
+    clip: ClipResult, result: ChoiceResult, seen: np.ndarray, label: Callable[[str], str], size: float
 ) -> dict[str, Any]:
     block, first = Block(), result.first
     count = result.motions[0].errors.shape[1]
     every = -(-count // MOST_CHARTED)
     within = seen[(seen >= first) & (seen < first + count)]
     rows = [motion.metrics[0] for motion in result.motions]
+    body = clip.parents is not None
+    largest = max(float(motion.errors[0].max()) for motion in result.motions)
+    joints = [motion.joint_errors.max(axis=1) for motion in result.motions if motion.joint_errors is not None]
+    by_joint = np.max(joints, axis=0) if joints else np.array([largest])
     keyed = len({row.keys for row in rows}) > 1 or rows[0].decimation != "uniform"
     return {
         "name": result.choice.name,
@@ -115,6 +133,10 @@ def _choice_data(
         "every": every,
         "seen": [int(np.searchsorted(seen, first)), len(within)],
         "keyed": keyed,
+        "worst": largest,
+        "factor": next(factor for factor in FACTORS if factor * largest <= SEEN_AS[body] * size or factor == 1),
+        "joint": int(np.argmax(by_joint)),
+        "top": float(by_joint.max()),
         "motions": [
             {
                 "modes": list(motion.modes),
@@ -122,7 +144,7 @@ def _choice_data(
                 "also": [label(mode) for mode in motion.modes[1:]],
                 "rms": [1e3 * row.rms_shell_m, 1e3 * row.rms_position_m, row.rms_rotation_deg],
                 "keys_per_s": row.keys_per_s if isinstance(result.choice, Tolerance) else None,
-                "errors": block.put(_peaks(motion.errors, every) * [[1e3], [1e3], [1.0]]),
+                "errors": [block.put(row) for row in _peaks(motion.errors, every) * [[1e3], [1e3], [1.0]]],
                 "keys": block.put(motion.keys - first, 4, 1.0),
                 **_deviations(block, clip, motion, within, first),
             }
@@ -183,11 +205,11 @@ def _seen(clip: ClipResult) -> np.ndarray:
     every = -(-count // max(MOST_SEEN // a_sample, FEWEST_SEEN))
     if every == 1:
         return np.arange(count)
-    worst = [
-        result.first + int(motion.errors[0].argmax()) for result in clip.choices for motion in result.motions
-    ]
-    ends = [place for result in clip.choices for place in (result.first, result.first + len(result.motions[0].errors[0]) - 1)]
-    return np.unique(np.concatenate((np.arange(0, count, every), worst, ends)))
+    kept = [np.arange(0, count, every)]
+    for result in clip.choices:
+        shell = [motion.errors[0] for motion in result.motions]
+        kept.append(result.first + np.array([0, len(shell[0]) - 1, *(int(errors.argmax()) for errors in shell)]))
+    return np.unique(np.concatenate(kept))
 
 
 def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
@@ -198,6 +220,12 @@ def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
 def _drawn_from(parents: np.ndarray) -> list[int]:
     """The parents to draw lines from: none from a root that only carries the body about."""
     return np.where((parents >= 0) & carrying(parents)[parents], -1, parents).tolist()
+
+
+def _nice(length: float) -> float:
+    """1, 2 or 5 times a power of ten, at least this."""
+    power = 10.0 ** floor(log10(length))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length)
 
 
 def _extent(places: np.ndarray) -> float:

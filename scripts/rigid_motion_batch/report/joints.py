@@ -1,4 +1,4 @@
-"""Joint by joint: the errors of a whole body over time as pictures of a pixel for each joint and stretch, and in numbers."""
+"""Joint by joint: the errors of a whole body over time, as pictures with a row for each joint, and in numbers."""
 
 from __future__ import annotations
 
@@ -78,5 +78,5 @@ def png(pixels: np.ndarray, palette: bytes) -> bytes:
 
     lines = np.pad(pixels, ((0, 0), (1, 0))).tobytes()
     header = struct.pack(">IIBBBBB", pixels.shape[1], pixels.shape[0], 8, 3, 0, 0, 0)
-    parts = (chunk(b"IHDR", header), chunk(b"PLTE", palette), chunk(b"IDAT", zlib.compress(lines, 9)), chunk(b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
+    content = ((b"IHDR", header), (b"PLTE", palette), (b"IDAT", zlib.compress(lines, 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*one) for one in content)

@@ -1,9 +1,10 @@
-"""The object that the viewer moves: triangles in metres, the body's own axes, Blender's convention (y forward, z up)."""
+"""The object that the viewer moves: triangles in metres, in the body's own axes, y forward and z up as in Blender."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Mesh:
         normals = np.zeros((len(owners), 3))
         order = np.argsort(owners, kind="stable")
         starts = np.searchsorted(owners[order], np.arange(owners.max() + 2))
-        for first, last in zip(starts[:-1], starts[1:], strict=True):
+        for first, last in pairwise(starts.tolist()):
             around = order[first:last]
             own = faces[around // 3]
             unit = own / np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
@@ -79,7 +80,7 @@ class Mesh:
         return ends.reshape(-1, 6).T
 
     def _faces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places of all corners (3 t, 3), normals of faces as long as these are large (t, 3), and which corners meet."""
+        """Places of all corners (3 t, 3), normals of faces by their size (t, 3), and which corners are at one place."""
         places = np.asarray(self.vertices, dtype=float)[self.triangles].reshape(-1, 3)
         _, owners = np.unique(np.round(places, 6), axis=0, return_inverse=True)
         a, b, c = places.reshape(-1, 3, 3).transpose(1, 0, 2)

@@ -46,8 +46,10 @@ MEASURES = (
     Measure("bytes_per_s", "Size", "bytes/s"),
     Measure("foot_slide_m", "Feet slide", "mm", 1e3),
 )
-ERROR, KEYS = 0, 6
-"""The measures that decide: the RMS shell error, or the keys a second where a tolerance limits the error."""
+NONE, MINUS = "\u2013", "\u2212"
+
+ERROR, LARGEST, KEYS = 0, 2, 6
+"""Places of measures. The RMS shell error decides, or the keys a second where a tolerance limits the error."""
 
 KINDS: tuple[type[Choice], ...] = (Uniform, Budget, Tolerance)
 
@@ -147,7 +149,7 @@ class Gathering:
 def digits(value: float | None, places: int = 3) -> str:
     """A number with so many significant digits, as tables show it."""
     if value is None or not isfinite(value):
-        return "–"
+        return NONE
     if abs(value) < NOTHING * 1e3:
         return "0"
     return f"{value:.{max(0, places - 1 - floor(log10(abs(value))))}f}"

@@ -37,7 +37,7 @@ from .colours import ERROR_COLOURS, colours_of
 from .data import clip_data, json_in_page, mesh_data
 from .joints import Joints, joints_of
 from .mesh import Mesh, drill
-from .numbers import ERROR, KINDS, MEASURES, Gathering, Numbers, digits
+from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
 from .verdict import Verdict, verdict
 
 HERE = Path(__file__).parent
@@ -138,8 +138,8 @@ def write_report(
         Where there is nothing to report.
     """
     folder = folder or path.parent
-    films = films or {}
-    gathering, page = Gathering(), _Clips(path, films, folder)
+    films, mesh = films or {}, mesh or drill()
+    gathering, page = Gathering(), _Clips(path, films, folder, mesh)
     for clip in clips:
         page.facts.append(clip.facts)
         if clip.choices:
@@ -151,7 +151,7 @@ def write_report(
     context = _context(numbers, page.needed, settings) | {
         "clips": page,
         "overview": overview,
-        "script": _script(SCRIPTS),
+        "script": script_of(SCRIPTS),
         "start": start,
         "warnings": page.warnings(start[1]),
         "grids": [
@@ -163,7 +163,7 @@ def write_report(
             {
                 "clips": page.places,
                 "modes": list(numbers.modes),
-                "mesh": mesh_data(mesh or drill()),
+                "mesh": mesh_data(mesh),
                 "shaders": _shaders(),
                 "ramp": ERROR_COLOURS,
                 "start": {"clip": start[0], "choice": start[1]},
@@ -210,7 +210,7 @@ def write_overview(
         advance()
     numbers = gathering.numbers(dict(settings.names))
     context = _context(numbers, needed, settings) | {
-        "script": _script(("tables",)),
+        "script": script_of(("tables",)),
         "grids": tables.grids(numbers),
         "rows": _overview_rows(numbers, facts, warnings, pages),
         "count": len(facts),
@@ -225,7 +225,7 @@ def write_overview(
 class _Clips:
     """What a page has of its clips, gathered one after the other."""
 
-    def __init__(self, path: Path, films: Films, folder: Path) -> None:
+    def __init__(self, path: Path, films: Films, folder: Path, mesh: Mesh) -> None:
         self.facts: list[ClipFacts] = []
         self.needed: list[KeysNeeded] = []
         self.choices: list[tuple[str, tuple[Choice, ...]]] = []
@@ -241,7 +241,7 @@ class _Clips:
         """Their data, as JSON."""
         self.files: list[Path] = []
         self._warned: list[tuple[str, tuple[Any, ...], float]] = []
-        self._path, self._films, self._folder = path, films, folder
+        self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
 
     def add(self, clip: ClipResult, names: Mapping[str, str]) -> None:
         name, place = clip.facts.name, len(self.places)
@@ -249,7 +249,7 @@ class _Clips:
         numbers.add(clip)
         own = numbers.numbers(dict(names))
         self.choices.append((name, tuple(result.choice for result in clip.choices)))
-        self.rows += tables.every_row(place, clip)
+        self.rows += tables.every_row(clip)
         self._warned.append((name, clip.warnings, float(clip.times[0])))
         if clip.needed:
             self.needed.append(clip.needed)
@@ -264,7 +264,7 @@ class _Clips:
             if said := tables.segments_of(result, own):
                 self.segments.append((name, result.choice.title, said))
         self.places.append({"name": name, "data": ""})
-        self.inside.append(json_in_page(clip_data(clip, own.label)))
+        self.inside.append(json_in_page(clip_data(clip, own.label, self._mesh)))
         if self.files or sum(map(len, self.inside)) > IN_THE_PAGE:
             self._move_out()
 
@@ -274,7 +274,7 @@ class _Clips:
         for place, data in enumerate(self.inside):
             if data:
                 file = beside / f"{place + 1}.js"
-                write_text(file, f"rigidMotionClip({place}, {data});\n")
+                write_text(file, f"rigidMotionClips[{place}]({data});\n")
                 self.files.append(file)
                 self.places[place]["data"] = f"{quote(beside.name)}/{file.name}"
                 self.inside[place] = ""
@@ -285,7 +285,12 @@ class _Clips:
     def warnings(self, choice: str) -> list[Warned]:
         """All warnings, with the addresses of their moments under a choice."""
         return [
-            Warned(name, one.text, one.way_out, _address(name, choice, one.start_s and one.start_s - begin))
+            Warned(
+                name,
+                one.text,
+                one.way_out,
+                _address(name, choice, None if one.start_s is None else one.start_s - begin),
+            )
             for name, warned, begin in self._warned
             for one in warned
         ]
@@ -303,7 +308,7 @@ def _start(numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]]) 
     places = [place for place, choice in enumerate(numbers.choices) if type(choice) is kind]
     at = places[(len(places) - 1) // 2]
     mode = numbers.modes.index(numbers.reference) if numbers.reference else 0
-    largest = numbers.values[2, :, at, mode]
+    largest = numbers.values[LARGEST, :, at, mode]
     clip = int(np.nanargmax(largest)) if np.isfinite(largest).any() else 0
     choice = numbers.choices[at]
     return numbers.clips[clip], choice.name if choice in choices[clip][1] else choices[clip][1][0].name
@@ -318,7 +323,8 @@ def _overview_rows(
     groups = [group[0] for group in numbers.groups()]
     columns = [numbers.modes.index(mode) for mode in groups]
     beside = numbers.modes.index(numbers.reference or numbers.modes[0])
-    largest = np.nan_to_num(numbers.values[2].max(axis=(1, 2), initial=0.0, where=np.isfinite(numbers.values[2])))
+    shown = numbers.values[LARGEST]
+    largest = shown.max(axis=(1, 2), initial=0.0, where=np.isfinite(shown))
     order = sorted(range(len(facts)), key=lambda place: (not warnings[place], -largest[place]))
     for place in order:
         cells = []
@@ -329,7 +335,8 @@ def _overview_rows(
                 continue
             best = columns[int(np.nanargmin(own[columns]))]
             share = own[best] / own[beside] - 1.0 if own[beside] > 0.0 else 0.0
-            gain = "" if best == beside or share > -0.005 else f"{numbers.label(numbers.modes[best])} −{-100 * share:.0f} %"
+            name = numbers.label(numbers.modes[best])
+            gain = f"{name} {MINUS}{percent(-share)}" if share < -0.005 else ""
             cells.append(tables.Cell(digits(own[beside]), gain, value=float(np.nan_to_num(own[beside]))))
         page = pages.get(facts[place].name)
         yield {
@@ -396,7 +403,7 @@ def _csv(rows: Sequence[Metrics]) -> str:
 
 
 @cache
-def _script(names: tuple[str, ...]) -> Markup:
+def script_of(names: tuple[str, ...]) -> Markup:
     """The modules as one: imports and exports are only there for each of them alone."""
     texts = []
     for name in names:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from rigid_motion_batch.comparison.study.body_decimated import DECIMATE
 from rigid_motion_batch.comparison.study.modes import BEST_OF
 from rigid_motion_batch.comparison.study.needed import DECIMATIONS, KeysNeeded, overall
 
-from .numbers import MEASURES, Numbers, digits, listed, percent
+from .numbers import MEASURES, MINUS, NONE, Numbers, digits, listed, percent
 
 SPACINGS = dict(zip(DECIMATIONS, ("evenly spaced", "where needed", "where needed, and fitted"), strict=True))
 
@@ -69,7 +69,7 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
             continue
         texts = [[digits(value) for value in row] for row in own.tolist()]
         # What is as small as it is shown is as good: ties are ties.
-        least = [min((text for text in row if text != "–"), key=float, default="–") for row in texts]
+        least = [_least(row) for row in texts]
         rows = tuple(
             Row(
                 group,
@@ -77,7 +77,7 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
                     Cell(
                         texts[choice][column],
                         _change(own[choice, column], reference, values[place, choice], group, numbers),
-                        len(groups) > 1 and texts[choice][column] == least[choice] != "–",
+                        len(groups) > 1 and texts[choice][column] == least[choice],
                     )
                     for choice in range(len(numbers.choices))
                 ),
@@ -90,9 +90,11 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
     return found
 
 
-def _change(
-    value: float, reference: int | None, row: np.ndarray, group: Sequence[str], numbers: Numbers
-) -> str:
+def _least(texts: Iterable[str]) -> str:
+    return min((text for text in texts if text != NONE), key=float, default="")
+
+
+def _change(value: float, reference: int | None, row: np.ndarray, group: Sequence[str], numbers: Numbers) -> str:
     """A value beside the reference's, in per cent."""
     if reference is None or not np.isfinite(value):
         return ""
@@ -102,37 +104,39 @@ def _change(
         return ""
     change = 100.0 * (value / row[reference] - 1.0)
     shown = f"{abs(change):.1f}" if abs(change) < 9.95 else f"{abs(change):.0f}"
-    return "same" if shown == "0.0" else f"{'+' if change > 0 else '−'}{shown}\u00a0%"
+    return "same" if shown == "0.0" else f"{'+' if change > 0 else MINUS}{shown}\u00a0%"
 
 
-def every_row(place: int, clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[Cell, ...]]]:
+def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[Cell, ...]]]:
     """Clip, choice, modes and numbers: a row for each motion under each choice."""
     found = []
     for result in clip.choices:
         lines = [
-            [str(row.keys), digits(row.keys_per_s)]
-            + [digits(measure.of(row)) for measure in MEASURES if measure.metric != "keys_per_s"]
+            [str(row.keys), digits(row.keys_per_s)] + [digits(measure.of(row)) for measure in COUNTED]
             for motion in result.motions
             for row in motion.metrics[:1]
         ]
-        least = [min((text for text in column if text != "–"), key=float, default="") for column in zip(*lines, strict=True)]
+        least = [
+            min((text for text in column if text != NONE), key=float, default="") for column in zip(*lines, strict=True)
+        ]
         found += [
             (
                 clip.facts.name,
                 result.choice.title,
                 motion.modes,
-                tuple(
-                    Cell(text, best=len(lines) > 1 and text == best) for text, best in zip(line, least, strict=True)
-                ),
+                tuple(Cell(text, best=len(lines) > 1 and text == best) for text, best in zip(line, least, strict=True)),
             )
             for motion, line in zip(result.motions, lines, strict=True)
         ]
     return found
 
 
-EVERY_HEAD = (("Keys", ""), ("Keys", "/s"), *(
-    (measure.title.replace("Shell error", "Shell"), measure.unit) for measure in MEASURES if measure.metric != "keys_per_s"
-))
+COUNTED = tuple(measure for measure in MEASURES if measure.metric != "keys_per_s")
+EVERY_HEAD = (
+    ("Keys", ""),
+    ("Keys", "/s"),
+    *((measure.title.replace(" error", ""), measure.unit) for measure in COUNTED),
+)
 
 
 def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[Cell]]]]:
@@ -150,7 +154,11 @@ def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tup
                 if not reached:
                     cells.append(Cell("not reached", value=1e9))
                     continue
-                number = f"{single.keys[group, way, at]:.0f}" if single else f"{digits(together.keys_per_s[group, way, at])}/s"
+                number = (
+                    f"{single.keys[group, way, at]:.0f}"
+                    if single
+                    else f"{digits(together.keys_per_s[group, way, at])}/s"
+                )
                 partly = f" on {reached} of {together.asked[at]} clips" if reached < together.asked[at] else ""
                 best = bool(share <= finite[..., at].min() + 5e-3)
                 cells.append(Cell(number, percent(share) + partly, best, float(share)))
@@ -190,6 +198,8 @@ def segments_of(result: ChoiceResult, numbers: Numbers) -> str:
     said = f"Of {sum(found.counts.values())} segments {modes}; the mode changes at {found.changes} keys."
     if BEST_OF in errors and errors.get(found.best_single, 0.0) > 0.0:
         less = 1.0 - errors[BEST_OF] / errors[found.best_single]
-        said += f" RMS shell error beside {numbers.label(found.best_single)}, the best single mode: {percent(abs(less))} "
+        said += (
+            f" RMS shell error beside {numbers.label(found.best_single)}, the best single mode: {percent(abs(less))} "
+        )
         said += "lower." if less > 0 else "higher."
     return said

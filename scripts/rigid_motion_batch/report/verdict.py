@@ -18,7 +18,7 @@ from rigid_motion_batch.comparison.study.metrics import NOTHING, geometric_mean
 from rigid_motion_batch.comparison.study.modes import BEST_OF, REFERENCE
 from rigid_motion_batch.comparison.study.needed import DECIMATIONS, KeysNeeded, overall
 
-from .numbers import ERROR, KINDS, Numbers, digits, listed, percent
+from .numbers import ERROR, KINDS, MINUS, Numbers, digits, listed, percent
 
 TIE = 0.005
 """Ratios closer to 1 than this are no difference: they would be shown as 0 %."""
@@ -31,8 +31,6 @@ SPACED = {
     "adaptive": "keys where the motion needs them",
     "fitted": "fitted keys",
 }
-
-MINUS = "\u2212"
 
 SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or nothing moves."
 
@@ -192,13 +190,13 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
         return Part("No mode needs fewer keys than "), reference, Part(" at "), Part(rate, "number"), Part(" a second.")
     return (
         Part(numbers.label(mode), "mode", mode),
-        Part(f" with {SPACED[DECIMATIONS[way]]} needs "),
+        Part(f", with {SPACED[DECIMATIONS[way]]}, does with "),
         Part(f"{together.keys_per_s[group, way, at]:.3g}", "number"),
         Part(" a second where "),
-        *((reference, Part(" evenly spaced")) if mode != REFERENCE else (Part("evenly spaced ones"),)),
-        Part(" needs " if mode != REFERENCE else " have to be "),
+        Part("it") if mode == REFERENCE else reference,
+        Part(" needs "),
         Part(f"{together.reference_keys_per_s[at]:.3g}", "number"),
-        Part(f": {percent(1.0 - shares[group, way])} fewer for the same error."),
+        Part(f" evenly spaced: {percent(1.0 - shares[group, way])} fewer for the same error."),
     )
 
 
@@ -224,11 +222,11 @@ def _fewer_keys(contest: _Contest) -> Text | None:
     else:
         return None
     rate = float(np.exp(np.interp(-theirs[highest], -own, np.log(rates))))
-    at_most = theirs[highest] >= own[0]
+    at_most = theirs[highest] > own[0]
     share = 1.0 - rate / rates[highest]
     if share < TIE:
         return None
-    placed = " placed where it needs them" if contest.kind is Budget else ""
+    placed = " on average" if contest.kind is Budget else ""
     return (
         contest.name(best),
         Part(" needs at most " if at_most else " needs "),
@@ -297,13 +295,12 @@ def _nobody(contest: _Contest) -> Text:
     phrase = contest.phrase(at)
     if len(contest.groups) == 1:
         modes = contest.groups[0]
-        alike = Part(f"All {len(modes)} modes are one motion: ") if len(modes) > 1 else Part("")
+        count = "Both" if len(modes) == 2 else f"All {len(modes)}"
+        alike = Part(f"{count} modes are one motion: ") if len(modes) > 1 else Part("")
         does = " needs " if kind is Tolerance else " is "
         off = "" if kind is Tolerance else " off (RMS)"
         return tuple(
-            part
-            for part in (alike, contest.name(0), Part(does), value, Part(f"{off} {phrase}."))
-            if part.text
+            part for part in (alike, contest.name(0), Part(does), value, Part(f"{off} {phrase}.")) if part.text
         )
     scores = np.log(means[known]).mean(axis=0)
     if np.ptp(scores) < TIE:

@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,16 @@ from typing import Any
 
 NAMES = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome")
 PROGRAM = next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
+WITH_PIPE = """
+import fcntl, os, sys
+pipe = [fcntl.fcntl(int(one), fcntl.F_DUPFD, 10) for one in sys.argv[1:3]]
+os.dup2(pipe[0], 3)
+os.dup2(pipe[1], 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+"""Becomes a program that has two files of ours as 3 and 4, which is where Chromium looks for its pipe."""
 
 
 class Browser:
@@ -61,7 +72,9 @@ class Browser:
             self.loaded = True
         return message
 
-    def open(self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True) -> None:
+    def open(
+        self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True
+    ) -> None:
         """Open a page of so many pixels, and wait until it shows something."""
         self.loaded = False
         phone = width < 600
@@ -84,7 +97,9 @@ class Browser:
 
     def settle(self) -> None:
         """Wait until what was asked for is on the screen."""
-        self.run("new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 450))")
+        self.run(
+            "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 450))"
+        )
 
     def mouse(self, *moves: tuple[str, float, float]) -> None:
         """Moves of the left button: ("pressed" | "moved" | "released", x, y), in pixels of the page."""
@@ -115,12 +130,11 @@ def browser() -> Iterator[Browser]:
     """Start a Chromium, which ends with the block."""
     (from_us, to_it), (from_it, to_us) = os.pipe(), os.pipe()
     with TemporaryDirectory() as profile:
-        # The pipe for debugging is 3 and 4; a shell puts ours there.
         arguments = ["--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run", "--mute-audio",
                      "--disable-dev-shm-usage", "--disable-background-networking", "--enable-unsafe-swiftshader",
                      f"--user-data-dir={profile}"]  # fmt: skip
         process = subprocess.Popen(
-            ["/bin/sh", "-c", f'exec "$@" 3<&{from_us} 4>&{to_us}', "sh", str(PROGRAM), *arguments],
+            [sys.executable, "-c", WITH_PIPE, str(from_us), str(to_us), str(PROGRAM), *arguments],
             pass_fds=(from_us, to_us),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -1,7 +1,7 @@
 /* The chart: the error over time under each mode, their keys, and the moment that the view shows. */
 import { at, highest, polyline, valueAt } from "./data.js";
 import { clamp, short, ticks } from "./mathematics.js";
-import { $, changed, id, ink, paint, play, S, shown, UNITS } from "./state.js";
+import { $, changed, id, ink, paint, play, S, shown } from "./state.js";
 import { pointers, wheel } from "./pointers.js";
 
 const plot = $("plot"), LEFT = 44, RIGHT = 10, TOP = 10, ROW = 8;
@@ -25,18 +25,16 @@ paint("chart", () => {
   const last = Math.min(at(times, S.high)[0] + 1, times.length - 1);
   const lines = all.map(({ errors }) => polyline(errors[S.measure], first, last, inside()));
   const top = 1.06 * Math.max(1e-6, ...lines.map((points) => points.reduce((most, [, v]) => Math.max(most, v), 0)));
-  const y = (value) => base - (value / top) * (base - TOP), up = ticks(0, top, 6), along = ticks(S.low, S.high, width / 90);
+  const y = (value) => base - (value / top) * (base - TOP), along = ticks(S.low, S.high, width / 90);
   base = height - 27 - ROW * rows.length;
   tallest = Math.max(1e-9, ...all.map((motion) => worst(motion).value));
   let drawn = `<clipPath id="inside"><rect x="${LEFT}" width="${inside()}" height="${height}"/></clipPath>`
     + label(LEFT - 7, base + ROW + 5, "end", "keys");
-  for (const v of up.values)
+  for (const [v, text] of ticks(0, top, 6))
     drawn += element("line", { class: v ? "grid" : "axis", x1: LEFT, x2: width - RIGHT, y1: y(v), y2: y(v) })
-      + label(LEFT - 7, y(v) + (v ? 4 : 1), "end", v.toFixed(up.places));
-  for (const t of along.values) {
-    const last = t === along.values.at(-1);
-    drawn += label(Math.min(xAt(t) + 8 * last, width - 20), height - 3, "middle", t.toFixed(along.places) + (last ? " s" : ""));
-  }
+      + label(LEFT - 7, y(v) + (v ? 4 : 1), "end", text);
+  for (const [t, text] of along)
+    drawn += label(Math.min(xAt(t), width - 20), height - 3, "middle", t === along.at(-1)[0] ? `${text} s` : text);
   drawn += `<g clip-path="url(#inside)">`;
   for (const { from, to } of S.clip.warnings.filter((one) => one.from !== null))
     drawn += element("rect", { class: "doubt", x: xAt(from), y: TOP, width: Math.max(2, xAt(to ?? from) - xAt(from)),
@@ -50,7 +48,8 @@ paint("chart", () => {
     const { t, value } = worst(motion), stroke = `var(${ink(motion)})`;
     const d = `M${lines[k].map(([i, v]) => `${xAt(times[i]).toFixed(1)} ${y(v).toFixed(1)}`).join("L")}`;
     drawn += element("path", { class: `line${S.hot ? (S.hot === id(motion) ? " hot" : " dim") : ""}`, d, stroke,
-      ...(k === 2 && { "stroke-dasharray": "5 3" }) }) + element("circle", { cx: xAt(t), cy: y(value), r: 3.5, stroke });
+      ...(k === 2 && { "stroke-dasharray": "5 3" }) });
+    drawn += element("circle", { cx: xAt(t), cy: y(value), r: 3.5, stroke });
   });
   plot.innerHTML = `${drawn}</g><g id="cursor"></g>`;
   changed("cursor");
@@ -61,12 +60,11 @@ export function cursor() {
   if (S.playing && (S.t < S.low || S.t > S.high)) zoom(S.t, S.t + S.high - S.low);
   $("cursor").innerHTML = S.t < S.low || S.t > S.high ? "" : `<path d="M${x - 5} 0h10v5l-5 5-5-5z"/>`
     + element("line", { class: "now", x1: x, x2: x, y1: TOP - 4, y2: base + 5 });
+  [plot.ariaValueMin, plot.ariaValueNow, plot.ariaValueMax] = [S.choice.begin, S.t, S.choice.end];
   $("now").textContent = S.t.toFixed(2);
-  [plot.ariaValueMin, plot.ariaValueNow, plot.ariaValueMax] = [S.choice.begin, S.t, S.choice.end].map((t) => t.toFixed(3));
-  plot.ariaValueText = `${S.t.toFixed(2)} seconds; `
-    + said.map(([{ name }, value]) => `${name} ${short(value)} ${UNITS[S.measure]}`).join(", ");
+  plot.ariaValueText = `${S.t.toFixed(2)} s; ${said.map(([{ name }, value]) => `${name} ${short(value)}`).join(", ")}`;
   for (const [motion, value] of said) {
-    const row = document.querySelector(`#modes tr[data-mode="${id(motion)}"]`);
+    const row = $("modes").tBodies[0].rows[S.choice.motions.indexOf(motion)];
     row.querySelector(".live").textContent = short(value);
     row.style.setProperty("--share", value / tallest);
   }
@@ -82,14 +80,14 @@ export function zoom(from, to) {
   S.high = S.low + span;
   changed("chart");
 }
-export const zoomBy = (factor, t = clamp(S.t, S.low, S.high)) => zoom(t + (S.low - t) * factor, t + (S.high - t) * factor);
+export const zoomBy = (share, t = clamp(S.t, S.low, S.high)) => zoom(t + (S.low - t) * share, t + (S.high - t) * share);
 
 /* The highest point near a place, or the moment there. */
 function peakAt(x) {
   const { times } = S.choice, [first, last] = [timeAt(x - 7), timeAt(x + 7)].map((t) => at(times, t)[0]);
-  const peaks = shown().map(({ errors }) => errors[S.measure].subarray(first, last + 1)).filter((part) => part.length > 2)
-    .map((part) => [part[highest(part)], first + highest(part)]).filter(([, i]) => i > first && i < last);
-  return peaks.length ? times[peaks.reduce((a, b) => (b[0] > a[0] ? b : a))[1]] : timeAt(x);
+  const most = (i) => Math.max(...shown().map(({ errors }) => errors[S.measure][i]));
+  const peak = first + highest(Array.from({ length: last - first + 1 }, (_, i) => most(first + i)));
+  return peak > first && peak < last ? times[peak] : timeAt(x);
 }
 pointers(plot, {
   start: () => { dragged = false; play(false); },

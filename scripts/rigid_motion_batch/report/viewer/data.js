@@ -22,23 +22,20 @@ export function unpack(bytes, [offset, rows, n, step, width]) {
   return Array.from({ length: rows }, (_, row) => values.subarray(row * n, (row + 1) * n));
 }
 
-export async function readRecording({ block, ...arrays }) {
-  const bytes = await inflate(block), read = (one) => one && unpack(bytes, one);
-  const [times, seen] = [read(arrays.times)[0], read(arrays.seen)[0]];
-  return { times, moments: seen.map((i) => times[i]), places: read(arrays.places), turns: read(arrays.turns),
-    scales: read(arrays.scales)?.[0] };
+export async function readRecording({ block, times, seen, places, turns, scales }) {
+  const bytes = await inflate(block), read = (one) => one && unpack(bytes, one), [all] = read(times);
+  const moments = read(seen)[0].map((i) => all[i]);
+  return { times: all, moments, places: read(places), turns: read(turns), scales: read(scales) };
 }
 
 export async function readChoice({ block, first, count, every, seen, ...choice }, { times, moments }) {
   const bytes = await inflate(block), read = (one) => one && unpack(bytes, one);
   const own = times.subarray(first, first + count);
-  const charted = every > 1 ? own.filter((_, i) => i % every === 0) : own;
-  if (every > 1) charted[charted.length - 1] = own[count - 1];
-  return { ...choice, seen: seen[0], moments: moments.subarray(seen[0], seen[0] + seen[1]), times: charted,
-    begin: own[0], end: own[count - 1],
-    motions: choice.motions.map((motion) => ({ ...motion, errors: read(motion.errors), away: read(motion.away),
-      turn: read(motion.turn), grown: read(motion.grown)?.[0], byJoint: read(motion.by_joint),
-      keys: Array.from(read(motion.keys)[0], (i) => own[i]) })) };
+  return { ...choice, seen: seen[0], moments: moments.subarray(seen[0], seen[0] + seen[1]),
+    begin: own[0], end: own[count - 1], times: own.filter((_, i) => i % every === 0),
+    motions: choice.motions.map(({ errors, keys, away, turn, grown, by_joint, ...motion }) => ({ ...motion,
+      errors: errors.map((one) => read(one)[0]), keys: Array.from(read(keys)[0], (i) => own[i]),
+      away: read(away), turn: read(turn), grown: read(grown), byJoint: read(by_joint) })) };
 }
 
 /* The sample at or before a time, and how far on the way to the next. */
@@ -52,27 +49,18 @@ export function at(times, t) {
   return [low, Math.max(0, (t - times[low]) / (times[high] - times[low]))];
 }
 
-export function valueAt(times, values, t) {
-  const [i, share] = at(times, t);
-  return share ? values[i] * (1 - share) + values[i + 1] * share : values[i];
-}
-
-export function highest(values) {
-  let best = 0;
-  for (let i = 1; i < values.length; i++) if (values[i] > values[best]) best = i;
-  return best;
-}
+export const valueAt = (times, values, t, [i, share] = at(times, t)) =>
+  (share ? values[i] * (1 - share) + values[i + 1] * share : values[i]);
+export const highest = (values) => values.reduce((best, value, i) => (value > values[best] ? i : best), 0);
 
 /* Samples from one to another as at most about so many points [sample, value]: the extremes of every few of them. */
 export function polyline(values, first, last, most) {
   const step = Math.max(1, Math.ceil((2 * (last - first)) / most)), points = [];
   for (let i = first; i <= last; i += step) {
     let [low, high] = [i, i];
-    for (let k = i + 1; k < Math.min(i + step, last + 1); k++) {
-      if (values[k] < values[low]) low = k;
-      if (values[k] > values[high]) high = k;
-    }
-    for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) points.push([k, values[k]]);
+    for (let k = i + 1; k < i + step && k <= last; k++)
+      if (values[k] < values[low]) low = k; else if (values[k] > values[high]) high = k;
+    for (const k of new Set([Math.min(low, high), Math.max(low, high)])) points.push([k, values[k]]);
   }
   return points;
 }

@@ -1,14 +1,13 @@
 /* WebGL: solids, lines of any width, dots, the ground. Knows nothing of clips; the shaders are in shaders.glsl. */
 
-const UNMOVED = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-
 export function drawingOn(canvas, shaders, ramp) {
   const gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
   if (!gl) return null;
   const setters = { [gl.FLOAT]: "uniform1f", [gl.FLOAT_VEC2]: "uniform2fv", [gl.FLOAT_VEC3]: "uniform3fv" };
-  let width = 1, height = 1, camera = null, floor = null, programs = {};
+  const unmoved = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+  let size = [1, 1], camera = null;
 
-  function compile(sources) {
+  function compile([name, sources]) {
     const program = gl.createProgram(), uniforms = [];
     sources.forEach((source, i) => {
       const shader = gl.createShader(i ? gl.FRAGMENT_SHADER : gl.VERTEX_SHADER);
@@ -19,89 +18,64 @@ export function drawingOn(canvas, shaders, ramp) {
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
     for (let i = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS) - 1; i >= 0; i--) {
-      const { name, type } = gl.getActiveUniform(program, i);
-      uniforms.push([name.replace("[0]", ""), gl.getUniformLocation(program, name), setters[type]]);
+      const uniform = gl.getActiveUniform(program, i), place = gl.getUniformLocation(program, uniform.name);
+      uniforms.push([uniform.name.replace("[0]", ""), place, setters[uniform.type]]);
     }
-    return { program, uniforms };
+    return [name, { program, uniforms }];
   }
-  function use(name, what, values) {
-    const given = { view: camera.view, ramp, ...values };
-    gl.useProgram(programs[name].program);
-    gl.bindVertexArray(what.vertices);
-    for (const [key, place, setter] of programs[name].uniforms)
-      if (setter) gl[setter](place, given[key] ?? 0); else gl.uniformMatrix4fv(place, false, given[key]);
-  }
-  /* Numbers that are drawn: attributes of these sizes, a set for each vertex, or for each of many copies. */
-  function array(data, sizes, each = 0) {
+  const programs = Object.fromEntries(Object.entries(shaders).map(compile));
+
+  /* Numbers that are drawn: attributes of these sizes, a set for each vertex, or for each line. */
+  function array(shape, sizes, data, each = 0) {
     const vertices = gl.createVertexArray(), buffer = gl.createBuffer(), stride = sizes.reduce((a, b) => a + b);
     gl.bindVertexArray(vertices);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, Float32Array.from(data), gl.DYNAMIC_DRAW);
-    sizes.reduce((offset, size, i) => {
+    gl.bufferData(gl.ARRAY_BUFFER, Float32Array.from(data), gl.STATIC_DRAW);
+    sizes.reduce((offset, length, i) => {
       gl.enableVertexAttribArray(i);
-      gl.vertexAttribPointer(i, size, gl.FLOAT, false, 4 * stride, 4 * offset);
+      gl.vertexAttribPointer(i, length, gl.FLOAT, false, 4 * stride, 4 * offset);
       gl.vertexAttribDivisor(i, each);
-      return offset + size;
+      return offset + length;
     }, 0);
-    return { vertices, buffer, count: data.length / stride };
+    return { vertices, buffer, shape, each, count: data.length / stride };
   }
-  const drop = (what) => [gl.deleteVertexArray(what.vertices), gl.deleteBuffer(what.buffer)];
-  const pen = {
-    points: (data) => array(data, [4]), triangles: (data) => array(data, [3, 3, 1]), drop,
-    segments: (data) => array(data, [4, 4], 1),
-    setUp() {
-      programs = Object.fromEntries(Object.entries(shaders).map(([name, sources]) => [name, compile(sources)]));
-      floor = array([-1, -1, 1, -1, -1, 1, 1, 1], [2]);
-    },
-    begin(w, h) {
-      if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
-      height = h;
-      gl.disable(gl.SCISSOR_TEST);
-      gl.clearColor(0, 0, 0, 0);
-      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-      [gl.BLEND, gl.SCISSOR_TEST, gl.DEPTH_TEST, gl.POLYGON_OFFSET_FILL].forEach((one) => gl.enable(one));
-      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      gl.depthFunc(gl.LEQUAL);
-    },
-    lane(x, wide, seen) {
-      [width, camera] = [wide, seen];
-      gl.viewport(x, 0, wide, height);
-      gl.scissor(x, 0, wide, height);
-    },
-    ground(colour, centre, reach, cell) {
-      gl.depthMask(false);
-      use("ground", floor, { colour, centre, reach, cell });
-      gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
-      gl.depthMask(true);
-    },
-    lines(what, colour, wide, alpha, { hidden = true, solid = false, ...more } = {}) {
-      gl.depthMask(solid);
-      if (!hidden) gl.disable(gl.DEPTH_TEST);
-      use("line", what, { colour, width: wide, alpha, body: UNMOVED, size: [width, height], ...more });
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, what.count);
-      gl.enable(gl.DEPTH_TEST);
-      gl.depthMask(true);
-    },
-    linesOnce(data, ...how) {
-      const once = array(data, [4, 4], 1);
-      pen.lines(once, ...how);
+  /* Draw with a program: whether it is seen, hides what is behind it, and is hidden by what is before it. */
+  function draw(name, { vertices, shape, each, count }, values, { seen = true, hides = false, hidden = true } = {}) {
+    const given = { view: camera.view, eye: camera.eye, body: unmoved, ramp, size, alpha: 1, ...values };
+    gl.depthMask(hides);
+    gl[hidden ? "enable" : "disable"](gl.DEPTH_TEST);
+    gl.colorMask(seen, seen, seen, seen);
+    gl.polygonOffset(-(values.nearer ?? 0), -(values.nearer ?? 0));
+    gl.useProgram(programs[name].program);
+    gl.bindVertexArray(vertices);
+    for (const [key, place, setter] of programs[name].uniforms)
+      if (setter) gl[setter](place, given[key] ?? 0); else gl.uniformMatrix4fv(place, false, given[key]);
+    if (each) gl.drawArraysInstanced(shape, 0, 4, count); else gl.drawArrays(shape, 0, count);
+  }
+  const drop = ({ vertices, buffer }) => [gl.deleteVertexArray(vertices), gl.deleteBuffer(buffer)];
+  const segments = (data) => array(gl.TRIANGLE_STRIP, [4, 4], data, 1);
+  return {
+    draw, drop, segments, triangles: (data) => array(gl.TRIANGLES, [3, 3, 1], data),
+    points: (data) => array(gl.POINTS, [4], data), plane: array(gl.TRIANGLE_STRIP, [2], [-1, -1, 1, -1, -1, 1, 1, 1]),
+    lines(data, values, how) {
+      const once = segments(data);
+      draw("line", once, values, how);
       drop(once);
     },
-    solid(what, body, colour, alpha = 1, nearer = 0) {
-      gl.polygonOffset(-nearer, -nearer);
-      use("solid", what, { body, colour, eye: camera.eye, alpha });
-      if (alpha < 1) { // its depth first, or its far side would show through
-        gl.colorMask(false, false, false, false);
-        gl.drawArrays(gl.TRIANGLES, 0, what.count);
-        gl.colorMask(true, true, true, true);
-      }
-      gl.drawArrays(gl.TRIANGLES, 0, what.count);
+    begin(width, height) {
+      if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+      [gl.BLEND, gl.DEPTH_TEST, gl.POLYGON_OFFSET_FILL, gl.SCISSOR_TEST].forEach((one) => gl.enable(one));
+      gl.scissor(0, 0, width, height);
+      gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+      gl.depthFunc(gl.LEQUAL);
+      gl.depthMask(true);
+      gl.colorMask(true, true, true, true);
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     },
-    dots(what, colour, rim, size, more) {
-      use("dot", what, { colour, rim, size, lift: -0.0006, ...more });
-      gl.drawArrays(gl.POINTS, 0, what.count);
+    lane(x, width, through) {
+      [size, camera] = [[width, canvas.height], through];
+      gl.viewport(x, 0, ...size);
+      gl.scissor(x, 0, ...size);
     },
   };
-  pen.setUp();
-  return pen;
 }

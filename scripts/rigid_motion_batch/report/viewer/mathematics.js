@@ -5,10 +5,9 @@ export const clamp = (value, low, high) => Math.min(high, Math.max(low, value));
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const mix = (a, b, share) => a.map((value, i) => value + (b[i] - value) * share);
 
-export function times(a, b) {
-  return [a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3], a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-    a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1], a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]];
-}
+export const times = (a, b) => [a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+  a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2], a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+  a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]];
 
 /* The quaternion of a rotation vector. */
 export function turning(vector) {
@@ -31,7 +30,7 @@ export function poseAt(recording, choice, t, motion, factor) {
   const [i, share] = at(choice.moments, t), k = i + choice.seen;
   const pose = { places: between(recording.places, k, share), scale: 1 };
   if (recording.turns) pose.turn = quaternionAt(recording.turns, k, share);
-  if (recording.scales) [pose.scale] = between([recording.scales], k, share);
+  if (recording.scales) [pose.scale] = between(recording.scales, k, share);
   if (!motion) return pose;
   if (motion.byJoint) pose.errors = between(motion.byJoint, i, share);
   between(motion.away, i, share).forEach((value, row) => { pose.places[row] += factor * value; });
@@ -39,7 +38,7 @@ export function poseAt(recording, choice, t, motion, factor) {
     const vector = between(motion.turn, i, share), most = Math.min(factor, 3 / Math.max(Math.hypot(...vector), 1e-9));
     pose.turn = times(turning(vector.map((value) => value * most)), pose.turn);
   }
-  if (motion.grown) pose.scale *= Math.exp(factor * between([motion.grown], i, share)[0]);
+  if (motion.grown) pose.scale *= Math.exp(factor * between(motion.grown, i, share)[0]);
   return pose;
 }
 
@@ -59,7 +58,6 @@ export function axesOf({ turn, tilt }) {
 }
 
 export const NARROW = Math.tan(0.26); // of half the angle that the view has from top to bottom
-
 export function cameraOf(camera, aspect, deep) {
   const axes = axesOf(camera), eye = camera.to.map((value, i) => value + axes[2][i] * camera.far), f = 1 / NARROW;
   const near = camera.far * 0.02, far = camera.far + deep;
@@ -68,28 +66,16 @@ export function cameraOf(camera, aspect, deep) {
   return { view: product([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, depth[0], -1, 0, 0, depth[1], 0], look), eye };
 }
 
-/* The largest factor with which a deviation still looks no larger than this. */
-export const magnification = (largest, size) =>
-  [1000, 500, 200, 100, 50, 30, 20, 10, 5, 3, 2].find((factor) => factor * largest <= size) ?? 1;
-
-/* 1, 2 or 5 times a power of ten, at least this. */
-export function nice(value) {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return [1, 2, 5, 10].map((step) => step * power).find((step) => step >= value * 0.999);
-}
-
+/* Round numbers from one to another, about so many, as [number, text]. */
 export function ticks(low, high, wanted) {
-  const step = nice((high - low) / Math.max(wanted, 1)), first = Math.ceil(low / step - 1e-9), found = [];
-  for (let k = first; k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  return { values: found, places: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
+  const raw = (high - low) / wanted, power = 10 ** Math.floor(Math.log10(raw)), found = [];
+  const step = power * [1, 2, 5, 10].find((one) => one * power >= raw * 0.999);
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++)
+    found.push([k * step, (k * step).toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))]);
+  return found;
 }
 
 export const short = (value) => value.toFixed(value >= 99.95 ? 0 : value >= 9.995 ? 1 : 2);
-export function lengthOf(metres) {
-  const [unit, factor] = metres >= 1 ? ["m", 1] : metres >= 0.01 ? ["cm", 100] : ["mm", 1000];
-  return `${+(metres * factor).toPrecision(2)} ${unit}`;
-}
-
 /* The address of a moment: clip, choice of keys, seconds. */
 export const addressOf = (clip, choice, t) => `#${[clip, choice].map(encodeURIComponent).join()},${t.toFixed(3)}`;
 export function fromAddress(hash) {

@@ -2,12 +2,11 @@
 import { at, readChoice, readRecording } from "./data.js";
 import { addressOf, clamp, fromAddress, short } from "./mathematics.js";
 import { $, changed, id, ink, PAGE, paint, play, S, shown, UNITS } from "./state.js";
-import { follow, newChoice, newPaths, openView, readColours, readOutLanes } from "./view.js";
+import { follow, magnify, nameLanes, openView, readColours } from "./view.js";
 import { cursor, seek, worst, zoom, zoomBy } from "./chart.js";
 
-const all = (selector) => [...document.querySelectorAll(selector)], arrived = {};
-let remembering = 0;
-window.rigidMotionClip = (place, data) => arrived[place](data);
+const all = (selector) => [...document.querySelectorAll(selector)], arrived = window.rigidMotionClips = {};
+let remembering = 0, last = 0;
 
 /* The data of a clip: in the page, or in a file beside it that a script element brings. */
 const dataOf = (place, src = PAGE.clips[place].data) => new Promise((resolve, reject) => {
@@ -18,87 +17,75 @@ const dataOf = (place, src = PAGE.clips[place].data) => new Promise((resolve, re
 });
 
 async function show({ clip, choice, t }) {
-  const place = Math.max(0, PAGE.clips.findIndex(({ name }) => name === clip));
-  if (S.clip?.name !== PAGE.clips[place].name) {
-    const data = await dataOf(place);
-    [S.recording, S.clip] = [await readRecording(data.recording), data];
-  }
-  S.choice = await readChoice(S.clip.choices.find(({ name }) => name === choice) ?? S.clip.choices[0], S.recording);
-  for (const one of all("[name=clip]")) if (one.type === "radio") one.checked = +one.value === place; else one.value = place;
+  const place = Math.max(0, PAGE.clips.findIndex(({ name }) => name === clip)), own = ++last;
+  const data = S.clip?.name === PAGE.clips[place].name ? S.clip : await dataOf(place);
+  const recording = data === S.clip ? S.recording : await readRecording(data.recording);
+  const found = await readChoice(data.choices.find(({ name }) => name === choice) ?? data.choices[0], recording);
+  if (own !== last) return; // something else has been asked for since
+  Object.assign(S, { clip: data, recording, choice: found });
+  for (const one of all("[name=clip]"))
+    if (one.type === "radio") one.checked = +one.value === place; else one.value = place;
   for (const one of all("[name=choice]")) {
-    one.checked = one.value === S.choice.name;
-    one.disabled = !S.clip.choices.some(({ name }) => name === one.value);
+    one.checked = one.value === found.name;
+    one.disabled = !data.choices.some(({ name }) => name === one.value);
   }
-  [$("about").textContent, $("end").textContent] = [S.choice.about, ` / ${S.choice.end.toFixed(2)} s`];
+  [$("about").textContent, $("end").textContent] = [found.about, ` / ${found.end.toFixed(2)} s`];
   for (const one of all("[data-clip]"))
-    one.hidden = one.dataset.clip !== `${place}` || (one.dataset.choice ?? S.choice.name) !== S.choice.name;
-  zoom(S.choice.begin, S.choice.end);
+    one.hidden = +one.dataset.clip !== place || (one.dataset.choice ?? found.name) !== found.name;
+  zoom(found.begin, found.end);
   listModes();
-  newChoice();
-  if (t === undefined) return toWorst(0);
-  seek(t);
-  return follow(true, 0);
+  magnify(S.automatic ? found.factor : S.factor, S.automatic);
+  if (t === undefined) toWorst(true); else [seek(t), follow(true, true)];
 }
 
 function listModes() {
   const least = short(Math.min(...S.choice.motions.map(({ rms }) => rms[S.measure])));
-  $("modes").tBodies[0].replaceChildren(...S.choice.motions.map((motion, k) => {
+  $("modes").tBodies[0].replaceChildren(...S.choice.motions.map((motion) => {
     const row = $("mode").content.firstElementChild.cloneNode(true), find = (name) => row.querySelector(`.${name}`);
-    const hot = (on) => { S.hot = on && !S.hidden.has(id(motion)) ? id(motion) : ""; changed("chart", "view"); };
-    Object.assign(row, { onpointerenter: () => hot(true), onpointerleave: () => hot(false) });
-    Object.assign(row.dataset, { mode: id(motion), number: k + 1 });
+    const hot = (mode) => { S.hot = S.hidden.has(mode) ? "" : mode; changed("chart", "view"); };
+    Object.assign(row, { onpointerenter: () => hot(id(motion)), onpointerleave: () => hot("") });
     row.style.setProperty("--c", `var(${ink(motion)})`);
     find("chip").lastChild.textContent = motion.name;
     find("chip").ariaPressed = !S.hidden.has(id(motion));
-    find("chip").onclick = () => toggle(motion);
+    find("chip").onclick = () => {
+      if (!S.hidden.delete(id(motion))) S.hidden.add(id(motion));
+      find("chip").ariaPressed = !S.hidden.has(id(motion));
+      magnify(S.factor, S.automatic);
+      changed("chart");
+    };
     find("also").textContent = motion.also.map((name) => `= ${name}`).join("\n");
-    find("rms").textContent = short(motion.rms[S.measure]);
+    [find("rms").textContent, find("worst").textContent] = [motion.rms[S.measure], worst(motion).value].map(short);
     find("rms").classList.toggle("best", short(motion.rms[S.measure]) === least);
-    find("worst").textContent = short(worst(motion).value);
     find("worst").onclick = () => toWorst(undefined, [motion]);
     return row;
   }));
   $("unit").textContent = UNITS[S.measure];
   changed("chart");
 }
-function toggle(motion) {
-  if (!S.hidden.delete(id(motion))) S.hidden.add(id(motion));
-  $("modes").querySelector(`[data-mode="${id(motion)}"] .chip`).ariaPressed = !S.hidden.has(id(motion));
-  newPaths();
-  changed("chart");
-}
-function toWorst(ms, motions = shown()) {
+function toWorst(at_once, motions = shown()) {
   if (!motions.length) return;
   play(false);
   seek(motions.map(worst).reduce((a, b) => (b.value > a.value ? b : a)).t);
   if (S.t < S.low || S.t > S.high) zoom(S.t - (S.high - S.low) / 2, S.t + (S.high - S.low) / 2);
-  follow(true, ms);
+  follow(true, at_once);
 }
 function toKey(way) {
   const keys = shown().flatMap((motion) => motion.keys).filter((t) => way * (t - S.t) > 1e-4);
   if (keys.length) seek(way > 0 ? Math.min(...keys) : Math.max(...keys));
 }
-function toSample(way) {
-  const { times } = S.choice, [i, share] = at(times, S.t + 1e-6);
-  seek(times[clamp(way > 0 ? i + 1 : share > 0.01 ? i : i - 1, 0, times.length - 1)]);
-}
-function magnify(factor) {
-  [S.factor, S.automatic] = [clamp(+factor.toPrecision(2), 1, 1000), false];
-  newPaths();
-}
+const toSample = (way, { times } = S.choice) => seek(times[clamp(at(times, S.t + 1e-6)[0] + way, 0, times.length - 1)]);
 
 const ACTIONS = { play: () => play(), worst: () => toWorst(), last: () => toKey(-1), next: () => toKey(1),
-  before: () => toSample(-1), after: () => toSample(1), begin: () => seek(S.choice.begin), end: () => seek(S.choice.end),
+  before: () => toSample(-1), after: () => toSample(1), begin: () => seek(-Infinity), end: () => seek(Infinity),
   in: () => zoomBy(0.6), out: () => zoomBy(1 / 0.6), all: () => zoom(S.choice.begin, S.choice.end),
-  more: () => magnify(S.factor * 1.25), less: () => magnify(S.factor / 1.25), whole: () => follow(!S.follow),
-  automatic: () => { S.automatic = true; newChoice(); } };
+  whole: () => follow(!S.follow), automatic: () => magnify(S.choice.factor, true) };
 const KEYS = { " ": "play", w: "worst", ArrowLeft: "before", ArrowRight: "after", Home: "begin", End: "end", f: "whole",
-  "+": "in", "-": "out", 0: "all", "]": "more", "[": "less" };
+  "+": "in", "-": "out", 0: "all" };
 addEventListener("keydown", (event) => {
-  const name = event.shiftKey && { ArrowLeft: "last", ArrowRight: "next" }[event.key] || KEYS[event.key];
-  const chip = $("modes").querySelector(`[data-number="${event.key}"] .chip`), on = event.target;
-  if (event.ctrlKey || event.metaKey || event.altKey || !(name || chip) || on.matches("input, select")
-    || (event.key === " " && on.matches("button, a, summary")) || (/Home|End/.test(event.key) && on.tabIndex < 0)) return;
+  const { key, target, shiftKey } = event, chip = $("modes").tBodies[0].rows[key - 1]?.querySelector(".chip");
+  const name = (shiftKey && { ArrowLeft: "last", ArrowRight: "next" }[key]) || KEYS[key];
+  if (event.ctrlKey || event.metaKey || event.altKey || !(name || chip) || target.matches("input, select")
+    || (key === " " && target.matches("button, a, summary")) || (/Home|End/.test(key) && target.tabIndex < 0)) return;
   event.preventDefault();
   if (name) ACTIONS[name](); else chip.click();
 });
@@ -107,28 +94,30 @@ document.addEventListener("change", ({ target: { name, value, type, checked } })
   if (name === "clip") show({ clip: PAGE.clips[value].name, choice: S.choice.name });
   else if (name === "choice") show({ clip: S.clip.name, choice: value, t: S.t });
   else if (name === "follow") follow(checked);
-  else if (name === "scope" || name === "column")
+  else if (name === "scope" || name === "column") {
+    const [scope, column] = [$("scope").value, $("column").value];
     for (const one of all("[data-scope]"))
-      one.hidden = one.dataset.scope !== $("scope").value || (one.dataset.column ?? $("column").value) !== $("column").value;
-  else if (name in S) {
+      one.hidden = one.dataset.scope !== scope || (one.dataset.column ?? column) !== column;
+  } else if (name in S) {
     S[name] = type === "checkbox" ? checked : name === "speed" || name === "measure" ? +value : value;
     listModes();
-    newPaths();
+    magnify(S.factor, S.automatic);
   }
 });
-$("factor").addEventListener("input", ({ target }) => magnify(10 ** (target.value / 50)));
+$("factor").addEventListener("input", ({ target }) => magnify(+(10 ** (target.value / 50)).toPrecision(2)));
 
 paint("cursor", () => {
   cursor();
-  readOutLanes();
+  nameLanes();
   clearTimeout(remembering);
-  remembering = setTimeout(() => !S.playing && history.replaceState(null, "", addressOf(S.clip.name, S.choice.name, S.t)), 300);
+  const address = addressOf(S.clip.name, S.choice.name, S.t);
+  remembering = setTimeout(() => S.playing || history.replaceState(null, "", address), 300);
 });
-const addressed = () => (PAGE.clips.some(({ name }) => name === fromAddress(location.hash).clip) ? fromAddress(location.hash) : null);
-addEventListener("hashchange", () => addressed() && show(addressed()));
-new ResizeObserver(() => S.choice && (newPaths(), changed("chart", "view"))).observe($("view"));
+const fromHere = (asked = fromAddress(location.hash)) => PAGE.clips.some(({ name }) => name === asked.clip) && asked;
+addEventListener("hashchange", () => fromHere() && show(fromHere()));
+new ResizeObserver(() => S.choice && (magnify(S.factor, S.automatic), changed("chart"))).observe($("view"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readColours);
 addEventListener("beforeprint", () => all("details").forEach((one) => { one.open = true; }));
 await openView();
 readColours();
-await show(addressed() ?? PAGE.start).catch((error) => { $("about").textContent = error.message; });
+await show(fromHere() || PAGE.start).catch((error) => { $("about").textContent = error.message; });

@@ -6,8 +6,8 @@ export function pointers(element, { start, move, pinch, finish }) {
     const box = element.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   };
-  const pair = ([a, b] = [...down.values()]) => ({ x: (a.x + b.x) / 2, y: (a.y + b.y) / 2,
-    apart: Math.hypot(a.x - b.x, a.y - b.y) || 1 });
+  const pair = ([{ x, y }, to] = [...down.values()]) =>
+    ({ x: (x + to.x) / 2, y: (y + to.y) / 2, apart: Math.hypot(x - to.x, y - to.y) });
   element.addEventListener("pointerdown", (event) => {
     element.setPointerCapture(event.pointerId);
     element.focus({ preventScroll: true });
@@ -20,15 +20,13 @@ export function pointers(element, { start, move, pinch, finish }) {
     down.set(event.pointerId, place(event));
     if (both) pinch(both, pair()); else if (down.size === 1) move(place(event), old, event);
   });
-  for (const name of ["pointerup", "pointercancel"])
-    element.addEventListener(name, (event) => down.delete(event.pointerId) && !down.size && finish?.(place(event), event));
+  const up = (event) => down.delete(event.pointerId) && !down.size && finish?.(place(event), event);
+  ["pointerup", "pointercancel"].forEach((name) => element.addEventListener(name, up));
 }
 
 /* The wheel scrolls the page until the element has the focus, or Ctrl is held. */
 export function wheel(element, turn) {
   element.addEventListener("wheel", (event) => {
-    if (document.activeElement !== element && !event.ctrlKey && !event.metaKey) return;
-    event.preventDefault();
-    turn(event);
+    if (document.activeElement === element || event.ctrlKey || event.metaKey) [event.preventDefault(), turn(event)];
   }, { passive: false });
 }

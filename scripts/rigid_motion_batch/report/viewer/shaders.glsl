@@ -34,7 +34,7 @@ layout(location=0) in vec4 a;
 layout(location=1) in vec4 b;
 uniform mat4 view, body;
 uniform vec2 size;
-uniform float width, lift;
+uniform float wide, lift;
 out float t;
 void main() {
   float end = float(gl_VertexID & 1), side = float(gl_VertexID >> 1) * 2. - 1.;
@@ -42,7 +42,7 @@ void main() {
   vec2 d = (B.xy / B.w - A.xy / A.w) * size;
   d = length(d) > 1e-4 ? normalize(d) : vec2(1, 0);
   t = mix(a.w, b.w, end);
-  P.xy += (vec2(-d.y, d.x) * side + d * (end * 2. - 1.) * .3) * width / size * P.w;
+  P.xy += (vec2(-d.y, d.x) * side + d * (end * 2. - 1.) * .3) * wide / size * P.w;
   P.z += lift * P.w;
   gl_Position = P;
 }
@@ -87,13 +87,13 @@ void main() {
 //// dot
 layout(location=0) in vec4 a;
 uniform mat4 view;
-uniform float size, lift;
+uniform float wide, lift;
 out float t;
 void main() {
   t = a.w;
   gl_Position = view * vec4(a.xyz, 1);
   gl_Position.z += lift * gl_Position.w;
-  gl_PointSize = size;
+  gl_PointSize = wide;
 }
 ----
 in float t;

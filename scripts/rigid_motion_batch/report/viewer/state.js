@@ -3,27 +3,25 @@
 export const $ = (id) => document.getElementById(id);
 export const PAGE = JSON.parse($("page").textContent);
 export const UNITS = ["mm", "mm", "°"];
-export const S = { clip: null, recording: null, choice: null, t: 0, low: 0, high: 1, playing: false, speed: 0.5, measure: 0,
-  hidden: new Set(), hot: "", factor: 1, automatic: true, layout: "", ghost: "ghost", paths: true, follow: true };
+export const S = { t: 0, low: 0, high: 1, playing: false, speed: 0.5, measure: 0, hidden: new Set(), hot: "", factor: 1,
+  automatic: true, layout: "", ghost: true, paths: true, follow: true };
 export const id = (motion) => motion.modes[0];
 export const shown = () => S.choice.motions.filter((motion) => !S.hidden.has(id(motion)));
 export const ink = (motion) => `--m${PAGE.modes.indexOf(id(motion))}`;
 
 const painters = {}, due = new Set();
-let asked = false, before = 0, late = 0;
+let asked = 0, before = 0, late = 0;
 export const paint = (name, painter) => { painters[name] = painter; };
 
 /* Have parts painted again: "view", "chart", "cursor". */
 export function changed(...parts) {
   parts.forEach((part) => due.add(part));
-  if (!asked) requestAnimationFrame(frame);
-  asked = true;
+  asked ||= requestAnimationFrame(frame);
 }
 
 function frame(now) {
   const parts = new Set(due), span = now - before;
-  asked = false;
-  before = now;
+  [asked, before] = [0, now];
   due.clear();
   if (!S.choice) return;
   if (S.playing) {
@@ -38,8 +36,6 @@ function frame(now) {
 }
 
 export function play(on = !S.playing) {
-  S.playing = on;
-  before = performance.now();
-  $("play").ariaPressed = on;
+  [S.playing, $("play").ariaPressed, before] = [on, on, performance.now()];
   changed("view", "cursor");
 }

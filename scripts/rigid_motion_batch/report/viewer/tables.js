@@ -1,5 +1,4 @@
-/* Tables: a click on a heading sorts by its column, a second one turns the order round; rows are found by their text. */
-
+/* Tables: a click on a heading sorts by its column, a second one turns the order round; rows are found by name. */
 const order = (a, b) => (Number(a) - Number(b) || a.localeCompare(b, "en", { numeric: true }));
 
 document.addEventListener("click", ({ target }) => {
@@ -13,8 +12,7 @@ document.addEventListener("click", ({ target }) => {
   body.append(...rows.map(([, row]) => row));
 });
 
-document.addEventListener("input", ({ target }) => {
-  if (target.type !== "search") return;
+document.querySelector("[type=search]")?.addEventListener("input", ({ target }) => {
   const rows = [...document.querySelectorAll("#overview tbody tr")], words = target.value.toLowerCase().split(/\s+/);
   for (const row of rows) row.hidden = !words.every((word) => row.cells[0].textContent.toLowerCase().includes(word));
   document.getElementById("found").textContent = `${rows.filter((row) => !row.hidden).length} of ${rows.length}`;
