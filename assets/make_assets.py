@@ -19,8 +19,8 @@ import numpy as np
 ASSETS = Path(__file__).resolve().parent
 sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
-from rigid_motion_batch.making.motions import MOTIONS
-from rigid_motion_batch.making.tracking import table, tick, track
+from research.making.motions import MOTIONS
+from research.making.tracking import table, tick, track
 
 SEED = 2021
 MODELS_BLENDER = (4, 5)
@@ -63,7 +63,7 @@ def main(arguments: list[str] | None = None) -> None:
     if bpy.app.version[:2] != MODELS_BLENDER:
         print(f"models.blend is left as it is: older versions cannot open what {bpy.app.version_string} writes")
         return
-    from rigid_motion_batch.making.library import write_models
+    from research.making.library import write_models
 
     write(output / "models.blend", write_models)
 

@@ -14,7 +14,7 @@ sys.path[:0] = [str(ASSETS.parent / folder) for folder in ("addon", "scripts")]
 
 import bpy  # noqa: F401 - bmesh and mathutils come with it
 
-from rigid_motion_batch.making import featured, icon
+from research.making import featured, icon
 
 PICTURES = {"icon": icon.make, "featured": featured.make}
 

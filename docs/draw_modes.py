@@ -15,10 +15,10 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from research.markup import Markup, element
 from rigid_motion.motion import MODES, Poses, interpolate
-from rigid_motion_batch.comparison.palette import THEMES, colour_of, colour_on
-from rigid_motion_batch.comparison.report.markup import Markup, element
 from rigid_motion_batch.files import write_text
+from rigid_motion_batch.palette import THEMES, colour_of, colour_on
 
 TIMES = np.array((0.0, 1.0, 2.0))
 POINTS = np.array(((0.0, 0.0), (1.0, 0.35), (2.0, 0.0)))

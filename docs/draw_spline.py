@@ -14,8 +14,8 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
+from research.markup import Markup, element
 from rigid_motion.motion import Poses, curves, interpolate
-from rigid_motion_batch.comparison.report.markup import Markup, element
 from rigid_motion_batch.files import write_text
 
 FRAMES = np.array((1.0, 13.0, 14.0, 26.0, 38.0))

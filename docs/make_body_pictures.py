@@ -19,15 +19,15 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from rigid_motion import animation
-from rigid_motion_batch import compare
+from rigid_motion_batch.analysis.bodies import reconstruct_body
+from rigid_motion_batch.analysis.body_metrics import measure_modes
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.cli import compare
 from rigid_motion_batch.comparison.report.body_charts import heat_map_alone
-from rigid_motion_batch.comparison.stage.film import render_still
-from rigid_motion_batch.comparison.stage.materials import surface
-from rigid_motion_batch.comparison.study.bodies import reconstruct_body
-from rigid_motion_batch.comparison.study.body_metrics import measure_modes
-from rigid_motion_batch.comparison.study.choices import Uniform
-from rigid_motion_batch.comparison.study.radii import JOINT
-from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.scenes.film import render_still
+from rigid_motion_batch.scenes.materials import surface
 from tests.rigs import dancer, figure
 
 RATE, MODES = "4", ("lerp_slerp", "dq_sclerp", "motor_spline")

@@ -25,12 +25,12 @@ from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import MODES, Poses, interpolate
 from rigid_motion.motion.quaternions import align_signs, rotate
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.stage import captions
-from rigid_motion_batch.comparison.stage.film import render_film, render_still
-from rigid_motion_batch.comparison.stage.materials import ink, surface
-from rigid_motion_batch.comparison.stage.scene import make_lights, set_up_render
-from rigid_motion_batch.comparison.stage.settings import StageSettings
+from rigid_motion_batch import palette
+from rigid_motion_batch.scenes import captions
+from rigid_motion_batch.scenes.film import render_film, render_still
+from rigid_motion_batch.scenes.materials import ink, surface
+from rigid_motion_batch.scenes.scene import make_lights, set_up_render
+from rigid_motion_batch.scenes.settings import StageSettings
 from tests.rigs import figure
 
 SETTINGS = StageSettings(resolution=(960, 540), antialiasing="5", fps=24)

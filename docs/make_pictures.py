@@ -18,11 +18,11 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch import compare
-from rigid_motion_batch.comparison.stage.scene import StageSettings, build_stage
-from rigid_motion_batch.comparison.study.choices import Uniform
-from rigid_motion_batch.comparison.study.reading import read_clips
-from rigid_motion_batch.comparison.study.reconstructions import reconstruct
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.cli import compare
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.scenes.scene import StageSettings, build_stage
 
 SMOOTH = ("lerp_slerp", "dq_sclerp", "motor_spline")
 

@@ -22,12 +22,12 @@ DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from rigid_motion import animation
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.stage import captions
-from rigid_motion_batch.comparison.stage.film import render_film, render_still
-from rigid_motion_batch.comparison.stage.materials import ink, surface
-from rigid_motion_batch.comparison.stage.scene import make_lights, set_up_render
-from rigid_motion_batch.comparison.stage.settings import StageSettings
+from rigid_motion_batch import palette
+from rigid_motion_batch.scenes import captions
+from rigid_motion_batch.scenes.film import render_film, render_still
+from rigid_motion_batch.scenes.materials import ink, surface
+from rigid_motion_batch.scenes.scene import make_lights, set_up_render
+from rigid_motion_batch.scenes.settings import StageSettings
 from tests.rigs import figure, scenes
 from tests.rigs.human import human
 

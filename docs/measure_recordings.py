@@ -28,14 +28,14 @@ import numpy as np
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
+from research.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
+from research.paper.table import RADIUS, SAMPLES_AN_UPDATE
 from rigid_motion.motion import curves, decimate
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.comparison.study.metrics import geometric_mean
-from rigid_motion_batch.comparison.study.modes import BEST_OF, REFERENCE
-from rigid_motion_batch.comparison.study.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
+from rigid_motion_batch.analysis.metrics import geometric_mean
+from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.analysis.needed import TABLE_RATES, KeysNeeded, OfRigidBody, keys_needed, overall
 from rigid_motion_batch.files import write_text
-from rigid_motion_batch.paper.motions import RECORDINGS, read_motion, recordings_in, sampling_rate
-from rigid_motion_batch.paper.table import RADIUS, SAMPLES_AN_UPDATE
+from rigid_motion_batch.recordings.clips import Clip
 
 OUTPUT = DOCS / "figures" / "recordings.json"
 

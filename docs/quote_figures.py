@@ -6,7 +6,7 @@
 A quote is what stands between <!-- quote NAME --> and <!-- end -->; `QUOTES` says what belongs there. Figures come
 from pages that a script has written (paper.md, subframes.md, benchmark_batch.md) and from docs/figures/recordings.json,
 which docs/measure_recordings.py writes; those of the motions in assets/ are measured at once. Pages of figures get
-their summaries as well, see rigid_motion_batch/summaries.
+their summaries as well, see research/summaries.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
+from research.markdown_tables import numbers, tables, tables_of, titled
+from research.paper.table import RADIUS
+from research.phrases import listed
+from research.summaries import SUMMARIES, with_summary
+from research.summaries.paper import TABLE_1, percent_saved
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.comparison.report.findings import listed
-from rigid_motion_batch.comparison.study.choices import Uniform
-from rigid_motion_batch.comparison.study.metrics import measure_reconstruction
-from rigid_motion_batch.comparison.study.modes import BEST_OF
-from rigid_motion_batch.comparison.study.reading import read_clips
-from rigid_motion_batch.comparison.study.reconstructions import reconstruct
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.metrics import measure_reconstruction
+from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.files import write_text
-from rigid_motion_batch.markdown_tables import numbers, tables, tables_of, titled
-from rigid_motion_batch.paper.table import RADIUS
 from rigid_motion_batch.places import ASSETS
-from rigid_motion_batch.summaries import SUMMARIES, with_summary
-from rigid_motion_batch.summaries.paper import TABLE_1, percent_saved
+from rigid_motion_batch.recordings.clip_reading import read_clips
 
 QUOTE = re.compile(r"(<!-- quote ([a-z0-9-]+) -->)(.*?)(<!-- end -->)", re.DOTALL)
 

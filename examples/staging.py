@@ -17,12 +17,12 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 from rigid_motion import animation
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.stage import captions
-from rigid_motion_batch.comparison.stage.film import render_still, save_blend
-from rigid_motion_batch.comparison.stage.materials import ink
-from rigid_motion_batch.comparison.stage.scene import make_lights, set_up_render
-from rigid_motion_batch.comparison.stage.settings import StageSettings
+from rigid_motion_batch import palette
+from rigid_motion_batch.scenes import captions
+from rigid_motion_batch.scenes.film import render_still, save_blend
+from rigid_motion_batch.scenes.materials import ink
+from rigid_motion_batch.scenes.scene import make_lights, set_up_render
+from rigid_motion_batch.scenes.settings import StageSettings
 from tests.rigs import figure
 
 RESOLUTION = 960, 540

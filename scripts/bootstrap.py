@@ -38,9 +38,9 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
-    "paper": ([ROOT / "scripts" / "reproduce_paper.py"], ()),
+    "paper": ([ROOT / "scripts" / "research", "paper"], ()),
     "test": (["-m", "pytest"], ("test", "farm", "docs")),
-    "benchmark": ([ROOT / "scripts" / "benchmark.py"], ("benchmark",)),
+    "benchmark": ([ROOT / "scripts" / "research", "benchmark"], ("benchmark",)),
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),

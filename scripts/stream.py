@@ -5,7 +5,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from rigid_motion_batch.commands import launch
+from rigid_motion_batch.cli.commands import launch
 
 if __name__ == "__main__":
     launch(__file__)

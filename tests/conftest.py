@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from rigid_motion_batch.build_extension import build
+from rigid_motion_batch.cli.build_extension import build
 from rigid_motion_batch.workplan.processes import processors
 from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
 from tests.blank import blank

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from docs import measure_recordings, quote_figures
+from research.paper.table import RADIUS
+from research.summaries import SUMMARIES, with_summary
 from rigid_motion.motion import curves, decimate
-from rigid_motion_batch.comparison.study.needed import OfRigidBody
-from rigid_motion_batch.paper.table import RADIUS
-from rigid_motion_batch.summaries import SUMMARIES, with_summary
+from rigid_motion_batch.analysis.needed import OfRigidBody
 from tests.scripts.comparison.recordings import swinging_clip
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"

@@ -18,7 +18,7 @@ from examples.dancer import make as dancer
 from examples.lid import make as lid
 from examples.sword import make as sword
 from rigid_motion.motion import Poses, reduce_keys, shell_error
-from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.recordings.clip_reading import read_clips
 from tests.scripts.comparing import outputs
 
 EXAMPLES = Path(make_examples.__file__).parent

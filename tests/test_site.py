@@ -13,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 from rigid_motion import motion
-from rigid_motion_batch.commands import COMMANDS
+from rigid_motion_batch.cli.commands import COMMANDS
 from scripts import build_site
 
 LOADED = {
@@ -136,7 +136,7 @@ def test_every_mode_has_its_film_its_picture_its_formula_and_what_the_table_says
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_says_its_options(command, site, pages):
     page = pages[site / "commands.html"]
-    module = COMMANDS[command].module.removesuffix(".__main__")
+    module = COMMANDS[command].module.removesuffix(".__main__").lstrip(".")
     assert f"{module}-help" in page.anchors
 
 

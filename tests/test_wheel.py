@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.commands import COMMANDS
+from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.places import CHECKOUT, manifest
 
 BESIDES = ("bpy", "numpy")
@@ -100,18 +100,12 @@ def test_the_zip_for_blender_is_the_same_as_from_the_checkout(
     assert Path(done.stdout.strip()).read_bytes() == extension_zip.read_bytes()
 
 
-@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "benchmark"])
+@pytest.mark.parametrize("command", COMMANDS)
 def test_help_shows_every_command_as_it_is_typed(command: str, installed: Path) -> None:
     done = run(installed / "rigid-motion", command, "--help")
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(f"usage: rigid-motion {command}")
     assert "python scripts/" not in done.stdout.replace("python scripts/bootstrap.py tasks", "")
-
-
-def test_the_benchmark_says_what_it_needs(installed: Path) -> None:
-    done = run(installed / "rigid-motion", "benchmark", "--help")
-    assert done.returncode == 2
-    assert "rigid-motion[benchmark]" in done.stderr
 
 
 def test_the_mathematics_needs_numpy_alone(installed: Path) -> None:
@@ -136,7 +130,7 @@ def test_a_command_that_there_is_not_is_said(installed: Path) -> None:
 
 def test_without_blender_a_command_says_what_brings_it(wheel: Path, tmp_path: Path) -> None:
     without = "import sys; sys.modules['bpy'] = None; sys.path.insert(0, sys.argv.pop()); sys.argv[0] = 'rigid-motion'"
-    code = f"{without}; from rigid_motion_batch.commands import main; sys.exit(main(['bake', 'shot.blend']))"
+    code = f"{without}; from rigid_motion_batch.cli.commands import main; sys.exit(main(['bake', 'shot.blend']))"
     with zipfile.ZipFile(wheel) as opened:
         opened.extractall(tmp_path)
     done = run(sys.executable, "-c", code, tmp_path, cwd=tmp_path)

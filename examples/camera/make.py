@@ -15,13 +15,13 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
+from research.making.tracking import table, turn
 from rigid_motion import animation
 from rigid_motion.motion import Poses, reduce_keys, rms, shell_error
 from rigid_motion.motion.quaternions import multiply
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.stage.materials import ink, surface
-from rigid_motion_batch.comparison.study.reading import read_clips
-from rigid_motion_batch.making.tracking import table, turn
+from rigid_motion_batch import palette
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.scenes.materials import ink, surface
 from tests.rigs import figure
 
 SEED, FPS, FRAMES = 11, 24, 240

@@ -14,8 +14,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
 from rigid_motion import animation
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.stage.materials import surface
+from rigid_motion_batch import palette
+from rigid_motion_batch.scenes.materials import surface
 from tests.rigs import dancer, figure
 
 MODE = "motor_spline"

@@ -17,13 +17,13 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
-from rigid_motion_batch import job_bundle
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.stage import captions
-from rigid_motion_batch.comparison.stage.film import render_still
-from rigid_motion_batch.comparison.stage.materials import ink, surface
-from rigid_motion_batch.making.motions import MOTIONS
-from rigid_motion_batch.making.tracking import table, tick, track
+from research.making.motions import MOTIONS
+from research.making.tracking import table, tick, track
+from rigid_motion_batch import palette
+from rigid_motion_batch.cli import job_bundle
+from rigid_motion_batch.scenes import captions
+from rigid_motion_batch.scenes.film import render_still
+from rigid_motion_batch.scenes.materials import ink, surface
 
 TAKES = {"drill": "screw", "probe": "pivot", "toss": "throw"}
 """Name of a take to the motion that it is of."""

@@ -12,14 +12,14 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
+from research.making.motions import MOTIONS
+from research.making.tracking import tick, track
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.comparison.stage.film import render_still
-from rigid_motion_batch.comparison.stage.scene import StageSettings, build_stage
-from rigid_motion_batch.comparison.study.choices import Uniform
-from rigid_motion_batch.comparison.study.reading import read_clips
-from rigid_motion_batch.comparison.study.reconstructions import reconstruct
-from rigid_motion_batch.making.motions import MOTIONS
-from rigid_motion_batch.making.tracking import tick, track
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.scenes.film import render_still
+from rigid_motion_batch.scenes.scene import StageSettings, build_stage
 
 SEED = 7
 

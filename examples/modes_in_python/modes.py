@@ -10,9 +10,9 @@ import numpy as np
 
 from rigid_motion.motion import MODES, Poses, decimate, interpolate, measure, reduce_keys, repair, rms
 from rigid_motion.motion.quaternions import rotate
-from rigid_motion_batch.comparison.palette import THEMES, colour_on
+from rigid_motion_batch.palette import THEMES, colour_on
 from rigid_motion_batch.places import ASSETS
-from rigid_motion_batch.trajectories.reading import read_trajectories
+from rigid_motion_batch.recordings.reading import read_trajectories
 
 COLOURS = {mode: colour_on(THEMES["light"], mode) for mode in MODES}
 

@@ -15,7 +15,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "addon"), str(ROOT / "scripts")]
 
 from examples import staging
 from rigid_motion import animation
-from rigid_motion_batch.comparison.stage.materials import surface
+from rigid_motion_batch.scenes.materials import surface
 from tests.rigs import figure
 
 KEYS = (1, 75.0), (19, -45.0), (31, -45.0), (55, 75.0)

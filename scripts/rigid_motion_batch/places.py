@@ -23,7 +23,7 @@ NAMED = {
     "blender_manifest.toml": MANIFEST,
     "rigid_motion": EXTENSION,
     "rigid_motion_batch": PACKAGE,
-    **({"tests": CHECKOUT / "tests"} if CHECKOUT else {}),
+    **({"research": CHECKOUT / "scripts" / "research", "tests": CHECKOUT / "tests"} if CHECKOUT else {}),
 }
 """What the program is made of, by names that are the same wherever it is; a folder that is in another comes first."""
 

@@ -23,10 +23,12 @@ from tests.animation.oracle import (
     curves_of,
     expected_bases,
     key_frames,
+    may_spin,
     mode_at,
     snapshot,
     transform_paths,
 )
+from tests.animation.path_oracle import DEPENDS_ON_KEYS
 from tests.animation.scenes import random_values
 from tests.blank import blank
 
@@ -107,6 +109,16 @@ def is_timed_together(carrier: Carrier, frame: float) -> bool:
             if fcurve.extrapolation == "LINEAR" or before.interpolation not in ("BEZIER", "LINEAR"):
                 return False
     return len(timings) == 1
+
+
+def shapes_path(carrier: Carrier, frame: float) -> bool:
+    """Whether a key inserted here is no breakdown, and makes another path: so it is where the carrier has spins."""
+    return mode_at(carrier, frame) in DEPENDS_ON_KEYS and may_spin(carrier)
+
+
+def is_seen_exactly(carrier: Carrier, frame: float) -> bool:
+    """Whether it is seen where it has to be on this frame: objects are between frames only where that is asked for."""
+    return frame % 1.0 == 0.0 or isinstance(carrier, bpy.types.PoseBone) or carrier.rigid_motion.is_exact
 
 
 class Editing(RuleBasedStateMachine):
@@ -220,7 +232,8 @@ class Editing(RuleBasedStateMachine):
         obj = self._found(name)
         keys = key_frames(obj)
         held, settable = self._holds_pose(obj, frame), self._has_keys_for_any_pose(obj)
-        goes_by = np.arange(keys[0], keys[-1], 0.5) if held and not posed and is_timed_together(obj, frame) else ()
+        goes_on_as_before = held and not posed and is_timed_together(obj, frame) and not shapes_path(obj, frame)
+        goes_by = np.arange(keys[0], keys[-1], 0.5) if goes_on_as_before and is_seen_exactly(obj, frame) else ()
         before = expected_bases(obj, goes_by, self.owns.get(name))
         moved = self._is_posed(obj)
         if posed:

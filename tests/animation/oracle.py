@@ -8,7 +8,8 @@ Matrices are (m, 4, 4), frames are the scene's.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -19,7 +20,7 @@ from mathutils import Euler, Quaternion
 from rigid_motion.motion import KEYFRAME_MODES, Poses, in_betweens, interpolate, twists
 from rigid_motion.motion.quaternions import multiply, normalise
 from tests.animation.modified import acting, held_frames, without_modifiers
-from tests.animation.path_oracle import beside_path, lies_on_path
+from tests.animation.path_oracle import DEPENDS_ON_KEYS, beside_path, lies_on_path
 from tests.animation.smooth_oracle import share_of, with_tangents
 from tests.animation.spin_oracle import Spin, spin_and_end
 
@@ -203,14 +204,14 @@ class Path:
 def _is_passed(obj: Carrier, keys: np.ndarray, number: int) -> bool:
     """Whether a key lies on a path that it does not shape."""
     before, mode = (mode_at(obj, frame) for frame in keys[[number - 1, number]])
+    if not 0 < number < len(keys) - 1 or before != mode or mode not in DEPENDS_ON_KEYS or may_spin(obj):
+        return False
     curves = (curve_of(obj, path, index) for path in transform_paths(obj) for index in range(WIDTHS[path]))
     curves = [curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute]
-    if not 0 < number < len(keys) - 1 or before != mode or _may_spin(obj):
-        return False
     return lies_on_path(curves, keys[number], mode)
 
 
-def _may_spin(obj: Carrier) -> bool:
+def may_spin(obj: Carrier) -> bool:
     """Whether it has turns, or an angle that goes by half a turn or more from one of its keys to the next."""
     turns = curve_of(obj, "rigid_motion.turns")
     if turns is not None and len(turns.keyframe_points) and not turns.mute:
@@ -248,15 +249,20 @@ def _spin_and_end(
     obj: Carrier, first: float, last: float, own: Own, *, channel: bool = True, whole: bool = False
 ) -> tuple[Spin, np.ndarray]:
     """The turns more from one key to the next, and where the body turns to without them."""
-    ends = np.array((first, last))
-    fcurve, turns = curve_of(obj, "rigid_motion.turns"), 0.0
-    if channel and fcurve is not None and not fcurve.mute and mode_at(obj, first) != "BLENDER":
-        turns = next((key.co[1] for key in reversed(fcurve.keyframe_points) if key.co[0] < first + 0.005), 0.0)
+    ends, turns = np.array((first, last)), _turns(obj, first) if channel else 0.0
     by_angles = {}
     if obj.rotation_mode != "QUATERNION":
         by_angles = {"angles": _channels(obj, "rotation_euler", ends), "order": obj.rotation_mode}
     quaternions = _key_poses(obj, ends, own, False).quaternions
     return spin_and_end(quaternions, turns, **by_angles, own=own.quaternion, whole=whole)
+
+
+def _turns(obj: Carrier, first: float) -> float:
+    """The turns of the channel in the segment that begins on this frame."""
+    fcurve = curve_of(obj, "rigid_motion.turns")
+    if fcurve is None or fcurve.mute or mode_at(obj, first) == "BLENDER":
+        return 0.0
+    return next((key.co[1] for key in reversed(fcurve.keyframe_points) if key.co[0] < first + 0.005), 0.0)
 
 
 def _smooth(
@@ -371,7 +377,31 @@ def progress(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.
                 begin, end, *values = _timing(fcurve, [first, last, *frames])
                 done += weight * (end - begin) * (np.array(values) - begin)
                 whole += weight * (end - begin) ** 2
-    return done / whole if whole > 0.0 else done
+    if whole > 0.0:
+        return done / whole
+    return _counted(obj, first, last, frames) if _turns(obj, first) else done
+
+
+def _counted(obj: Carrier, first: float, last: float, frames: np.ndarray) -> np.ndarray:
+    """The same where the body spins and no channel changes: of a value that goes up by one from key to key.
+
+    It has the keys of the first channel that turns, with flat handles.
+    """
+    curves = (curve_of(obj, rotation_path(obj), index) for index in range(WIDTHS[rotation_path(obj)]))
+    like = next(curve for curve in curves if curve is not None and len(curve.keyframe_points) and not curve.mute)
+    with spare_curve() as fcurve:
+        fcurve.extrapolation = like.extrapolation
+        fcurve.keyframe_points.add(len(like.keyframe_points))
+        for number, (made, key) in enumerate(zip(fcurve.keyframe_points, like.keyframe_points, strict=True)):
+            made.co = key.co[0], number
+            for field in ("interpolation", "easing", "back", "amplitude", "period"):
+                setattr(made, field, getattr(key, field))
+            made.handle_left_type = made.handle_right_type = "FREE"
+            made.handle_left, made.handle_right = (key.handle_left[0], number), (key.handle_right[0], number)
+        begin, end, *values = (fcurve.evaluate(frame) for frame in (first, last, *frames))
+    if begin == end:
+        return (frames - first) / (last - first)
+    return (np.array(values) - begin) / (end - begin)
 
 
 def matrices(location: np.ndarray, quaternion: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -482,22 +512,23 @@ def _timing(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[float]:
 
 
 def _elastic(key: bpy.types.Keyframe, end: float, frames: Sequence[float]) -> list[float]:
-    """Blender's own elastic easing from 0 to 1, in a spare Action."""
+    """Blender's own elastic easing from 0 to 1."""
+    with spare_curve() as fcurve:
+        fcurve.keyframe_points.insert(key.co[0], 0.0)
+        fcurve.keyframe_points.insert(end, 1.0)
+        start = fcurve.keyframe_points[0]
+        for field in ("interpolation", "easing", "back", "amplitude", "period"):
+            setattr(start, field, getattr(key, field))
+        return [fcurve.evaluate(frame) for frame in frames]
+
+
+@contextmanager
+def spare_curve() -> Iterator[bpy.types.FCurve]:
+    """An F-curve of an Action that nothing uses."""
     action = bpy.data.actions.new("Timing")
-    channelbag = (
-        action.layers.new("Layer")
-        .strips.new(type="KEYFRAME")
-        .channelbag(action.slots.new("OBJECT", "Timing"), ensure=True)
-    )
-    fcurve = channelbag.fcurves.new("location")
-    start = fcurve.keyframe_points.insert(key.co[0], 0.0)
-    fcurve.keyframe_points.insert(end, 1.0)
-    start = fcurve.keyframe_points[0]
-    for field in ("interpolation", "easing", "back", "amplitude", "period"):
-        setattr(start, field, getattr(key, field))
-    share = [fcurve.evaluate(frame) for frame in frames]
+    strip = action.layers.new("Layer").strips.new(type="KEYFRAME")
+    yield strip.channelbag(action.slots.new("OBJECT", "Timing"), ensure=True).fcurves.new("location")
     bpy.data.actions.remove(action)
-    return share
 
 
 def _scales_evenly(obj: Carrier, keys: np.ndarray) -> bool:

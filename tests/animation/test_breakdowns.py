@@ -10,7 +10,17 @@ from mathutils import Matrix, Quaternion
 from rigid_motion.animation import Breakdowns, Refused, breakdown, set_mode, set_turns, write_channel
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
 from tests.animation.bones.rigs import new_rig
-from tests.animation.oracle import Own, as_quaternion, curves_of, key_frames, matrices, shown_worlds, snapshot, unit
+from tests.animation.oracle import (
+    Own,
+    as_quaternion,
+    assert_shown,
+    curves_of,
+    key_frames,
+    matrices,
+    shown_worlds,
+    snapshot,
+    unit,
+)
 from tests.animation.scenes import FRAMES, give_own_deltas, key, new_object, push_down, random_values, tweak
 
 FACTORS = (-0.3, 0.0, 0.35, 1.0, 1.25)
@@ -291,6 +301,33 @@ def test_a_breakdown_leaves_the_path_and_changes_when_the_body_is_there(live_fil
     nearest = np.abs(shown[:, None] - path).max(axis=(2, 3)).min(axis=1)
     assert nearest.max() < 2e-3 * np.abs(path).max()
     np.testing.assert_allclose(shown_worlds([obj], [*range(1, 11), *range(25, 41)])[0], beside, atol=2e-5)
+
+
+@pytest.mark.parametrize("mode", ["motor_spline", "pga_lerp"])
+@pytest.mark.parametrize("gone", [BEFORE, AFTER])
+def test_a_path_with_a_breakdown_leads_through_keys_that_not_all_channels_have(live_file, mode, gone):
+    obj = key(new_object(rotation_mode="QUATERNION"), seed=5)
+    set_mode(obj, mode)
+    bpy.context.scene.frame_set(int(NOW))
+    breakdown(obj, 0.8)
+    for path in ("location", "rotation_quaternion"):
+        points = curves_of(obj)[path, 0].keyframe_points
+        points.remove(next(one for one in points if one.co[0] == gone))
+    bpy.context.view_layer.update()
+    assert_shown([obj], np.arange(-2.0, 44.0))
+
+
+@pytest.mark.parametrize(("growth", "there"), [(0.0, (1.3, 1.3, 1.3)), (0.01, (1.1, 1.2, 1.3))])
+def test_a_breakdown_may_scale_otherwise_than_the_keys_around_it(live_file, growth, there):
+    obj = key(new_object(rotation_mode="QUATERNION"), seed=5, scale="even")
+    set_mode(obj, "pga_lerp")
+    bpy.context.scene.frame_set(int(NOW))
+    breakdown(obj, 0.8)
+    for axis in range(3):
+        for point in curves_of(obj)["scale", axis].keyframe_points:
+            point.co_ui.y = there[axis] if point.co[0] == NOW else 1.0 + growth * point.co[0]
+    bpy.context.view_layer.update()
+    assert_shown([obj], np.arange(-2.0, 44.0))
 
 
 def animation_of(obj: bpy.types.Object, mode: str, times: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ from rigid_motion.animation import (
 from rigid_motion.animation.baking import fewer_keys
 from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate, interpolate_by_segments, repair, shell_error, twists
 from rigid_motion.motion.quaternions import multiply
-from rigid_motion_batch.trajectories import read_trajectories
+from rigid_motion_batch.recordings import read_trajectories
 from tests.animation.oracle import curves_of, rotation_path, snapshot
 from tests.animation.scenes import give_own_deltas, key, new_object
 

@@ -77,8 +77,11 @@ class WithTools(Editing):
         self._edit(change)
 
     def _assert_shown(self, obj: bpy.types.Object) -> None:
-        """An object is shown where it has to be."""
-        assert_shown([obj], self._frames_that_are_seen([obj]), self.owns)
+        """An object is shown where it has to be, on frames on which its parents are, too."""
+        carried_by = [obj]
+        while (parent := carried_by[-1].parent) is not None:
+            carried_by.append(parent)
+        assert_shown([obj], self._frames_that_are_seen(carried_by), self.owns)
 
 
 def animators(obj: bpy.types.Object) -> dict[tuple[str, int], bpy.types.FCurve]:

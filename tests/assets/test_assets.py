@@ -14,10 +14,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from assets import make_assets
-from rigid_motion.motion import Poses
-from rigid_motion.motion.quaternions import angle_between, rotate
-from rigid_motion_batch.making.drill import drill
-from rigid_motion_batch.making.motions import (
+from research.making.drill import drill
+from research.making.motions import (
     BACK,
     CENTRE_OF_MASS,
     FOREARM,
@@ -37,8 +35,10 @@ from rigid_motion_batch.making.motions import (
     strokes,
     through,
 )
-from rigid_motion_batch.making.shells import corner_normals, loft, oval, volume
-from rigid_motion_batch.making.tracking import tick, wander
+from research.making.shells import corner_normals, loft, oval, volume
+from research.making.tracking import tick, wander
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import angle_between, rotate
 
 ASSETS = Path(make_assets.__file__).parent
 
@@ -287,7 +287,7 @@ def assert_closed(faces: list[tuple[int, ...]]) -> None:
 def models():
     """The objects of the kept file and those made anew: {name: (kept, made)}."""
     bpy = pytest.importorskip("bpy")
-    from rigid_motion_batch.making.library import MODELS, build_models
+    from research.making.library import MODELS, build_models
 
     kinds = ("objects", "meshes", "materials")
     before = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
@@ -337,7 +337,7 @@ def test_the_script_makes_the_kept_model_again(models, name):
 
 @each_model
 def test_the_kept_materials_have_their_colours_in_the_viewport_and_in_the_nodes(models, name):
-    from rigid_motion_batch.making.library import MATERIALS
+    from research.making.library import MATERIALS
 
     kept, _ = models[name]
     assert sorted(material_names(kept)) == sorted(MATERIALS)

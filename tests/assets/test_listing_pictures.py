@@ -10,9 +10,9 @@ import pytest
 from mathutils import Vector
 
 from assets import make_listing
+from research.making import featured
+from research.making.rendering import without_notes
 from rigid_motion import animation
-from rigid_motion_batch.making import featured
-from rigid_motion_batch.making.rendering import without_notes
 
 LISTING = make_listing.ASSETS / "listing"
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import MODES, Poses, decimate, interpolate, reduce_keys, repair, twists
 from rigid_motion.motion.quaternions import align_signs, normalise
-from rigid_motion_batch.trajectories import read_trajectories
+from rigid_motion_batch.recordings import read_trajectories
 from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
 from tests.thoroughness import sample, tried

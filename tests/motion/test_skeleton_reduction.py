@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, reduce_skeleton_keys
 from rigid_motion.motion.quaternions import conjugate, multiply, rotate
-from rigid_motion_batch.trajectories import read_trajectories
+from rigid_motion_batch.recordings import read_trajectories
 from tests.motion.bodies import body_errors, in_root_space, wandering_body
 from tests.motion.cases import random_quaternions
 from tests.recordings import RECORDINGS

@@ -11,7 +11,7 @@ import pytest
 from rigid_motion.animation import write_channel
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch import reduce
+from rigid_motion_batch.cli import reduce
 from tests.animation.farm import on_a_farm, played_on_a_farm
 from tests.animation.oracle import curves_of
 from tests.animation.scenes import new_object

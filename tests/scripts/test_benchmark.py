@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research.benchmark import cases, changed, report
 from rigid_motion.motion import MODES
-from rigid_motion_batch.benchmark import cases, changed, report
 
 
 @pytest.mark.parametrize(

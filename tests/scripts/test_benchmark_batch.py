@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from rigid_motion_batch import benchmark_batch
-from rigid_motion_batch.trajectories import read_trajectories
+from research import benchmark_batch
+from rigid_motion_batch.recordings import read_trajectories
 
 
 def test_its_clips_are_recordings_of_which_none_is_like_another(tmp_path):

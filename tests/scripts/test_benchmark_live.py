@@ -6,24 +6,15 @@ import bpy
 import numpy as np
 import pytest
 
+from research import benchmark_live
+from research.live_benchmark.baking import long_bakes
+from research.live_benchmark.everyday import everyday
+from research.live_benchmark.rigs import RigSize, add_skin, edits, rig_of, rigs
+from research.live_benchmark.scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
+from research.live_benchmark.shots import KEY, SAMPLE, choosing, file_sizes, samples_of, shot, shots, what_is_left
+from research.live_benchmark.turns import against, judged, told, told_in_ms
 from rigid_motion import animation
 from rigid_motion.animation import channelbag_of, read_poses
-from rigid_motion_batch import benchmark_live
-from rigid_motion_batch.live_benchmark.baking import long_bakes
-from rigid_motion_batch.live_benchmark.everyday import everyday
-from rigid_motion_batch.live_benchmark.rigs import RigSize, add_skin, edits, rig_of, rigs
-from rigid_motion_batch.live_benchmark.scenes import MODE, MOTIONS, NativeBaking, Size, scene_of, set_modes
-from rigid_motion_batch.live_benchmark.shots import (
-    KEY,
-    SAMPLE,
-    choosing,
-    file_sizes,
-    samples_of,
-    shot,
-    shots,
-    what_is_left,
-)
-from rigid_motion_batch.live_benchmark.turns import against, judged, told, told_in_ms
 
 SMALL = Size(3, 5, 40)
 SMALL_RIG = RigSize(12, 5, 40, vertices=400)
@@ -92,7 +83,7 @@ def test_shots_are_told_for_every_motion_and_rotation_mode():
 @pytest.mark.usefixtures("live_file")
 def test_a_shot_tells_the_ratios_of_what_stands_beside_them(monkeypatch):
     sizes = iter(((100_000, 1_000_000), (390_000, 6_100_000), (780_000, 24_400_000)))
-    monkeypatch.setattr("rigid_motion_batch.live_benchmark.shots.file_sizes", lambda: next(sizes))
+    monkeypatch.setattr("research.live_benchmark.shots.file_sizes", lambda: next(sizes))
     page = list(shot(SMALL, "QUATERNION", "about general axes", 3))
     (rows,) = tables(page).values()
     assert [row[0] for row in rows] == [
@@ -271,7 +262,7 @@ def test_the_command_goes_through_the_sections_that_it_is_asked_for(monkeypatch,
     page = tmp_path / "page.md"
     assert benchmark_live.main(["--rounds", "1", "--only", "choosing", "baking", "--output", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
-    assert "`python scripts/benchmark_live.py --rounds 1 --only choosing baking`" in text
+    assert "`python scripts/research benchmark_live --rounds 1 --only choosing baking`" in text
     assert [line for line in text.splitlines() if line.startswith("## ")] == [
         f"## A mode for {SMALL}, turned by QUATERNION",
         f"## A mode for {SMALL}, turned by XYZ",

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch import build_extension
+from rigid_motion_batch.cli import build_extension
 from rigid_motion_batch.places import EXTENSION, LICENSE, MANIFEST
 
 ROOT = Path(__file__).resolve().parents[2]

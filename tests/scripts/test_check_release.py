@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch import check_release
-from rigid_motion_batch.check_release import CHANGELOG, CHECKS, LISTING, MANIFEST, MANUAL
+from research import check_release
+from research.check_release import CHANGELOG, CHECKS, LISTING, MANIFEST, MANUAL
 
 ROOT = Path(__file__).resolve().parents[2]
 WEBSITE = "https://motion.dev/rigid"
@@ -116,7 +116,7 @@ def test_the_text_is_as_long_as_people_read(words, ready):
 
 
 def test_a_zip_that_blender_refuses_is_no_release(ready, monkeypatch, capsys):
-    from rigid_motion_batch import build_extension
+    from rigid_motion_batch.cli import build_extension
 
     def refused(folder: Path) -> Path:
         raise build_extension.BuildError("Blender refuses the extension")

@@ -21,9 +21,9 @@ from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternio
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
-from rigid_motion_batch import compare
-from rigid_motion_batch.comparison.stage import film
-from rigid_motion_batch.comparison.study.reading import folder_names
+from rigid_motion_batch.cli import compare
+from rigid_motion_batch.recordings.clip_reading import folder_names
+from rigid_motion_batch.scenes import film
 from rigid_motion_batch.workplan import Workspace
 from rigid_motion_batch.workplan import __main__ as workplan
 from tests.balls import largest_displacements
@@ -573,7 +573,7 @@ def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, caps
 
     asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
     with monkeypatch.context() as patch:
-        patch.setattr("rigid_motion_batch.comparison.study.metrics.write_metrics", full)
+        patch.setattr("rigid_motion_batch.analysis.metrics.write_metrics", full)
         assert run(*asked) == 2
     said = capsys.readouterr()
     assert "No space left on device; nothing that is done is lost" in said.err

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch import compare
+from rigid_motion_batch.cli import compare
 from tests.scripts.comparing import write_toss
 
 OPTIONS = ("--no-video", "--rates", "5", "--modes", "lerp_slerp", "--jobs", "0")

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.comparison.study.reading import make_clip
-from rigid_motion_batch.figures import IN_METRES, TYPICAL, UNITS, Skin, repaired, size_of, unit_of
-from rigid_motion_batch.trajectories import Trajectory
+from rigid_motion_batch.recordings import Trajectory
+from rigid_motion_batch.recordings.clip_reading import make_clip
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import IN_METRES, TYPICAL, UNITS, Skin, repaired, size_of, unit_of
 from tests.scripts.comparison.bodies import JOINTS, swinging_body
 
 

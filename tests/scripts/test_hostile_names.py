@@ -14,12 +14,12 @@ from urllib.parse import unquote
 
 import pytest
 
-from rigid_motion_batch import compare
+from rigid_motion_batch.cli import compare
 from rigid_motion_batch.comparison.report.pages import ON_ONE_PAGE
-from rigid_motion_batch.comparison.study.reading import DEVICES, NOT_FOLDERS, folder_names
+from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings.clip_reading import DEVICES, NOT_FOLDERS, folder_names
 from rigid_motion_batch.rows import meant
-from rigid_motion_batch.trajectories import TrajectoryError, read_trajectories
-from tests.scripts.trajectories.seeds import SEEDS
+from tests.scripts.recordings.seeds import SEEDS
 
 FORMULAS = "=+-@\t\r"
 """What spreadsheets take for the beginning of a formula."""
@@ -167,7 +167,7 @@ def test_a_comparison_stays_in_its_folder_and_names_do_not_change_its_report(
 
 
 def test_bones_of_any_name_stay_in_the_folder_and_do_not_change_the_report(tmp_path: Path) -> None:
-    from tests.scripts.trajectories.blends import bpy, key, rig
+    from tests.scripts.recordings.blends import bpy, key, rig
 
     # Blender's own names are text of at most 63 bytes, without NUL.
     names = [name for name in NAMES if 0 < len(name.encode(errors="replace")) <= 63 and not set(name) & set("\0\udcff")]

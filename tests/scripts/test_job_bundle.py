@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch import compare, job_bundle
+from rigid_motion_batch.cli import compare, job_bundle
 from rigid_motion_batch.workplan import Plan, Task
 from tests.scripts.comparing import outputs, write_toss
 

@@ -15,6 +15,7 @@ from tests.animation.farm import played_on_a_farm
 from tests.animation.oracle import curves_of
 from tests.scripts.baking import extension, open_again
 from tests.scripts.bvh_bodies import write_body
+from tests.scripts.recordings.glbs import curved, mixed_rates, soldier
 from tests.scripts.reducing import (
     FRAMES,
     ROUNDING,
@@ -30,7 +31,6 @@ from tests.scripts.reducing import (
     worlds_of,
     write_csv,
 )
-from tests.scripts.trajectories.glbs import curved, mixed_rates, soldier
 
 
 @pytest.mark.parametrize("mode", ["motor_spline", "dq_sclerp"])

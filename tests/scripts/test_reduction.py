@@ -8,11 +8,11 @@ import bpy
 import numpy as np
 import pytest
 
+from research import reduction
 from rigid_motion import animation
 from rigid_motion.motion import shell_error
-from rigid_motion_batch import reduction
-from rigid_motion_batch.trajectories import TrajectoryError
-from tests.scripts.trajectories.test_damaged_bvh_bodies import seed
+from rigid_motion_batch.recordings import TrajectoryError
+from tests.scripts.recordings.test_damaged_bvh_bodies import seed
 
 TOLERANCE, RADIUS = 0.005, 0.1
 

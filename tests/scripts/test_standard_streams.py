@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.command_line import path_line
-from rigid_motion_batch.commands import COMMANDS
 from tests.scripts.reducing import write_csv
 
 ROOT = Path(__file__).resolve().parents[2]

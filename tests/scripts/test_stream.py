@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import interpolate, shell_error
-from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.streaming import PACKINGS, TWISTS, Packets, PlayOut
 from rigid_motion_batch.streaming.hearing import Hearing
 from rigid_motion_batch.streaming.limits import EACH, SILENCE, STREAMS, Cookies

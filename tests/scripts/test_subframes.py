@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from research import subframes
+from research.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
 from rigid_motion import animation
 from rigid_motion.animation.compute.differences import in_betweens
 from rigid_motion.animation.queries.keyed import source_of
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch import subframes
-from rigid_motion_batch.subframes import QUARTERS, Motion, between, deviation, keyed_object, measure
 
 BRISK = Motion("Brisk", turn=90.0, distance=1.0, frames=24)
 

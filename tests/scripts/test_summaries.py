@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch import markdown_tables, publishing
-from rigid_motion_batch.live_benchmark.turns import beyond
-from rigid_motion_batch.summaries import of_batch, of_live, of_paper, of_reduction, of_speed, of_sub_frames
+from research import markdown_tables, publishing
+from research.live_benchmark.turns import beyond
+from research.summaries import of_batch, of_live, of_paper, of_reduction, of_speed, of_sub_frames
 
 RACE = """### A path
 

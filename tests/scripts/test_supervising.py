@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.trajectories import importing
+from rigid_motion_batch.recordings import importing
 from tests.scripts.baking import one_object_file
 from tests.scripts.reducing import object_file, write_csv
 from tests.scripts.stopping import CRASH, alive, descendants, start

@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 import pytest
 
+from research import reduction
+from research.whole_bodies import against_decimate, against_greedy, against_published, feet, rigs, timing
+from research.whole_bodies import section as page
+from research.whole_bodies.bodies import Body, repeated
+from research.whole_bodies.optimum import optimum, optimum_of_four
 from rigid_motion.motion import Poses, reduce_skeleton_keys
-from rigid_motion_batch import reduction
-from rigid_motion_batch.whole_bodies import against_decimate, against_greedy, against_published, feet, rigs, timing
-from rigid_motion_batch.whole_bodies import section as page
-from rigid_motion_batch.whole_bodies.bodies import Body, repeated
-from rigid_motion_batch.whole_bodies.optimum import optimum, optimum_of_four
 
 # Blender's BVH importer leaves closing the file to Python.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -17,23 +17,23 @@ from typing import Any
 
 import numpy as np
 
+from rigid_motion_batch.analysis.choices import Choice, choice_parts, fewest_keys
+from rigid_motion_batch.analysis.metrics import body_table_names, table_names
+from rigid_motion_batch.analysis.modes import single_modes
+from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
-from rigid_motion_batch.trajectories.options import AS_THE_FILE_SAYS
-from rigid_motion_batch.trajectories.reading import split_source
-from rigid_motion_batch.trajectories.recordings import listed
+from rigid_motion_batch.comparison.storage import ClipReference, file_names, read_facts, read_times
+from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
+from rigid_motion_batch.recordings.clip_reading import clip_names
+from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS
+from rigid_motion_batch.recordings.reading import split_source
+from rigid_motion_batch.recordings.recordings import listed
+from rigid_motion_batch.scenes.settings import StageSettings, place_of_subject
+from rigid_motion_batch.scenes.timeline import Timeline
 from rigid_motion_batch.workplan import Plan, Task
 
 from . import steps
 from .report.pages import ON_ONE_PAGE, Settings
-from .stage.settings import StageSettings, place_of_subject
-from .stage.timeline import Timeline
-from .study.choices import Choice, choice_parts, fewest_keys
-from .study.metrics import body_table_names, table_names
-from .study.modes import single_modes
-from .study.radii import EVERYWHERE, Radii
-from .study.reading import clip_names
-from .study.storage import ClipReference, file_names, read_facts, read_times
 from .version import step_versions
 
 MODULE = steps.__name__

@@ -10,17 +10,24 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rigid_motion_batch.analysis.choices import Choice, choice_from
+from rigid_motion_batch.comparison.storage import (
+    ClipReference,
+    file_names,
+    read_clip,
+    read_keys,
+    write_keys,
+    write_recording,
+)
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.workplan import Job, TaskError, step
 
-from .study.choices import Choice, choice_from
-from .study.storage import ClipReference, file_names, read_clip, read_keys, write_keys, write_recording
-
 if TYPE_CHECKING:
+    from rigid_motion_batch.analysis.metrics import Metrics
+    from rigid_motion_batch.analysis.needed import KeysNeeded, Ways
+    from rigid_motion_batch.comparison.results import ClipResults
+
     from .report.clip_section import Films
-    from .study.metrics import Metrics
-    from .study.needed import KeysNeeded, Ways
-    from .study.results import ClipResults
 
 PARTS = ".parts"
 
@@ -132,9 +139,8 @@ def identify(job: Job, *, path: str) -> None:
 @step
 def read(job: Job, *, source: str, axes: str, options: Mapping[str, Any], recording: str) -> None:
     """Read a source, and repair its clips."""
-    from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
-
-    from .study.reading import read_source
+    from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
+    from rigid_motion_batch.recordings.clip_reading import read_source
 
     try:
         clips, note = read_source(source, axes, ReadingOptions(**options))
@@ -147,10 +153,11 @@ def read(job: Job, *, source: str, axes: str, options: Mapping[str, Any], record
 @step
 def measure(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], modes: Sequence[str], radius: float) -> None:
     """Choose keys of a clip, let the modes fill them in, and measure what was lost."""
+    from rigid_motion_batch.analysis.metrics import write_reconstruction
+    from rigid_motion_batch.analysis.reconstructions import reconstruct
+    from rigid_motion_batch.comparison.results import Result, write_result
+
     from .report.error_charts import errors_over_time
-    from .study.metrics import write_reconstruction
-    from .study.reconstructions import reconstruct
-    from .study.results import Result, write_result
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = reconstruct(whole, chosen, modes, radius)
@@ -174,13 +181,14 @@ def measure_body(
     shared: bool,
 ) -> None:
     """Choose keys of a whole body, let the modes fill them in, and measure what was lost."""
+    from rigid_motion_batch.analysis.bodies import reconstruct_body
+    from rigid_motion_batch.analysis.body_metrics import measure_modes, write_joint_metrics, write_key_tables
+    from rigid_motion_batch.analysis.metrics import body_table_names
+    from rigid_motion_batch.analysis.radii import Radii
+    from rigid_motion_batch.comparison.body_storage import write_body_keys
+    from rigid_motion_batch.comparison.results import Result, write_result
+
     from .report.body_charts import body_charts, body_curves
-    from .study.bodies import reconstruct_body
-    from .study.body_metrics import measure_modes, write_joint_metrics, write_key_tables
-    from .study.body_storage import write_body_keys
-    from .study.metrics import body_table_names
-    from .study.radii import Radii
-    from .study.results import Result, write_result
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     of_joints = Radii(**radii).of(whole.figure.joints)
@@ -203,12 +211,13 @@ def decimate_body(
     job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radii: Mapping[str, Any], shared: bool
 ) -> None:
     """See what Blender's Decimate needs to be as good as the keys of a whole body under each mode."""
-    from .decimating import beside_decimate
+    from rigid_motion_batch.analysis.body_decimated import write_keys_of_bodies
+    from rigid_motion_batch.analysis.radii import Radii
+    from rigid_motion_batch.comparison.body_storage import read_body_keys
+    from rigid_motion_batch.comparison.results import read_numbers
+    from rigid_motion_batch.scenes.decimating import beside_decimate
+
     from .report.decimated_table import decimated_table
-    from .study.body_decimated import write_keys_of_bodies
-    from .study.body_storage import read_body_keys
-    from .study.radii import Radii
-    from .study.results import read_numbers
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = read_body_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, shared=shared)
@@ -226,7 +235,7 @@ def decimate_body(
 @step
 def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radius: float, fit: bool) -> None:
     """Find how many keys every mode needs on a clip."""
-    from .study.needed import OfRigidBody
+    from rigid_motion_batch.analysis.needed import OfRigidBody
 
     whole = read_clip(job.output, ClipReference(**clip))
     _write_needed(job, whole.name, OfRigidBody(whole, radius, fit=fit), modes)
@@ -235,16 +244,16 @@ def count_keys(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radiu
 @step
 def count_key_poses(job: Job, *, clip: Mapping[str, Any], modes: Sequence[str], radii: Mapping[str, Any]) -> None:
     """Find how many key poses every mode needs on a whole body."""
-    from .study.body_needed import OfBody
-    from .study.radii import Radii
+    from rigid_motion_batch.analysis.body_needed import OfBody
+    from rigid_motion_batch.analysis.radii import Radii
 
     whole = read_clip(job.output, ClipReference(**clip))
     _write_needed(job, whole.name, OfBody(whole, Radii(**radii).of(whole.figure.joints)), modes)
 
 
 def _write_needed(job: Job, clip: str, ways: Ways, modes: Sequence[str]) -> None:
-    from .study import needed
-    from .study.modes import single_modes
+    from rigid_motion_batch.analysis import needed
+    from rigid_motion_batch.analysis.modes import single_modes
 
     found = needed.keys_needed(ways, single_modes(modes), advance=_counted(job, needed.RATES))
     write_text(job.writes(needed_of(clip)), needed.to_json(found))
@@ -253,7 +262,7 @@ def _write_needed(job: Job, clip: str, ways: Ways, modes: Sequence[str]) -> None
 @step
 def tabulate(job: Job, *, studies: Sequence[Any]) -> None:
     """Write the tables of all clips."""
-    from .study.metrics import write_metrics
+    from rigid_motion_batch.analysis.metrics import write_metrics
 
     advance = _counted(job, studies)
 
@@ -269,7 +278,7 @@ def tabulate(job: Job, *, studies: Sequence[Any]) -> None:
 @step
 def tabulate_joints(job: Job, *, studies: Sequence[Any]) -> None:
     """Write the table of the joints of all bodies."""
-    from .study.body_metrics import join_tables, write_joint_metrics
+    from rigid_motion_batch.analysis.body_metrics import join_tables, write_joint_metrics
 
     parts = _parts(job, studies, measuring, joints_of)
     if parts:
@@ -281,8 +290,8 @@ def tabulate_joints(job: Job, *, studies: Sequence[Any]) -> None:
 @step
 def tabulate_decimated(job: Job, *, studies: Sequence[Any]) -> None:
     """Write the table of the keys of all bodies beside Decimate's."""
-    from .study.body_decimated import write_keys_of_bodies
-    from .study.body_metrics import join_tables
+    from rigid_motion_batch.analysis.body_decimated import write_keys_of_bodies
+    from rigid_motion_batch.analysis.body_metrics import join_tables
 
     parts = _parts(job, studies, decimating, lambda clip, choice: decimated_of(clip, choice)[0])
     if parts:
@@ -302,7 +311,7 @@ def _parts(
 @step
 def tabulate_keys(job: Job, *, studies: Sequence[Any]) -> None:
     """Write the table of the keys that all clips need."""
-    from .study.needed import write_keys_needed
+    from rigid_motion_batch.analysis.needed import write_keys_needed
 
     found = [clip.needed for clip in Clips(job, studies) if clip.needed]
     write_keys_needed(job.writes(KEYS_NEEDED), found)
@@ -315,9 +324,9 @@ def tabulate_keys(job: Job, *, studies: Sequence[Any]) -> None:
 @step
 def build(job: Job, *, clip: Mapping[str, Any], choice: Sequence[str], radius: float, stage: Mapping[str, Any]) -> None:
     """Build the stage of a film, and save it."""
-    from .stage.film import save_blend
-    from .stage.scene import build_stage
-    from .stage.settings import StageSettings, SubjectError
+    from rigid_motion_batch.scenes.film import save_blend
+    from rigid_motion_batch.scenes.scene import build_stage
+    from rigid_motion_batch.scenes.settings import StageSettings, SubjectError
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = read_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, radius)
@@ -339,11 +348,11 @@ def build_body(
     stage: Mapping[str, Any],
 ) -> None:
     """Build the stage of a film of whole bodies, and save it."""
-    from .stage.body_scene import build_body_stage
-    from .stage.film import save_blend
-    from .stage.settings import StageSettings
-    from .study.body_storage import read_body_keys
-    from .study.radii import Radii
+    from rigid_motion_batch.analysis.radii import Radii
+    from rigid_motion_batch.comparison.body_storage import read_body_keys
+    from rigid_motion_batch.scenes.body_scene import build_body_stage
+    from rigid_motion_batch.scenes.film import save_blend
+    from rigid_motion_batch.scenes.settings import StageSettings
 
     whole, chosen = read_clip(job.output, ClipReference(**clip)), choice_from(*choice)
     made = read_body_keys(job.reads(keys_of(whole.name, chosen)), whole, chosen, shared=shared)
@@ -358,7 +367,7 @@ def build_body(
 @step
 def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int) -> dict[str, float]:
     """Render some frames of a film."""
-    from .stage.film import render_piece
+    from rigid_motion_batch.scenes.film import render_piece
 
     chosen = choice_from(*choice)
     blend = job.reads(blend_of(clip, chosen))
@@ -373,7 +382,7 @@ def render(job: Job, *, clip: str, choice: Sequence[str], first: int, last: int)
 @step
 def encode(job: Job, *, clip: str, choice: Sequence[str], firsts: Sequence[int]) -> dict[str, float]:
     """Join the pieces of a film."""
-    from .stage.film import join_pieces
+    from rigid_motion_batch.scenes.film import join_pieces
 
     chosen = choice_from(*choice)
     pieces = [job.reads(piece_of(clip, chosen, first)) for first in firsts]
@@ -404,7 +413,7 @@ class Clips:
         self._studies = [(clip, [choice_from(*choice) for choice in choices]) for clip, choices in studies]
 
     def __iter__(self) -> Iterator[ClipResults]:
-        from .study.results import ClipResults, read_result
+        from rigid_motion_batch.comparison.results import ClipResults, read_result
 
         for clip, choices in self._studies:
             read = [
@@ -443,7 +452,7 @@ class Clips:
         return self._job.reads(decimated_of(clip, choice)[1])
 
     def _needed(self, clip: str) -> KeysNeeded | None:
-        from .study import needed
+        from rigid_motion_batch.analysis import needed
 
         if counting(clip) not in self._job.finished:
             return None

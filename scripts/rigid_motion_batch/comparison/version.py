@@ -18,8 +18,8 @@ SOURCES = (
     *(
         f"rigid_motion_batch/{part}"
         for part in (
-            *("comparison", "trajectories", "axes.py", "command_line.py", "decimated_bodies.py", "figures.py"),
-            *("files.py", "graph_decimate.py", "hushing.py", "places.py", "rows.py"),
+            *("analysis", "comparison", "recordings", "scenes", "axes.py", "command_line.py", "files.py", "hushing.py"),
+            *("palette.py", "places.py", "rows.py"),
         )
     ),
 )

@@ -13,13 +13,13 @@ import numpy as np
 from rigid_motion import animation
 from rigid_motion.animation.transforms import transform_of
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.comparison.stage.armature import Rest, Rig
-from rigid_motion_batch.comparison.study.clips import Clip
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.keying.blend_files import FileProblem
 from rigid_motion_batch.keying.reducing import Wishes, reduced
 from rigid_motion_batch.keying.targets import Result
-from rigid_motion_batch.trajectories.rigs import LAST_FRAME
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.rigs import LAST_FRAME
+from rigid_motion_batch.scenes.armature import Rest, Rig
 
 RATES = 1, 240
 """Frames a second that a file may be given for the rate of its recording."""

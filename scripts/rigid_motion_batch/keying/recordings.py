@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigid_motion.motion import reduce_keys
-from rigid_motion_batch.comparison.study.choices import Tolerance
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.comparison.study.metrics import write_poses
-from rigid_motion_batch.comparison.study.radii import RIGID
-from rigid_motion_batch.comparison.study.reading import folder_names, read_source
-from rigid_motion_batch.comparison.study.reconstructions import fill_in
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.metrics import write_poses
+from rigid_motion_batch.analysis.radii import RIGID
+from rigid_motion_batch.analysis.reconstructions import fill_in
 from rigid_motion_batch.keying.blend_files import (
     FileProblem,
     refuse_came_meanwhile,
@@ -29,8 +27,10 @@ from rigid_motion_batch.keying.jobs import place_of
 from rigid_motion_batch.keying.keyed_files import key_body, key_object, new_file
 from rigid_motion_batch.keying.reducing import Wishes, fewer, off
 from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Stopped, counted, tell_failure
-from rigid_motion_batch.trajectories import ReadingOptions, TrajectoryError
-from rigid_motion_batch.trajectories.reading import split_source
+from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
+from rigid_motion_batch.recordings.clip_reading import folder_names, read_source
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.reading import split_source
 
 TOLERANCE = Tolerance("5mm")
 """Where none is given."""

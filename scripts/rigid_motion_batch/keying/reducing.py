@@ -12,10 +12,10 @@ from rigid_motion.animation import NeedsItsKeys, Reduction, Refused, WholeRig
 from rigid_motion.animation.baking.sizes import first_tolerance, metres_per_unit, rig_size
 from rigid_motion.animation.queries.polls import with_more_keys_than
 from rigid_motion.animation.transforms import Transform
-from rigid_motion_batch.comparison.study.choices import Tolerance
-from rigid_motion_batch.figures import unit_of
+from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.keying.sessions import counted
 from rigid_motion_batch.keying.targets import Action, Result
+from rigid_motion_batch.recordings.figures import unit_of
 
 FEWEST = 2
 """So many keys are as few as a motion has."""

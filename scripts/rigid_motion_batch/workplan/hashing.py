@@ -112,7 +112,7 @@ def code_version(*paths: str) -> str:
     Parameters
     ----------
     *paths : str
-        Modules and packages, as `places` names them: "rigid_motion/motion", "rigid_motion_batch/compare.py". Of a
+        Modules and packages, as `places` names them: "rigid_motion/motion", "rigid_motion_batch/cli/compare.py". Of a
         package, all modules and the files beside them.
     """
     digest = hashlib.sha256()

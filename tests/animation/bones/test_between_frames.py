@@ -55,6 +55,30 @@ def test_keys_off_whole_frames_are_hit(live_file, mode, order):
     assert max(errors.values()) < PROMISE, errors
 
 
+@pytest.mark.parametrize("order", ["QUATERNION", "XYZ"])
+@pytest.mark.parametrize("part", range(len(OFF_WHOLE_FRAMES) - 1))
+def test_a_single_segment_with_a_mode_may_begin_and_end_off_whole_frames(live_file, part, order):
+    rig = key_all(new_rig(rotation_mode=order), OFF_WHOLE_FRAMES)
+    set_mode(list(rig.pose.bones), "dq_sclerp", [OFF_WHOLE_FRAMES[part]])
+    bpy.context.view_layer.update()
+    errors = largest_error(rig, np.array(OFF_WHOLE_FRAMES))
+    assert max(errors.values()) < 2e-5, errors
+    errors = largest_error(rig, EIGHTHS)
+    assert max(errors.values()) < PROMISE, errors
+
+
+def test_a_key_edited_far_from_a_mode_that_ends_off_whole_frames_is_followed(live_file):
+    rig = key_all(new_rig(), OFF_WHOLE_FRAMES)
+    set_mode(list(rig.pose.bones), "dq_sclerp", [OFF_WHOLE_FRAMES[0], OFF_WHOLE_FRAMES[1]])
+    bpy.context.view_layer.update()
+    assert max(record.rate for record in rig.animation_data.action.rigid_motion.slots) > 1
+    curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[-1].co_ui.y += 0.1
+    bpy.context.view_layer.update()
+    errors = largest_error(rig, EIGHTHS)
+    assert max(errors.values()) < PROMISE, errors
+    assert refresh() == 0
+
+
 def test_an_edit_of_a_key_off_whole_frames_is_followed(live_file):
     rig = key_all(new_rig(), OFF_WHOLE_FRAMES)
     set_mode(list(rig.pose.bones), "dq_sclerp")

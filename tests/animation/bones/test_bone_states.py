@@ -284,11 +284,11 @@ class EditingBones(RigEditing):
         name = self._named(who)
         bone = self._found(name)
         constraint = next(iter(own_constraints(bone)), None)
-        if constraint is None or constraint.mute:
+        if constraint is None or constraint.mute or self._is_at_odds(name):
             return
         constraint.influence = influence
         bpy.context.view_layer.update()
-        frames = np.arange(2.0, 36.0, 7.0) + self.shift
+        frames = np.array(self._frames_that_are_seen([bone])[::7], dtype=np.float64)
         (shown,) = shown_poses([bone.id_data], frames)
         native, wanted = (self._placed(bone, shown, how(bone, frames)) for how in (as_blender_has_it, expected_bases))
         between = native[:, :3, 3] + influence * (wanted - native)[:, :3, 3]

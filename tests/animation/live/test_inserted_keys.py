@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
-from rigid_motion.animation import key_frames, set_mode
+from rigid_motion.animation import key_frames, set_mode, write_channel
 from rigid_motion.animation.compute.source_cache import MOST_BYTES, known, size_of
 from tests.animation.bones.rigs import key_all, new_rig
-from tests.animation.oracle import curves_of, expected_bases
-from tests.animation.scenes import key, new_object, push_down, tweak
+from tests.animation.oracle import curves_of, expected_bases, rotation_path
+from tests.animation.scenes import key, new_object, push_down, random_values, tweak
 
 
 @pytest.fixture
@@ -164,6 +164,29 @@ def test_a_pose_pasted_by_copy_global_transform_with_auto_key_is_where_it_lands(
     importlib.import_module(f"{in_blender}copy_global_transform").set_matrix(live_file, matrix)
     assert np.abs(world() - np.array(matrix)).max() < 2e-5
     assert 15.0 in key_frames(shown)
+
+
+@pytest.mark.parametrize("keyed", ["location", "rotation"])
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_key_keeps_the_pose_also_where_it_is_the_first_of_a_property(live_file, order, keyed):
+    obj = new_object("Tool", order)
+    path = rotation_path(obj) if keyed == "rotation" else keyed
+    write_channel(obj, path, np.array((1.0, 25.0)), random_values(obj, path, 2, 3), interpolation="LINEAR")
+    values = random_values(obj, rotation_path(obj), 1, 5)[0]
+    obj.scale = (0.5, 2.0, 1.5)
+    if keyed == "location":
+        setattr(obj, rotation_path(obj), values)
+    else:
+        obj.location = (1.0, 2.0, 3.0)
+    set_mode(obj, "dq_sclerp")
+    curves_of(obj)[path, 0].keyframe_points[0].interpolation = "SINE"
+    bpy.context.scene.frame_set(15)
+    before = seen()
+    native = getattr(obj, path).copy()
+    key_pose(obj, every=True)
+    assert np.abs(seen() - before).max() < 2e-5
+    keyed_now = [curves_of(obj)[path, index].evaluate(15.0) for index in range(len(native))]
+    assert np.abs(np.subtract(keyed_now, native)).max() > 1e-3, "the difference has to be worth a key"
 
 
 @pytest.mark.parametrize("order", ORDERS)

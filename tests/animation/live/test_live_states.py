@@ -88,7 +88,15 @@ class EditingObjects(TakenAway, WithTools):
         return self._found(self._named(share))
 
     def _basis(self, obj: bpy.types.Object) -> np.ndarray:
-        return np.array(obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_basis)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        evaluated = obj.evaluated_get(depsgraph)
+        if not obj.rigid_motion.is_exact:
+            return np.array(evaluated.matrix_basis)
+        # A constraint has the difference, and is not in there.
+        above = np.eye(4)
+        if obj.parent is not None:
+            above = np.array(obj.parent.evaluated_get(depsgraph).matrix_world @ obj.matrix_parent_inverse)
+        return np.linalg.solve(above, np.array(evaluated.matrix_world))
 
     @precondition(lambda self: self.on)
     @rule(who=shares, seed=seeds)

@@ -195,6 +195,19 @@ def test_what_is_eased_and_does_not_turn_spins_by_its_interpolation(live_file):
     assert np.abs(turned(obj, EACH[:25]) - expected).max() < 1e-5
 
 
+@pytest.mark.parametrize("interpolation", ["BEZIER", "ELASTIC", "CONSTANT"])
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_what_stays_between_its_keys_spins_by_the_interpolation_of_its_rotation(live_file, mode, interpolation):
+    obj, frames = new_object(), np.array((1.0, 13.0, 25.0, 49.0))
+    for path, values in (("location", (0.0, 1.0, -2.0)), ("rotation_quaternion", (0.8, 0.0, 0.6, 0.0))):
+        rows = np.tile(values, (4, 1))
+        rows[3] = np.roll(values, 1)
+        write_channel(obj, path, frames, rows, interpolation="LINEAR" if path == "location" else interpolation)
+    set_mode(obj, mode)
+    set_turns(obj, 2, [13.0])
+    assert_shown([obj], EACH[:49])
+
+
 @pytest.mark.parametrize("mode", ["dq_sclerp", "motor_spline"])
 def test_a_bake_has_the_turns_and_undoing_it_brings_them_back(live_file, mode):
     obj = propeller(mode)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.figures import Figure
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import Figure
 
 BONES = {
     "Hips": (None, (0, 90, 0)),

@@ -9,8 +9,8 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import normalise
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.figures import Figure, Skin
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import Figure, Skin
 
 JOINTS = ("Hips", "Spine", "Head", "Left leg", "Right leg", "Left foot")
 PARENTS = (-1, 0, 1, 0, 0, 3)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, interpolate, measure
-from rigid_motion_batch.comparison.study.choices import Uniform
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.comparison.study.reconstructions import Reconstruction
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
+from rigid_motion_batch.recordings.clips import Clip
 
 
 def swinging_clip(

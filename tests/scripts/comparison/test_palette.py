@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import MODES
-from rigid_motion_batch.comparison import palette
-from rigid_motion_batch.comparison.study.modes import BEST_OF
+from rigid_motion_batch import palette
+from rigid_motion_batch.analysis.modes import BEST_OF
 
 # Machado, Oliveira, Fernandes 2009, severity 1: what people with one kind of cone missing see, in linear RGB.
 VISION = {

@@ -10,6 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES
+from rigid_motion_batch.analysis.choices import (
+    Budget,
+    Choice,
+    Tolerance,
+    Uniform,
+    choice_from,
+    choice_parts,
+    fewest_keys,
+)
+from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.planning import (
     MOST_POSES,
@@ -22,22 +33,11 @@ from rigid_motion_batch.comparison.planning import (
     without_films,
 )
 from rigid_motion_batch.comparison.report.pages import ON_ONE_PAGE, Settings
-from rigid_motion_batch.comparison.stage.settings import StageSettings
-from rigid_motion_batch.comparison.study.choices import (
-    Budget,
-    Choice,
-    Tolerance,
-    Uniform,
-    choice_from,
-    choice_parts,
-    fewest_keys,
-)
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.comparison.study.radii import Radii
-from rigid_motion_batch.comparison.study.reading import folder_names
-from rigid_motion_batch.comparison.study.reconstructions import reconstruct
-from rigid_motion_batch.comparison.study.storage import ClipReference, file_names, write_recording
-from rigid_motion_batch.trajectories import ReadingOptions
+from rigid_motion_batch.comparison.storage import ClipReference, file_names, write_recording
+from rigid_motion_batch.recordings import ReadingOptions
+from rigid_motion_batch.recordings.clip_reading import folder_names
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.scenes.settings import StageSettings
 from rigid_motion_batch.workplan import Plan, Task
 from tests.scripts.comparison.recordings import swinging_clip
 from tests.thoroughness import tried

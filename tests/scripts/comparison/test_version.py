@@ -28,7 +28,7 @@ def test_a_blender_that_was_not_installed_by_pip_is_asked_itself(monkeypatch) ->
 def test_numbers_are_compared_without_loading_blender(tmp_path) -> None:
     script = """
 import json, sys
-from rigid_motion_batch import compare
+from rigid_motion_batch.cli import compare
 code = compare.main(["assets/throw.csv", "--no-video", "--rates", "5", "--jobs", "0", "--output", sys.argv[1]])
 from rigid_motion_batch.comparison.version import program_version
 print(json.dumps({"code": code, "loaded": "bpy" in sys.modules, "version": program_version()}))

@@ -6,8 +6,8 @@ import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
 from rigid_motion.motion.quaternions import angle_between, normalise
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import Clip
 from tests.recordings import RECORDINGS
 
 FRAME = 1.0 / 60.0

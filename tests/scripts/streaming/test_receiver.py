@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_motion.motion import MODES, Poses, interpolate, rms, shell_error
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.comparison.study.clips import Clip
+from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.streaming import PACKINGS, Link, Packets, Playback, PlayOut, What, receive, send
 from rigid_motion_batch.streaming.packets import HEADER, sealed
 from tests.scripts.streaming.motions import FRAME, SOURCES, clips, swinging

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from distributed import Client
 
-from rigid_motion_batch import compare
+from rigid_motion_batch.cli import compare
 from rigid_motion_batch.workplan import ExecutorError, Plan, Workspace, run
 from rigid_motion_batch.workplan.dask_executor import DaskExecutor
 from rigid_motion_batch.workplan.running import order_for

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from rigid_motion.motion import MODES
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.comparison.planning import Study, Wanted, comparison_tasks, reading_tasks
 from rigid_motion_batch.comparison.report.pages import Settings
-from rigid_motion_batch.comparison.study.choices import Uniform
-from rigid_motion_batch.comparison.study.radii import Radii
-from rigid_motion_batch.comparison.study.storage import ClipReference
+from rigid_motion_batch.comparison.storage import ClipReference
 from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.workplan import Plan, SerialExecutor, Workspace
 from rigid_motion_batch.workplan.running import RETRIES, _Run

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from rigid_motion_batch.comparison import steps
-from rigid_motion_batch.comparison.version import step_versions
 from rigid_motion_batch.places import NAMED
 from rigid_motion_batch.workplan.module_text import read_module
 from rigid_motion_batch.workplan.sources import SourceReader
@@ -52,7 +51,7 @@ print(json.dumps(sorted(own - {None})))
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, object]]:
     """A comparison with films, whose tasks can be done again: for every step the order of a task."""
-    from rigid_motion_batch import compare
+    from rigid_motion_batch.cli import compare
     from rigid_motion_batch.workplan import Plan
     from rigid_motion_batch.workplan.running import order_for
     from tests.scripts.comparing import write_toss
@@ -104,13 +103,6 @@ def test_no_film_depends_on_the_report_and_no_report_on_the_films(files: dict[st
     assert [file for name in REPORTS for file in files[name] if "/stage/" in file] == []
     assert [file for name in ("measure", "count_keys") for file in files[name] if "/page/" in file] == []
     assert "assets/models.blend" in files["build"]
-
-
-def test_blenders_version_counts_for_the_steps_that_load_it() -> None:
-    versions = step_versions(f"{steps.__name__}:{name}" for name in (*STEPS, *REPORTS))
-    loading = {name.partition(":")[2] for name, parts in versions.items() if "Blender" in parts}
-    assert loading == {"read", "build", "render", "encode"}
-    assert all("NumPy" in parts for parts in versions.values())
 
 
 def test_of_its_own_module_a_step_depends_on_itself_and_what_it_refers_to() -> None:

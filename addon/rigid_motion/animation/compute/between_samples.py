@@ -83,7 +83,9 @@ def largest_errors(
             continue
         count = place.stop - place.start
         begins, ends = np.clip(behind[:-1], 0, count), np.clip(before[1:] + 1, 0, count)
-        is_seen = (begins < ends - 1) & (source.modes != 0)
+        # One may begin and end between two samples.
+        is_whole = (before[:-1] >= 0) & (behind[1:] < count)
+        is_seen = (is_whole | (begins < ends - 1)) & (source.modes != 0)
         if np.any(is_seen & (known[place.start + begins] == known[place.start + ends])):
             largest[number] = np.inf
     return largest

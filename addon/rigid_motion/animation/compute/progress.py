@@ -7,11 +7,12 @@ is what the interpolation of the keys says.
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
 from ..curves import Keys, evaluate
-from .components import ROTATION, ROWS
+from .components import PART_OF, ROTATION, ROWS
 from .sources import Source
 
 
@@ -36,9 +37,15 @@ def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: n
     """Return how far segments have come on frames (m,) where no channel changes: by the interpolation of their keys.
 
     `first` and `last` are the frames that each runs between, (m,). It is that of a value with the same keys, which
-    goes up by one from each to the next, and rests at a key where handles are.
+    goes up by one from each to the next, and rests at a key where handles are: those of the first channel that turns.
     """
-    keys = next((keys for rows, keys in source.channels if 3 <= rows[0] < 7), source.curves[0])
+    turning = [
+        (row, keys.only([place]))
+        for rows, keys in source.channels
+        for place, row in enumerate(rows)
+        if PART_OF[row] == ROTATION
+    ]
+    _, keys = min(turning, key=itemgetter(0), default=(0, source.curves[0].only([0])))
     begin, at, end = evaluate([_counting(keys)] * 3, [first, frames, last])
     way, duration = end - begin, np.where(last > first, last - first, np.inf)
     counted = np.divide(at - begin, way, out=np.zeros_like(at), where=way != 0.0)
@@ -46,8 +53,7 @@ def idle_progress(source: Source, frames: np.ndarray, first: np.ndarray, last: n
 
 
 def _counting(keys: Keys) -> Keys:
-    """One curve with the frames and interpolations of these keys, and their numbers for values."""
-    one = keys.only([0])
+    """The curve with the frames and interpolations of these keys, and their numbers for values."""
     numbers = np.arange(len(keys.times), dtype=np.float32)
 
     def numbered(points: np.ndarray | None) -> np.ndarray | None:
@@ -61,4 +67,6 @@ def _counting(keys: Keys) -> Keys:
     if cycles is not None:
         before, after = ("REPEAT_OFFSET" if mode == "REPEAT" else mode for mode in (cycles.before, cycles.after))
         cycles = replace(cycles, before=before, after=after)
-    return replace(one, points=numbered(one.points), left=numbered(one.left), right=numbered(one.right), cycles=cycles)
+    return replace(
+        keys, points=numbered(keys.points), left=numbered(keys.left), right=numbered(keys.right), cycles=cycles
+    )

@@ -114,6 +114,9 @@ class Source:
     is_on_top: bool = False
     """Whether differences come on top of the original one, and not in its place."""
 
+    shaping: np.ndarray | None = None
+    """The frames of the keys that segments run between, where others are `passed`; None where all are."""
+
     @cached_property
     def digest(self) -> str:
         """Differs wherever anything differs that the in-betweens depend on."""
@@ -160,7 +163,7 @@ class Source:
     @property
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
-        return len(self.channels) == 1 and self.cyclic is None
+        return len(self.channels) == 1 and self.cyclic is None and self.shaping is None
 
     @cached_property
     def steps(self) -> tuple[Stepped, ...]:
@@ -188,12 +191,16 @@ class Source:
         """Where any of the channels has a key of the animator's, shape (k,)."""
         return np.unique(np.concatenate([keys.times for keys in self.curves]))
 
-    @cached_property
+    @property
     def key_frames(self) -> np.ndarray:
         """The same without keys that are one to Blender, and with the copies that cycles make, (n,).
 
-        Copies are there as far as it is seen, and a round on both sides at least.
+        Copies are there as far as it is seen, and a round on both sides at least. On a `path` only those that shape it.
         """
+        return self._all_key_frames if self.shaping is None else self.shaping
+
+    @cached_property
+    def _all_key_frames(self) -> np.ndarray:
         if self.is_together:
             return self.curves[0].times
         times = [keys.times for keys in self.curves]
@@ -327,9 +334,8 @@ class Source:
         """The same without the keys that are `passed`."""
         if not self.passed.any():
             return self
-        frames = self.key_frames[self.passed]
-        channels = tuple((rows, keys.at(~np.isin(keys.times, frames))) for rows, keys in self.channels)
-        return replace(self, channels=channels)
+        # Channels keep these keys: one without a key on the others would be elsewhere there.
+        return replace(self, shaping=self.key_frames[~self.passed])
 
     @property
     def is_live(self) -> bool:
@@ -394,7 +400,7 @@ class Source:
         """Whether the scale is animated, and at every key the same along all axes and positive. Else Blender scales."""
         if SCALE not in self.keyed or self.has_modified_scale:
             return False
-        x, y, z = self.values_at(self.key_frames)[ROWS[SCALE]]
+        x, y, z = self.values_at(self._all_key_frames)[ROWS[SCALE]]
         return bool(np.allclose(x, y) and np.allclose(x, z) and np.all(x > 0.0) and np.ptp(x) > 0.0)
 
     def values_at(self, frames: np.ndarray) -> np.ndarray:

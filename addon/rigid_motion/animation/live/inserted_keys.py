@@ -213,6 +213,9 @@ class InsertedKeys:
         added = added_values(place, user, source, frames)[:, 0]
         if decided is None:
             in_between = old.values_at(old.held(frames))[:, 0] + added
+            # A property that had no keys at all is where it is.
+            unkeyed = [part not in old.keyed for part in PART_OF]
+            in_between[unkeyed] = user.components()[unkeyed]
             shown = in_between if posed is None else posed.components
             if not _has_values(source, frame, shown) or (posed is not None and not (posed.on_top or posed.is_shown)):
                 return False

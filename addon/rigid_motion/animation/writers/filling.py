@@ -93,7 +93,9 @@ def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | No
     if span is None:
         return None
     begin, end = source.sample_range(rate)
-    return max(span[0] * rate, begin), min(span[1] * rate, end)
+    # On a whole frame around it, keys off whole frames leave no sample.
+    first, last = (min(max(frame * rate, begin), end) for frame in span)
+    return first, last
 
 
 def _fill_in_changed(

@@ -92,7 +92,7 @@ class Layout:
         """In an F-curve that is read as the frames pass."""
         first, last = source.frame_range
         cycles = source.cyclic.cycles if source.repeats else None
-        return cls(first, last, _ends(source), cycles, first < 0 and cycles is None, steps=source.steps)
+        return cls(first, last, _ends(source, 1), cycles, first < 0 and cycles is None, steps=source.steps)
 
     @classmethod
     def apart(cls, source: Source, rate: int) -> Layout:
@@ -100,7 +100,7 @@ class Layout:
         first, last = source.sample_range(rate)
         cycles = source.cyclic.cycles if source.repeats else None
         shift, steps = max(0, -source.frame_range[0]), source.steps
-        return cls(first, last, _ends(source), cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
+        return cls(first, last, _ends(source, rate), cycles, shift=shift, is_apart=True, steps=steps, rate=rate)
 
     @property
     def frames(self) -> tuple[int, int]:
@@ -220,10 +220,10 @@ def _are(modifiers: Sequence[bpy.types.FModifier], wanted: Sequence[Modifier]) -
     )
 
 
-def _ends(source: Source) -> tuple[float, float]:
-    """Where the outermost samples of a source lie."""
-    first, last = source.frame_range
+def _ends(source: Source, rate: int) -> tuple[float, float]:
+    """The frames on which the outermost samples of a source lie, of so many a frame."""
+    first, last = (number / rate for number in source.sample_range(rate))
     if source.goes_on and not source.repeats:
-        return float(first), float(last)
+        return first, last
     begin, end = source.keyed_range
     return max(first, begin), min(last, end)

@@ -11,11 +11,11 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.analysis.body_metrics import MeasuredBody, ModeOfBody, key_samples
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.figures import carrying, short_names
+from rigid_motion_batch.palette import ERROR_COLOURS, error_hex, full_colour
+from rigid_motion_batch.recordings.figures import carrying, short_names
 
-from ..palette import ERROR_COLOURS, error_hex, full_colour
-from ..study.body_metrics import MeasuredBody, ModeOfBody, key_samples
 from .charts import nice_ticks
 from .elements import heading, label, number_cell, rounded, swatch, table
 from .error_charts import error_curves

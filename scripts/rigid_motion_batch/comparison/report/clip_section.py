@@ -11,11 +11,12 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ..study.choices import Tolerance, Uniform
-from ..study.metrics import NOTHING, Metrics
-from ..study.modes import BEST_OF, single_modes
-from ..study.reconstructions import joint_groups
-from ..study.results import ClipResults, Result, SegmentModes
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import NOTHING, Metrics
+from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
+from rigid_motion_batch.analysis.reconstructions import joint_groups
+from rigid_motion_batch.comparison.results import ClipResults, Result, SegmentModes
+
 from .charts import axis_over, line_chart
 from .elements import curve, heading, is_best, label, mode_cell, number_cell, rate_axis, rounded, table
 from .findings import compared, listed

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..study.body_decimated import DECIMATE, SHARED, KeysOfBody
-from ..study.reconstructions import Groups
+from rigid_motion_batch.analysis.body_decimated import DECIMATE, SHARED, KeysOfBody
+from rigid_motion_batch.analysis.reconstructions import Groups
+
 from .elements import heading, label, missing_cell, mode_cell, number_cell, rounded, table
 from .findings import listed
 from .markup import Content, Markup, element

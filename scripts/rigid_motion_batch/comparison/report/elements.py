@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..palette import colour_of
-from ..study.modes import label_of as label
+from rigid_motion_batch.analysis.modes import label_of as label
+from rigid_motion_batch.palette import colour_of
+
 from .charts import Axis, Curve
 from .markup import Content, Markup, element
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..palette import colour_of
-from ..study.reconstructions import Groups, Reconstruction, identical_modes
+from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
+from rigid_motion_batch.palette import colour_of
+
 from .charts import Axis, Marks, axis_over, line_chart, with_rows_below
 from .elements import curve
 from .markup import Markup, element, join

@@ -13,11 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..study.choices import Choice, Tolerance, Uniform
-from ..study.metrics import NOTHING, geometric_mean
-from ..study.modes import BEST_OF, REFERENCE, single_modes
-from ..study.reconstructions import Groups, joint_groups
-from ..study.results import Result
+from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE, single_modes
+from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
+from rigid_motion_batch.comparison.results import Result
 
 UPDATES_IN_THE_PAPER = {"30": "20", "20": "10", "15": "7", "12": "5"}
 """The paper's table: updates a second under its state of the art, and those that it found to look the same."""

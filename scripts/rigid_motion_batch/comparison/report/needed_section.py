@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..study.modes import REFERENCE
-from ..study.needed import DECIMATIONS, TABLE_RATES, KeysNeeded, Overall, overall
+from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.analysis.needed import DECIMATIONS, TABLE_RATES, KeysNeeded, Overall, overall
+
 from .charts import Curve, axis_over, line_chart
 from .elements import curve, heading, is_best, label, missing_cell, mode_cell, number_cell, rounded, table, text_cell
 from .findings import listed

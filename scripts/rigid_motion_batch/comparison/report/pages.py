@@ -19,14 +19,14 @@ from string import Template
 from typing import TextIO
 from urllib.parse import quote
 
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import NOTHING
+from rigid_motion_batch.analysis.modes import REFERENCE, description_of, label_of, single_modes
+from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.comparison.results import ClipResults, Result
 from rigid_motion_batch.files import replacing
 
-from ..study.choices import Budget, Choice, Tolerance, Uniform
-from ..study.metrics import NOTHING
-from ..study.modes import REFERENCE, description_of, label_of, single_modes
-from ..study.needed import KeysNeeded
-from ..study.radii import JOINT
-from ..study.results import ClipResults, Result
 from .clip_section import Films, clip_section, film_name
 from .elements import heading, number_cell, rounded, swatch, text_cell
 from .findings import Summary, listed, summarise

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..study.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
+
 from .charts import Axis, line_chart
 from .elements import curve, heading, is_best, label, mode_cell, number_cell, rate_axis, table
 from .findings import Summary, findings, listed

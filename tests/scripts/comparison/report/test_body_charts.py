@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_motion.motion import Poses
-from rigid_motion_batch.comparison.palette import ERROR_COLOURS, NEARLY_ALL
+from rigid_motion_batch.analysis.bodies import reconstruct_body
+from rigid_motion_batch.analysis.body_metrics import MeasuredBody, measure_modes
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.comparison.report.body_charts import (
     LONGEST_NAME,
     MOST_ROWS,
@@ -23,11 +25,9 @@ from rigid_motion_batch.comparison.report.body_charts import (
     short_names,
 )
 from rigid_motion_batch.comparison.report.markup import Markup
-from rigid_motion_batch.comparison.study.bodies import reconstruct_body
-from rigid_motion_batch.comparison.study.body_metrics import MeasuredBody, measure_modes
-from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
-from rigid_motion_batch.comparison.study.clips import Clip
-from rigid_motion_batch.figures import Figure
+from rigid_motion_batch.palette import ERROR_COLOURS, NEARLY_ALL
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import Figure
 from tests.scripts.comparison.bodies import JOINTS, still_body, swinging_body
 
 MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import measure_reconstruction
+from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.reconstructions import identical_modes
+from rigid_motion_batch.analysis.reconstructions import reconstruct as fill_by
 from rigid_motion_batch.comparison.report.findings import Summary, findings, summarise
-from rigid_motion_batch.comparison.study.choices import Budget, Tolerance, Uniform
-from rigid_motion_batch.comparison.study.metrics import measure_reconstruction
-from rigid_motion_batch.comparison.study.modes import BEST_OF
-from rigid_motion_batch.comparison.study.reconstructions import identical_modes
-from rigid_motion_batch.comparison.study.reconstructions import reconstruct as fill_by
-from rigid_motion_batch.comparison.study.results import Result
+from rigid_motion_batch.comparison.results import Result
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 LABELS = {"lerp_slerp": "Line", "dq_sclerp": "Screw", "pga_slerp": "Motor", "pga_lerp": "Blend", BEST_OF: "Best"}

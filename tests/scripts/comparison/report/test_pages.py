@@ -17,18 +17,18 @@ import numpy as np
 import pytest
 
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.comparison.palette import colour_of
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import measure_reconstruction
+from rigid_motion_batch.analysis.modes import BEST_OF, label_of
+from rigid_motion_batch.analysis.needed import KeysNeeded, OfRigidBody, keys_needed
+from rigid_motion_batch.analysis.reconstructions import Reconstruction
+from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.comparison.report.charts import GRID_X, GRID_Y
 from rigid_motion_batch.comparison.report.clip_section import COLUMNS
 from rigid_motion_batch.comparison.report.error_charts import errors_over_time
 from rigid_motion_batch.comparison.report.pages import Settings, write_clip_page, write_overview, write_report
-from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
-from rigid_motion_batch.comparison.study.metrics import measure_reconstruction
-from rigid_motion_batch.comparison.study.modes import BEST_OF, label_of
-from rigid_motion_batch.comparison.study.needed import KeysNeeded, OfRigidBody, keys_needed
-from rigid_motion_batch.comparison.study.reconstructions import Reconstruction
-from rigid_motion_batch.comparison.study.reconstructions import reconstruct as choose
-from rigid_motion_batch.comparison.study.results import ClipFacts, ClipResults, Result
+from rigid_motion_batch.comparison.results import ClipFacts, ClipResults, Result
+from rigid_motion_batch.palette import colour_of
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
 
 VOID = {"meta", "link", "br", "img", "input", "hr", "source"}

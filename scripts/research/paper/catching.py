@@ -1,0 +1,303 @@
+"""The figure "catching a tool": a drill thrown by one person and caught by another, as a third one's headset shows it.
+
+The two hands and the tool are streams of their own, at the same rate over the same link, and a mode fills in what
+arrives. A hand that holds the tool is one rigid body with it, so nothing between them should move. The hand is tracked
+at the wrist, a hand's length from where it holds. All modes are shown at the same moments of the motion; one that looks
+ahead gets there later. Seconds, metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from research.making.motions import HAND, THERE
+from rigid_motion.animation import bake_poses
+from rigid_motion.motion import MODES, Poses, interpolate, measure, rms
+from rigid_motion.motion.quaternions import multiply, rotate
+from rigid_motion_batch.analysis.modes import label_of
+from rigid_motion_batch.palette import DARK, colour_of
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.scenes import captions, layout, trails
+from rigid_motion_batch.scenes.materials import surface
+from rigid_motion_batch.scenes.nodes import apply_group
+from rigid_motion_batch.scenes.subject import load_subject
+from rigid_motion_batch.streaming import Link, Playback, receive, send
+from rigid_motion_batch.streaming.smooth import joined
+
+from .picture import FAINT, INK, RULE, Sheet
+from .table import PHASES
+
+ENGINES = ("lerp_slerp", "dq_sclerp", "pga_lerp", "motor_spline")
+
+RATES = (5, 10, 15, 20)
+"""Updates a second."""
+
+LINK = Link(latency=0.05)
+
+SEED = 2021
+
+GRIP = np.array((0.0, -HAND, 0.0))
+"""Where the wrist is, in the axes of the tool that the hand holds."""
+
+_, RELEASE, CATCH, _ = THERE.moments
+
+WITHDRAWN = 0.45
+"""Seconds that the hands take from the throw to rest, and from rest to the catch."""
+
+READY = np.array((-0.08, -0.04, -0.04))
+"""From the catch to where the hand waits for it."""
+
+END = 2.55
+"""What comes after is another throw."""
+
+SHOWN = (0.32, 1.90)
+"""The moments that are shown, from the first to the last."""
+
+FPS, SLOWER = 30, 3.0
+"""Of the film."""
+
+YAW = np.radians(52.0)
+"""By which the scene is turned for the eye, so that neither the throw nor the tool is seen end on."""
+
+FILM_SIZE = (720, 1004)
+"""Pixels: as the picture, but smaller."""
+
+TRAIL_SECONDS = 0.7
+"""Of the motion."""
+
+MIDDLE = np.array((0.0, 0.40, 1.14))
+"""Of the throw."""
+
+TITLE = 0.5 - 0.044
+"""Where the first line stands on the sheet."""
+
+HANDS = {"thrower": "#3A6EA5", "catcher": "#7A5C99"}
+"""Who takes part, with the colours of their controllers."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What a mode makes of a rate. The fields are the columns of `catching.csv`."""
+
+    mode: str
+    updates: int
+
+    delay_s: float
+    """How far behind the sender it is shown."""
+
+    rms_shell_m: float
+    max_shell_m: float
+    """Of the tool, against what really happened."""
+
+    slip_m: float
+    """The most that the tool moves in the hand that holds it, between updates at all of which it is held."""
+
+    gap_m: float
+    """Between the tool and where the catching hand would hold it, when it is caught: as the figure shows it."""
+
+    mean_gap_m: float
+    """The same on average over senders that begin one after the other within an interval, as are the errors."""
+
+
+def bodies(clip: Clip) -> tuple[np.ndarray, dict[str, Poses]]:
+    """The times of the first throw of a clip, shape (n,), and the poses of the tool and of both hands, (n,) each."""
+    part = clip.times <= END
+    times, tool = clip.times[part], clip.poses[part]
+    held = Poses(
+        tool.positions + rotate(tool.quaternions, np.broadcast_to(GRIP, tool.positions.shape)), tool.quaternions
+    )
+    let_go, caught = _recorded(times)
+    throwing, catching = times <= let_go, times >= caught
+    withdrawn = times[throwing][-1] + WITHDRAWN
+    ready = Poses(held[catching].positions[:1] + READY, held[catching].quaternions[:1])
+    return times, {
+        "tool": tool,
+        "thrower": interpolate(
+            [*times[throwing], withdrawn, END], joined((held[throwing], held[[0, 0]])), times, "motor_spline"
+        ),
+        "catcher": interpolate(
+            [times[0] - 1.0, times[catching][0] - WITHDRAWN, *times[catching]],
+            joined((ready[[0, 0]], held[catching])),
+            times,
+            "motor_spline",
+        ),
+    }
+
+
+def receive_all(
+    times: np.ndarray, poses: Mapping[str, Poses], rate: float, mode: str, moments: np.ndarray
+) -> dict[str, Playback]:
+    """What is shown of every body at these moments of the motion, none of them before the first update."""
+    shown = {}
+    for body, of_body in poses.items():
+        packets = send(times, of_body, rate)
+        arrivals = LINK.carry(packets, np.random.default_rng(SEED))
+        delay = LINK.latency + (1.0 + MODES[mode].ahead) * packets.interval
+        shown[body] = receive(packets, arrivals, moments + delay, mode)
+    return shown
+
+
+def view(times: np.ndarray, poses: Mapping[str, Poses], rate: int, mode: str) -> View:
+    """The figure in numbers, for one mode at one rate."""
+    found = []
+    for phase in range(PHASES):
+        late = times >= times[0] + phase / (PHASES * rate)
+        found.append(_looked_at(times[late], {body: of_body[late] for body, of_body in poses.items()}, rate, mode))
+    errors, slips, gaps, delays = zip(*found, strict=True)
+    return View(
+        mode=mode,
+        updates=rate,
+        delay_s=delays[0],
+        rms_shell_m=rms(np.concatenate(errors)),
+        max_shell_m=float(np.concatenate(errors).max()),
+        slip_m=float(np.concatenate(slips).max(initial=0.0)),
+        gap_m=gaps[0],
+        mean_gap_m=float(np.mean(gaps)),
+    )
+
+
+def _looked_at(
+    times: np.ndarray, poses: Mapping[str, Poses], rate: int, mode: str
+) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """For a sender that begins with the first of these times: shell errors, slips while held, gap and delay."""
+    let_go, caught = _recorded(times)
+    moments = times[(times >= SHOWN[0]) & (times <= SHOWN[1])]
+    shown = receive_all(times, poses, rate, mode, moments)
+    truth = interpolate(times, poses["tool"], moments, "dq_sclerp")
+    ticks = times[0] + np.arange(int((times[-1] - times[0]) * rate) + 1) / rate
+    segment = np.searchsorted(ticks, moments, side="right") - 1
+    first = ticks[np.maximum(segment - MODES[mode].behind, 0)]
+    last = ticks[np.minimum(segment + 1 + MODES[mode].ahead, len(ticks) - 1)]
+    slips = [
+        _apart(shown["tool"].poses, shown[hand].poses)[held]
+        for hand, held in (("thrower", last <= let_go), ("catcher", first >= caught))
+    ]
+    then = receive_all(times, poses, rate, mode, np.array((caught,)))
+    gap = float(_apart(then["tool"].poses, then["catcher"].poses)[0])
+    errors = measure(moments, shown["tool"].poses, truth).shell
+    return errors, np.concatenate(slips), gap, shown["tool"].delay
+
+
+def views(clip: Clip) -> list[View]:
+    """All modes at all rates."""
+    times, poses = bodies(clip)
+    return [view(times, poses, rate, mode) for mode in ENGINES for rate in RATES]
+
+
+def frame_moments(caught: float) -> np.ndarray:
+    """The moments that the frames of the film show, that of the catch among them."""
+    rate = FPS * SLOWER
+    before, after = (np.floor(abs(end - caught) * rate) for end in SHOWN)
+    return caught + np.arange(-before, after + 1.0) / rate
+
+
+def _recorded(times: np.ndarray) -> tuple[float, float]:
+    """The last sample before the tool is let go, and the first after it is caught."""
+    return float(times[times <= RELEASE][-1]), float(times[times >= CATCH][0])
+
+
+def build(clip: Clip, found: Sequence[View], *, film: bool) -> bpy.types.Scene:
+    """The scene of the film, or of the picture at the catch, with the gaps that were found."""
+    times, poses = bodies(clip)
+    moments = frame_moments(_recorded(times)[1])
+    sheet = Sheet(1400, 5.6, frames=len(moments) if film else 1)
+    sheet.scene.render.fps = FPS
+    if film:
+        sheet.scene.render.resolution_x, sheet.scene.render.resolution_y = FILM_SIZE
+    gaps = {(one.mode, one.updates): one.gap_m for one in found}
+    cast = _Cast(sheet, interpolate(times, poses["tool"], moments, "dq_sclerp"))
+    columns, pitch = (np.arange(len(RATES)) - 1.5) * 0.243 * sheet.aspect, 0.2135
+    sheet.words("Catching a tool", sheet.left, TITLE, 9.0)
+    for rate, x in zip(RATES, columns, strict=True):
+        sheet.words(f"{rate} updates/s", x, TITLE - 0.036, 7.0, INK, "CENTER")
+    for row, mode in enumerate(ENGINES):
+        top = TITLE - 0.050 - row * pitch
+        sheet.card(0.0, top, 2.0 * -sheet.left, 0.0014, RULE)
+        sheet.words(label_of(mode), sheet.left, top - 0.025, 6.5)
+        for rate, x in zip(RATES, columns, strict=True):
+            cast.perform(mode, rate, receive_all(times, poses, rate, mode, moments), sheet.place(x, top - 0.118))
+            sheet.words(f"{1e3 * gaps[mode, rate]:.0f} mm", x + 0.06, top - 0.055, 6.5, INK, "CENTER")
+    _write_legend(sheet, moments)
+    sheet.scene.frame_set(1 + int(np.argmax(moments >= CATCH)))
+    return sheet.scene
+
+
+class _Cast:
+    """Whoever moves: one tool, its ghost and two hands to a panel, with the paths of the tool."""
+
+    def __init__(self, sheet: Sheet, truth: Poses) -> None:
+        self.sheet, self.truth = sheet, truth
+        self.tool, self.controller = load_subject("drill"), load_subject("controller")
+        self.ghost = surface("What happened", DARK.ghost, alpha=0.45)
+        self.hands = {hand: surface(hand, colour) for hand, colour in HANDS.items()}
+        self.tools = {mode: surface(f"Mode {mode}", colour_of(mode)) for mode in ENGINES}
+        self.trail = trails.trail_group()
+        self.turn = layout.yaw_quaternion(YAW)
+        self.frames = np.arange(1.0, len(truth) + 1.0)
+
+    def perform(self, mode: str, rate: int, shown: Mapping[str, Playback], place: np.ndarray) -> None:
+        """One panel, its middle at a place."""
+        name = f"{mode} {rate}"
+        self._move(name, self.tool, shown["tool"].poses, place, self.tools[mode], whole=False)
+        self._move(f"{name} truth", self.tool, self.truth, place, self.ghost, whole=True)
+        for hand, paint in self.hands.items():
+            self._move(f"{name} {hand}", self.controller, shown[hand].poses, place, paint, whole=False)
+        self._trace(f"{name} path", shown["tool"].poses, place, 0.010, colour_of(mode))
+        self._trace(f"{name} true path", self.truth, place, 0.004, FAINT)
+
+    def _move(
+        self,
+        name: str,
+        mesh: bpy.types.Mesh,
+        poses: Poses,
+        place: np.ndarray,
+        paint: bpy.types.Material,
+        *,
+        whole: bool,
+    ) -> None:
+        seen = self._seen(poses, place)
+        obj = self.sheet.solid(name, mesh, np.zeros(3), seen[0], paint, whole=whole)
+        obj.rotation_mode = "QUATERNION"
+        bake_poses(obj, self.frames, seen)
+
+    def _trace(self, name: str, poses: Poses, place: np.ndarray, radius: float, colour: str) -> None:
+        line = trails.polyline(name, self.frames, self._seen(poses, place).positions)
+        obj = bpy.data.objects.new(name, line)
+        self.sheet.objects.objects.link(obj)
+        window = TRAIL_SECONDS * FPS * SLOWER
+        apply_group(obj, self.trail, Past=window, Ahead=0.0, Radius=radius, Taper=0.6, Material=self.sheet.ink(colour))
+
+    def _seen(self, poses: Poses, place: np.ndarray) -> Poses:
+        """Turned for the eye, around the middle of the throw."""
+        turn = np.broadcast_to(self.turn, poses.quaternions.shape)
+        return Poses(rotate(turn, poses.positions - MIDDLE) + place, multiply(turn, poses.quaternions))
+
+
+def _write_legend(sheet: Sheet, moments: np.ndarray) -> None:
+    """What is what, and the time."""
+    low = -0.5 + 0.042
+    entries = [*((colour, f"{hand}'s hand") for hand, colour in HANDS.items()), (DARK.ghost, "what happened")]
+    sheet.key(entries, sheet.left, low, 6.5)
+    sheet.words(
+        "coloured: the tool as shown, and its path; mm: from tool to hand at the catch",
+        sheet.left,
+        low - 0.028,
+        6.5,
+        FAINT,
+    )
+    right, unit = -sheet.left, "s"
+    sheet.words(unit, right, TITLE, 9.0, FAINT, "RIGHT")
+    frames = np.arange(1.0, len(moments) + 1.0)
+    readout = captions.readout_group("Time in s", 2, sheet.ink(INK))
+    time = captions.readout("Time", readout, sheet.size(9.0), frames[[0, -1]], moments[[0, -1]])
+    sheet.put(time, right - sheet.size(9.0) * (captions.width_of(unit) + 0.3), TITLE)
+
+
+def _apart(tool: Poses, hand: Poses) -> np.ndarray:
+    """Between the tool's origin and where the hand holds it, shape (n,)."""
+    holds = hand.positions - rotate(hand.quaternions, np.broadcast_to(GRIP, hand.positions.shape))
+    return np.linalg.norm(holds - tool.positions, axis=-1)

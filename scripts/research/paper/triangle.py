@@ -1,0 +1,110 @@
+"""The figure "LERP and SLERP of multivectors": a triangle between two extreme poses, filled in both ways.
+
+LERP of motors is `pga_lerp`, SLERP `pga_slerp`. Twenty in-betweens stand at even steps, and how far the one
+way leaves the other is counted. Metres; the triangle is about as large as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from rigid_motion.motion import MODES, Poses, interpolate, measure
+from rigid_motion.motion.quaternions import angle_between, normalise, rotate
+from rigid_motion_batch.scenes.materials import surface
+
+from . import claims
+from .picture import FAINT, INK, Sheet
+
+IN_BETWEENS = 20
+
+ENGINES = {"lerp": "pga_lerp", "slerp": "pga_slerp"}
+"""What the paper calls them, and the modes that they are here."""
+
+TRIANGLE = np.array(((-0.30, 0.0, -0.36), (0.40, 0.0, -0.26), (-0.08, 0.0, 0.46)))
+"""The corners in the body's own axes, shape (3, 3)."""
+
+TURN, AXIS = np.radians(150.0), np.array((-0.45, 0.85, 0.20))
+"""Of the second pose: an extreme turn."""
+
+EXTREMES = Poses(
+    [(-1.85, 0.0, -0.60), (1.65, 0.0, -0.30)],
+    normalise(np.array([(1.0, 0.0, 0.0, 0.0), (np.cos(TURN / 2), *np.sin(TURN / 2) * AXIS / np.linalg.norm(AXIS))])),
+)
+
+
+@dataclass(frozen=True)
+class Step:
+    """An in-between of both kinds. The fields are the columns of `triangle.csv`."""
+
+    at: float
+    """Share of the way."""
+
+    lerp_turned_deg: float
+    slerp_turned_deg: float
+
+    apart_m: float
+    """How far the origins are from one another."""
+
+    apart_deg: float
+    """And the rotations."""
+
+
+def in_betweens() -> tuple[np.ndarray, dict[str, Poses]]:
+    """The shares of the way, without the ends, and the poses there of either kind."""
+    shares = np.arange(1, IN_BETWEENS + 1) / (IN_BETWEENS + 1.0)
+    return shares, {name: interpolate([0.0, 1.0], EXTREMES, shares, mode) for name, mode in ENGINES.items()}
+
+
+def steps() -> list[Step]:
+    """The figure in numbers."""
+    shares, poses = in_betweens()
+    turned = {
+        name: np.degrees(angle_between(np.broadcast_to(EXTREMES.quaternions[0], p.quaternions.shape), p.quaternions))
+        for name, p in poses.items()
+    }
+    apart = measure(shares, poses["lerp"], poses["slerp"])
+    columns = shares, turned["lerp"], turned["slerp"], apart.position, np.degrees(apart.rotation)
+    return [Step(*map(float, row)) for row in zip(*columns, strict=True)]
+
+
+def build() -> bpy.types.Scene:
+    """The figure as a scene."""
+    sheet = Sheet(620, 3.1)
+    _, poses = in_betweens()
+    fine = np.linspace(0.0, 1.0, 200)
+    for name, mode in ENGINES.items():
+        colour = claims.COLOURS[name]
+        corners = _corners(poses[name])
+        sheet.faces(f"{name} faces", corners, surface(name, colour, alpha=0.14))
+        sheet.lines(f"{name} edges", corners, 0.013, colour, closed=True)
+        paths = _corners(interpolate([0.0, 1.0], EXTREMES, fine, mode)).transpose(1, 0, 2)
+        sheet.lines(f"{name} paths", paths, 0.006, colour)
+    ends = _corners(EXTREMES)
+    sheet.faces("Extremes", ends, surface("Extremes", "#7C8794", alpha=0.75))
+    sheet.lines("Extreme edges", ends, 0.018, INK, closed=True)
+    low = -0.5 + 0.05
+    sheet.words("LERP and SLERP of multivectors", sheet.left, 0.5 - 0.095, 9.0)
+    sheet.key(
+        [
+            (claims.COLOURS["lerp"], f"LERP: {MODES[ENGINES['lerp']].label}"),
+            (claims.COLOURS["slerp"], f"SLERP: {MODES[ENGINES['slerp']].label}"),
+        ],
+        sheet.left,
+        low + 0.07,
+    )
+    sheet.words(
+        f"{IN_BETWEENS} in-betweens at even steps, {np.degrees(TURN):.0f}° from the first to the last",
+        sheet.left,
+        low,
+        7.0,
+        FAINT,
+    )
+    return sheet.scene
+
+
+def _corners(poses: Poses) -> np.ndarray:
+    """Where the triangle's corners are, shape (n, 3, 3)."""
+    return poses.positions[:, None] + rotate(poses.quaternions[:, None], TRIANGLE[None])

@@ -1,0 +1,183 @@
+"""How far live in-betweens are off between whole frames: in delta transforms, and set to be exact there.
+
+    python scripts/research subframes
+    python scripts/research subframes --radius 1
+    python scripts/research subframes --output docs/subframes.md
+
+On whole frames in-betweens are exact, but motion blur and slow motion look between frames. Objects go from key to key
+about axes and in directions drawn at random. All segments have the same angle and distance, and the easing that Blender
+gives new keys. At sub-frames, the pose that Blender shows is compared with the pose that the mode has there. Lengths
+are the largest displacement in the world of any point within a distance (`--radius`) of the origin; degrees are the
+angle between the two poses. *Live* and *baked every frame* are measured at quarter frames, *baked every 0.25* half-way
+between its keys, where it is worst. *Exact* is live with *Exact Between Frames*, as bones always are, at every 32nd
+part of a frame. Numbers are the largest of all, or the RMS where a column says so.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from research.publishing import opening, publish
+from research.summaries import of_sub_frames
+from rigid_motion import animation
+from rigid_motion.animation.compute.differences import in_betweens
+from rigid_motion.animation.queries.keyed import source_of
+from rigid_motion.motion import KEYFRAME_MODES, Poses, shell_error
+from rigid_motion.motion.eulers import extrinsic_eulers_from_quaternions
+from rigid_motion.motion.measures import rms
+from rigid_motion.motion.quaternions import align_signs, angle_between, multiply
+from rigid_motion_batch.command_line import parser_of
+
+SEGMENTS = 24
+
+ROTATION_MODES = ("QUATERNION", "XYZ")
+
+QUARTERS = np.array((0.25, 0.5, 0.75))
+"""Where motion blur with a few steps looks."""
+
+THIRTY_SECONDS = np.arange(1, 32) / 32.0
+"""Between samples wherever these lie."""
+
+EIGHTHS = np.array((0.125, 0.375, 0.625, 0.875))
+"""Half-way between keys that are baked on every quarter of a frame."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What happens between two keys: an angle in degrees, a distance in metres, a duration in frames."""
+
+    name: str
+    turn: float
+    distance: float
+    frames: int
+
+    @property
+    def key_frames(self) -> np.ndarray:
+        return 1.0 + self.frames * np.arange(SEGMENTS + 1)
+
+    def describe(self) -> str:
+        return (
+            f"{self.name}: {self.turn:g} degrees and {self.distance:g} m in {self.frames} frames, "
+            f"{self.turn / self.frames:.2g} degrees and {100 * self.distance / self.frames:.2g} cm a frame"
+        )
+
+
+MOTIONS = (
+    Motion("Slow", 30.0, 0.5, 48),
+    Motion("Brisk", 90.0, 1.0, 24),
+    Motion("Violent", 150.0, 2.0, 13),
+)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a motion is off: shell errors in metres, the rotation in radians."""
+
+    largest: float
+    rms: float
+    rotation: float
+
+
+def key_poses(motion: Motion) -> Poses:
+    """Poses a turn and a step apart, in directions drawn at random."""
+    random = np.random.default_rng(11)
+    axes, steps = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in random.normal(size=(2, SEGMENTS, 3)))
+    half = 0.5 * np.radians(motion.turn)
+    quaternions = [np.array((0.5, 0.5, -0.5, 0.5))]
+    for axis in axes:
+        quaternions.append(multiply(np.concatenate(((np.cos(half),), np.sin(half) * axis)), quaternions[-1]))
+    positions = np.concatenate((np.zeros((1, 3)), np.cumsum(motion.distance * steps, axis=0)))
+    return Poses(positions, align_signs(np.array(quaternions)))
+
+
+def keyed_object(motion: Motion, rotation_mode: str) -> bpy.types.Object:
+    """An empty in the scene with these keys, eased as Blender eases them."""
+    obj = bpy.data.objects.new(motion.name, None)
+    obj.rotation_mode = rotation_mode
+    bpy.context.collection.objects.link(obj)
+    poses, frames = key_poses(motion), motion.key_frames
+    animation.write_channel(obj, "location", frames, poses.positions, interpolation="BEZIER")
+    if rotation_mode == "QUATERNION":
+        animation.write_channel(obj, "rotation_quaternion", frames, poses.quaternions, interpolation="BEZIER")
+    else:
+        angles = extrinsic_eulers_from_quaternions(poses.quaternions, rotation_mode)
+        animation.write_channel(obj, "rotation_euler", frames, angles, interpolation="BEZIER")
+    return obj
+
+
+def between(motion: Motion, fractions: np.ndarray) -> np.ndarray:
+    """The sub-frames from the first key to the last."""
+    first, last = motion.key_frames[[0, -1]]
+    return (np.arange(first, last)[:, None] + fractions).ravel()
+
+
+def deviation(obj: bpy.types.Object, frames: np.ndarray, wanted: Poses, radius: float) -> Deviation:
+    """How far Blender shows an object from where it should be."""
+    shown = animation.read_poses(obj, frames)
+    shell = shell_error(shown, wanted, radius)
+    return Deviation(float(shell.max()), rms(shell), float(angle_between(shown.quaternions, wanted.quaternions).max()))
+
+
+def measure(motion: Motion, mode: str, rotation_mode: str, radius: float) -> list[Deviation]:
+    """Of live in-betweens, of exact ones, of those baked on every quarter of a frame, and on every whole frame."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    obj = keyed_object(motion, rotation_mode)
+    animation.set_mode(obj, mode)
+    source = source_of(obj)
+    quarters, eighths = (between(motion, fractions) for fractions in (QUARTERS, EIGHTHS))
+    at_quarters, at_eighths = (in_betweens(source, frames).wanted for frames in (quarters, eighths))
+    live = deviation(obj, quarters, at_quarters, radius)
+    animation.set_exact(obj)
+    finest = between(motion, THIRTY_SECONDS)
+    exact = deviation(obj, finest, in_betweens(source, finest).wanted, radius)
+    animation.set_exact(obj, False)
+    animation.bake(obj, step=0.25)
+    finely = deviation(obj, eighths, at_eighths, radius)
+    animation.unbake(obj)
+    animation.bake(obj)
+    return [live, exact, finely, deviation(obj, quarters, at_quarters, radius)]
+
+
+def table(motion: Motion, radius: float) -> Iterator[str]:
+    """The measurements of one motion as lines of Markdown."""
+    yield f"## {motion.describe()}"
+    yield ""
+    yield (
+        "| mode | turned by | live, mm | RMS, mm | degrees | baked every 0.25, mm | degrees | baked every frame, mm "
+        "| exact, mm |"
+    )
+    yield "|---|---|---:|---:|---:|---:|---:|---:|---:|"
+    for mode in KEYFRAME_MODES:
+        for rotation_mode in ROTATION_MODES:
+            live, exact, finely, whole = measure(motion, mode, rotation_mode, radius)
+            yield (
+                f"| `{mode}` | {rotation_mode} | {1e3 * live.largest:.3g} | {1e3 * live.rms:.2g} "
+                f"| {np.degrees(live.rotation):.2g} | {1e3 * finely.largest:.2g} | {np.degrees(finely.rotation):.2g} "
+                f"| {1e3 * whole.largest:.2g} | {1e3 * exact.largest:.2g} |"
+            )
+    yield ""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print, and write where asked."""
+    parser = parser_of("subframes.py", __doc__)
+    parser.add_argument("--radius", type=float, default=0.1, help="of the shell, in metres (%(default)s)")
+    parser.add_argument("--output", type=Path, help="a Markdown file to write the tables to")
+    options = parser.parse_args(arguments)
+    command = f"python scripts/research subframes --radius {options.radius:g}"
+    lines = opening("Between whole frames", command, __doc__, Blender=bpy.app.version_string)
+    animation.register()
+    try:
+        for motion in MOTIONS:
+            print(f"{motion.name} ...", file=sys.stderr, flush=True)
+            lines += table(motion, options.radius)
+    finally:
+        animation.unregister()
+    publish(lines, options.output, of_sub_frames)
+    return 0

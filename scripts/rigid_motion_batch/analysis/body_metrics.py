@@ -1,0 +1,238 @@
+"""What a comparison found of a whole body, in numbers: over all joints, and joint by joint.
+
+Errors are in metres, in the root's space. `metrics.csv` has the body, `metrics_joints.csv` its joints. What is as long
+as the recording is there for one mode at a time, and then only what is shown of it.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.measures import rms
+from rigid_motion_batch.files import replacing
+from rigid_motion_batch.rows import line_of, write_rows
+
+from .bodies import BodyErrors, BodyReconstruction, Ground, JointKeys, identical_body_modes, measure_body, moving
+from .metrics import BYTES_PER_KEY, Metrics, lines_of_poses
+from .reconstructions import Groups
+
+COLUMNS = 240
+"""Stretches of time that a picture of all joints is divided into."""
+
+Radii = float | np.ndarray
+"""Of the balls at the joints, in metres: one for all, or shape (joints,)."""
+
+
+@dataclass(frozen=True)
+class JointMetrics:
+    """One joint of a clip with one choice of keys under one mode: the columns of `metrics_joints.csv`."""
+
+    clip: str
+    joint: str
+    mode: str
+
+    rate_hz: str
+    """As the user wrote it; empty where a tolerance decides."""
+
+    keys: int
+    """1 of a joint that stays as it is in its parent's space."""
+
+    samples: int
+    rms_shell_m: float
+    p95_shell_m: float
+    max_shell_m: float
+
+    worst_s: float
+    """When that is, in seconds from the first key on."""
+
+    rms_position_m: float
+    rms_rotation_deg: float
+    rms_velocity_m_s: float
+    decimation: str
+    tolerance_m: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class ModeOfBody:
+    """What is shown of one mode. Errors in metres."""
+
+    over_time: np.ndarray
+    """The largest error of any joint at each sample, shape (n,)."""
+
+    by_joint: np.ndarray
+    """The largest error of each joint in each stretch of time, shape (joints, at most COLUMNS)."""
+
+    worst: tuple[int, int, float]
+    """The joint, the sample from the first key on, and the error."""
+
+    shown: Poses
+    """Where the joints are then, shape (joints,), in metres."""
+
+    truth: Poses
+    """Where they were in the recording."""
+
+    errors: np.ndarray
+    """Their errors then, shape (joints,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredBody:
+    """A whole body under one choice of keys, measured."""
+
+    made: BodyReconstruction
+
+    rows: tuple[Metrics, ...]
+    """One for each mode."""
+
+    joints: tuple[JointMetrics, ...]
+    """One for each mode and joint."""
+
+    groups: Groups
+    """The modes, those together that are one motion."""
+
+    modes: Mapping[str, ModeOfBody]
+
+
+def measure_modes(made: BodyReconstruction, radius: Radii) -> MeasuredBody:
+    """All modes of a reconstruction; of those that are one motion the first is shown."""
+    ground, groups = Ground.of(made), identical_body_modes(made)
+    rows: dict[str, Metrics] = {}
+    joints: dict[str, tuple[JointMetrics, ...]] = {}
+    shown: dict[str, ModeOfBody] = {}
+    for mode in made.keys:
+        errors = measure_body(made, mode, radius, ground)
+        rows[mode] = row_of_body(made, mode, errors, ground)
+        joints[mode] = tuple(joint_rows(made, mode, errors))
+        if mode in (group[0] for group in groups):
+            shown[mode] = _shown_of(made, mode, errors)
+    every = tuple(row for mode in made.keys for row in joints[mode])
+    return MeasuredBody(made, tuple(rows.values()), every, groups, shown)
+
+
+def row_of_body(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
+    """Return the row of a mode in `metrics.csv`."""
+    clip, choice, times = made.clip, made.choice, made.times
+    duration = float(times[-1] - times[0])
+    keys = made.keys[mode]
+    # A joint that stays as it is has its key once, and sends nothing.
+    sent = sum(len(own) - 1 for own in keys)
+    moving_joints = sum(len(own) > 1 for own in keys)
+    joint, _ = errors.worst
+    return Metrics(
+        clip=clip.name,
+        mode=mode,
+        rate_hz=choice.rate,
+        keys=sum(map(len, keys)),
+        samples=len(times),
+        duration_s=duration,
+        bytes_per_s=sent / duration * BYTES_PER_KEY,
+        rms_shell_m=rms(errors.shell),
+        p95_shell_m=float(np.percentile(errors.shell, 95.0)),
+        max_shell_m=float(errors.shell.max()),
+        rms_position_m=rms(errors.position),
+        rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
+        rms_velocity_m_s=rms(errors.velocity),
+        decimation=choice.decimation,
+        tolerance_m=choice.tolerance(clip),
+        keys_per_s=sent / max(moving_joints, 1) / duration,
+        joints=len(keys),
+        key_frames=len(key_samples(keys)),
+        worst_joint=clip.figure.joints[joint],
+        foot_slide_m=errors.slide if len(ground.joints) else None,
+        recorded_slide_m=ground.slide if len(ground.joints) else None,
+    )
+
+
+def joint_rows(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
+    """Return the rows of a mode in `metrics_joints.csv`."""
+    clip, choice, times = made.clip, made.choice, made.times
+    worst = errors.shell.argmax(axis=1)
+    root_mean_squares = np.sqrt(np.mean(np.square(errors.shell), axis=1))
+    for joint, name in enumerate(clip.figure.joints):
+        yield JointMetrics(
+            clip=clip.name,
+            joint=name,
+            mode=mode,
+            rate_hz=choice.rate,
+            keys=len(made.keys[mode][joint]),
+            samples=len(times),
+            rms_shell_m=float(root_mean_squares[joint]),
+            p95_shell_m=float(np.percentile(errors.shell[joint], 95.0)),
+            max_shell_m=float(errors.shell[joint, worst[joint]]),
+            worst_s=float(times[worst[joint]] - times[0]),
+            rms_position_m=float(errors.position[joint]),
+            rms_rotation_deg=float(np.degrees(errors.rotation[joint])),
+            rms_velocity_m_s=float(errors.velocity[joint]),
+            decimation=choice.decimation,
+            tolerance_m=choice.tolerance(clip),
+        )
+
+
+def _shown_of(made: BodyReconstruction, mode: str, errors: BodyErrors) -> ModeOfBody:
+    joint, sample = errors.worst
+    count = errors.shell.shape[1]
+    begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
+    at = made.samples.start + sample
+    return ModeOfBody(
+        over_time=errors.shell.max(axis=0),
+        by_joint=np.maximum.reduceat(errors.shell, begins, axis=1),
+        worst=(joint, sample, float(errors.shell[joint, sample])),
+        shown=made.shown(mode, made.clip.times[at : at + 1])[:, 0],
+        truth=made.truth(slice(at, at + 1))[:, 0],
+        errors=errors.shell[:, sample].copy(),
+    )
+
+
+def key_samples(keys: JointKeys) -> np.ndarray:
+    """The samples that are a key of any joint that moves."""
+    moving_ones = [own for own in keys if len(own) > 1]
+    return np.unique(np.concatenate(moving_ones)) if moving_ones else keys[0]
+
+
+def numbers_of(made: BodyReconstruction, mode: str) -> int:
+    """How many numbers the keys take: for each its time, and the place and the turn where these vary."""
+    clip = made.clip
+    places = np.ptp(clip.poses.positions, axis=1).max(axis=1) * clip.metres_per_unit > 1e-4
+    channels = 4 + 3 * places
+    counts = np.array([len(own) for own in made.keys[mode]])
+    if made.shared:
+        return int(len(key_samples(made.keys[mode])) + (counts * channels)[moving(clip)].sum())
+    return int((counts * (1 + channels))[moving(clip)].sum())
+
+
+def write_joint_metrics(path: Path, rows: Iterable[JointMetrics]) -> None:
+    """Write a header and a row for every mode and joint."""
+    write_rows(path, JointMetrics, rows)
+
+
+def join_tables(path: Path, parts: Iterable[Path]) -> None:
+    """Write the rows of tables that have the same header, at least one, under a single one."""
+    with replacing(path) as stream:
+        for number, part in enumerate(parts):
+            with part.open(encoding="utf-8", newline="") as source:
+                header = source.readline()
+                if number == 0:
+                    stream.write(header)
+                shutil.copyfileobj(source, stream)
+
+
+def write_key_tables(folder: Path, made: BodyReconstruction) -> None:
+    """Write the keys: of evenly spaced ones those of all modes, of others a `MODE.keys.csv` for each.
+
+    A row is a joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
+    """
+    uniform = made.choice.decimation == "uniform"
+    for mode, keys in list(made.keys.items())[: 1 if uniform else None]:
+        with replacing(folder / ("keys.csv" if uniform else f"{mode}.keys.csv")) as stream:
+            stream.write("joint,t,x,y,z,qw,qx,qy,qz\n")
+            for joint, own in enumerate(keys):
+                name = line_of([made.clip.figure.joints[joint]])[:-1]
+                poses = made.clip.poses[joint][own]
+                for _, lines in lines_of_poses([made.clip.times[own], *poses.positions.T, *poses.quaternions.T]):
+                    stream.writelines(f"{name},{line}\n" for line in lines)

@@ -1,0 +1,80 @@
+"""Key poses needed: how few of them a mode can do with on a whole body to be as good as the reference is with many.
+
+As in `needed`, with the RMS over all samples and joints in the root's space. Those that the motion chooses are the best
+of so many that `reduce_skeleton_keys` finds, which keep the largest error small; how many is searched for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigid_motion.motion import reduce_skeleton_keys
+from rigid_motion_batch.recordings.clips import Clip
+
+from .bodies import BodyReconstruction, rms_of_body, same_body_motions
+from .choices import Uniform
+from .needed import DECIMATIONS, part_of
+from .reconstructions import Groups
+
+NEAR = 0.02
+"""The search ends where one knows the number of key poses to so much of it: every step reduces keys anew."""
+
+
+@dataclass(frozen=True)
+class OfBody:
+    """Key poses of a whole body: the same samples for all joints."""
+
+    clip: Clip
+    """With a figure."""
+
+    radii: np.ndarray
+    """Of the balls at the joints, in metres, shape (joints,)."""
+
+    decimations = DECIMATIONS[:2]
+
+    def groups(self, modes: tuple[str, ...]) -> Groups:
+        return same_body_motions(self.clip, modes)
+
+    def between(self, first: int, last: int) -> OfBody:
+        return replace(self, clip=part_of(self.clip, first, last))
+
+    def error(self, keys: np.ndarray, mode: str) -> float:
+        made = BodyReconstruction(self.clip, Uniform("1"), {mode: (keys,) * len(self.radii)}, shared=True)
+        return rms_of_body(made, mode, self.radii)
+
+    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
+        """Key poses: as many as evenly spaced ones at most, if those of the motion are any better."""
+        samples = len(self.clip.times)
+        too_few, enough = 1, min(evenly, samples)
+        keys, error = self._best_of(enough, mode)
+        while error > target and enough < samples:
+            too_few, enough = enough, min(2 * enough, samples)
+            keys, error = self._best_of(enough, mode)
+        while enough - too_few > max(1, NEAR * enough):
+            middle = (enough + too_few) // 2
+            tried, found = self._best_of(middle, mode)
+            if found <= target:
+                enough, keys, error = middle, tried, found
+            else:
+                too_few = middle
+        return [(keys, error)]
+
+    def _best_of(self, budget: int, mode: str) -> tuple[np.ndarray, float]:
+        """So many key poses at most, and their error."""
+        if budget >= len(self.clip.times):
+            keys = np.arange(len(self.clip.times))
+        else:
+            radii = self.radii / self.clip.metres_per_unit
+            found = reduce_skeleton_keys(
+                self.clip.times,
+                self.clip.poses,
+                self.clip.figure.parents,
+                mode,
+                radius=radii,
+                budget=max(budget, 2),
+                shared=True,
+            )
+            keys = max(found, key=len)
+        return keys, self.error(keys, mode)

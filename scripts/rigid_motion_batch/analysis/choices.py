@@ -1,0 +1,283 @@
+"""Choices of keys: which samples of a clip a mode may keep, evenly in time or wherever the motion needs them.
+
+A clip under a choice is a `Reconstruction`, whatever the choice: that names the folder, and says itself in captions,
+in the report and in `metrics.csv`. Amounts stay as the user wrote them. Tolerances are lengths with a unit, or in the
+unit of the recording.
+"""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from rigid_motion.motion import decimate, reduce_keys, reduce_skeleton_keys
+from rigid_motion_batch.recordings.clips import Clip
+
+MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
+"""Units of a tolerance, and how many millimetres they have."""
+
+Radius = float | np.ndarray
+"""Of the ball at every joint, in metres: one for all, or shape (joints,)."""
+
+METRES = {unit: length * 1e-3 for unit, length in MILLIMETRES.items()}
+"""Units of a tolerance, and their lengths."""
+
+NUMBER = r"\d{1,6}(?:\.\d{1,6})?"
+"""What amounts are made of: names of folders as well."""
+
+
+@dataclass(frozen=True)
+class Choice(ABC):
+    """A way to choose keys, and how much of it is wanted."""
+
+    written: str
+    """The amount as the user wrote it: "7.5", "5mm"."""
+
+    decimation: ClassVar[str]
+    """What metrics.csv calls it: "uniform" or "adaptive"."""
+
+    at: ClassVar[str] = "at"
+    """The word that leads to the amount in a sentence."""
+
+    unit: ClassVar[str] = "keys/s"
+    """What follows the amounts, if anything."""
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(NUMBER, self.written, re.ASCII) or float(self.written) <= 0.0:
+            raise ValueError(f"{self.written!r} is no rate; give numbers such as 5,7.5,10")
+
+    @abstractmethod
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        """The samples of the clip that are kept under a mode, rising, shape (k,).
+
+        The radius of the shell is in metres. Fewer than two keys where the clip is too short.
+        """
+
+    @abstractmethod
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        """The samples that are kept of each joint of a clip with a figure, the same for all where they are `shared`.
+
+        The radius is that of the balls at the joints in metres, one or shape (joints,).
+        """
+
+    @property
+    def name(self) -> str:
+        """Unique among the choices of a run, and safe as the name of a folder."""
+        return self.written
+
+    @property
+    def amount(self) -> str:
+        """What was written, as prose has it."""
+        return self.written
+
+    @property
+    def title(self) -> str:
+        """The amount with its unit, as a heading."""
+        return f"{self.amount} {self.unit}"
+
+    @property
+    def phrase(self) -> str:
+        """The same in a sentence: "at 10 keys/s"."""
+        return f"{self.at} {self.title}"
+
+    @property
+    def rate(self) -> str:
+        """The keys a second that were asked for, as written; empty where none were."""
+        return self.written
+
+    @abstractmethod
+    def ends(self, times: np.ndarray) -> tuple[int, int] | None:
+        """The samples of the first and the last key, which all modes keep, among a clip's times, shape (n,).
+
+        None where the clip is too short for two keys.
+        """
+
+    def tolerance(self, clip: Clip) -> float | None:
+        """The largest shell error that is allowed, in metres; None where nothing is said of it."""
+        return None
+
+    @property
+    def size(self) -> float:
+        """What choices of one kind are sorted by."""
+        return float(self.written)
+
+    @property
+    def wanted(self) -> tuple[Fraction, str]:
+        """The amount exactly, and what it is counted in: the same for "5" and "5.0", for "5mm" and "0.5cm"."""
+        return Fraction(self.written), self.unit
+
+
+class Uniform(Choice):
+    """So many keys a second, evenly in time: the same for all modes."""
+
+    decimation = "uniform"
+
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        return decimate(clip.times, float(self.written))
+
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        return (decimate(clip.times, float(self.written)),) * clip.poses.shape[0]
+
+    def ends(self, times: np.ndarray) -> tuple[int, int] | None:
+        keys = decimate(times, float(self.written))
+        return (int(keys[0]), int(keys[-1])) if len(keys) > 1 else None
+
+
+class Budget(Choice):
+    """So many keys a second on average, where they make the RMS shell error of a mode smallest."""
+
+    decimation = "adaptive"
+    unit = "keys/s on average"
+
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        count = self._count(clip.times)
+        if count < 2:
+            return np.array([0])
+        return _reduced(clip, mode, radius, budget=min(count, len(clip.times)), rms=True)
+
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        poses = min(self._count(clip.times), len(clip.times))
+        return _reduced_body(clip, mode, radius, shared, budget=poses * (1 if shared else clip.poses.shape[0]))
+
+    def ends(self, times: np.ndarray) -> tuple[int, int] | None:
+        return (0, len(times) - 1) if self._count(times) > 1 else None
+
+    def _count(self, times: np.ndarray) -> int:
+        """As many keys as a sender at that rate has ticks: the allowance is for rounding, as in 2.0 * 0.5."""
+        return int(float(times[-1] - times[0]) * float(self.written) + 1e-9) + 1
+
+    @property
+    def name(self) -> str:
+        return f"budget-{self.written}"
+
+
+class Tolerance(Choice):
+    """The fewest keys with which the shell error of a mode stays within a length at every sample."""
+
+    decimation = "adaptive"
+    at = "within"
+    unit = ""
+
+    def __post_init__(self) -> None:
+        self._parts()
+
+    def keys(self, clip: Clip, mode: str, radius: float) -> np.ndarray:
+        return _reduced(clip, mode, radius, tolerance=self.tolerance(clip) / clip.metres_per_unit)
+
+    def body_keys(self, clip: Clip, mode: str, radius: Radius, *, shared: bool) -> tuple[np.ndarray, ...]:
+        return _reduced_body(clip, mode, radius, shared, tolerance=self.tolerance(clip) / clip.metres_per_unit)
+
+    def ends(self, times: np.ndarray) -> tuple[int, int]:
+        return 0, len(times) - 1
+
+    @property
+    def name(self) -> str:
+        return f"tolerance-{self.written}"
+
+    @property
+    def amount(self) -> str:
+        number, unit = self._parts()
+        return f"{number} {unit or ('unit' if number == '1' else 'units') + ' of the recording'}"
+
+    @property
+    def title(self) -> str:
+        return f"within {self.amount}"
+
+    @property
+    def phrase(self) -> str:
+        return self.title
+
+    @property
+    def rate(self) -> str:
+        return ""
+
+    def tolerance(self, clip: Clip) -> float:
+        return self.metres(clip.metres_per_unit)
+
+    def metres(self, per_unit: float) -> float:
+        """The length in metres, given how many a unit of the recording has."""
+        number, unit = self._parts()
+        return float(number) * (METRES[unit] if unit else per_unit)
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it says its unit, and does not go by that of the recording."""
+        return bool(self._parts()[1])
+
+    def alike(self, metres: float, per_unit: float) -> str:
+        """Another length, in metres, written in the unit that this one is in."""
+        _, unit = self._parts()
+        length = round(metres / (METRES[unit] if unit else per_unit), 4)
+        return f"{length:.3g} {unit}".strip()
+
+    @property
+    def size(self) -> float:
+        number, unit = self._parts()
+        return float(number) * METRES.get(unit, 1.0)
+
+    @property
+    def wanted(self) -> tuple[Fraction, str]:
+        number, unit = self._parts()
+        return Fraction(number) * MILLIMETRES.get(unit, 1), "mm" if unit else ""
+
+    def _parts(self) -> tuple[str, str]:
+        """The number and the unit, which may be empty."""
+        found = re.fullmatch(rf"({NUMBER})({'|'.join(METRES)})?", self.written, re.ASCII)
+        if not found or float(found[1]) <= 0.0:
+            raise ValueError(
+                f"{self.written!r} is no tolerance; give a length such as 5mm, 0.5cm or 0.005m, or a plain number in "
+                "the unit of the recording"
+            )
+        return found[1], found[2] or ""
+
+
+def _reduced(clip: Clip, mode: str, radius: float, **wanted: float | bool) -> np.ndarray:
+    return reduce_keys(clip.times, clip.poses, mode, radius=radius / clip.metres_per_unit, **wanted)
+
+
+def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted: float) -> tuple[np.ndarray, ...]:
+    return reduce_skeleton_keys(
+        clip.times,
+        clip.poses,
+        clip.figure.parents,
+        mode,
+        radius=radius / clip.metres_per_unit,
+        shared=shared,
+        **wanted,
+    )
+
+
+KINDS: dict[str, type[Choice]] = {kind.__name__.lower(): kind for kind in (Uniform, Budget, Tolerance)}
+"""What choices are called where they are plain data."""
+
+
+def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:
+    """Of each kind of choice that which keeps the fewest keys, where modes differ most."""
+    kinds: dict[type[Choice], list[Choice]] = {}
+    for choice in choices:
+        kinds.setdefault(type(choice), []).append(choice)
+    return [(max if kind is Tolerance else min)(some, key=lambda choice: choice.size) for kind, some in kinds.items()]
+
+
+def distinct(choices: Iterable[Choice]) -> list[Choice]:
+    """Choices of one kind without those that want the same as one before them, however it is written."""
+    first: dict[tuple[Fraction, str], Choice] = {}
+    for choice in choices:
+        first.setdefault(choice.wanted, choice)
+    return list(first.values())
+
+
+def choice_parts(choice: Choice) -> tuple[str, str]:
+    """A choice as plain data."""
+    return type(choice).__name__.lower(), choice.written
+
+
+def choice_from(kind: str, written: str) -> Choice:
+    """The choice of `choice_parts`."""
+    return KINDS[kind](written)

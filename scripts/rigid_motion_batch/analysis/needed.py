@@ -1,0 +1,357 @@
+"""Keys needed: how few keys each mode can do with to be as good as the reference is with many, evenly spaced ones.
+
+As good means: the same RMS shell error, over the same samples. The reference is the paper's state of the art, sent at
+the rates of the paper's table; the others keep evenly spaced keys too, or those that `reduce_keys` finds,
+or fewer that `fit_keys` has moved: these are no samples, but have as many numbers. The same numbers are
+the points of the curve of error over keys a second. Errors are in metres.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from rigid_motion.motion import Poses, decimate, fit_keys, interpolate, reduce_keys, rms, shell_error
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.rows import write_rows
+
+from .metrics import NOTHING, geometric_mean
+from .modes import REFERENCE
+from .reconstructions import Groups, same_motions
+
+RATES = ("30", "20", "15", "12", "8", "5")
+"""Keys a second of the reference that others are to be as good as."""
+
+TABLE_RATES = RATES[:4]
+"""Those of the paper's table; the lower ones make the curve longer."""
+
+DECIMATIONS = ("uniform", "adaptive", "fitted")
+"""The ways to have fewer keys, of which the last is not always tried."""
+
+TRIES = 3
+"""How often fewer keys are fitted, to find how few will do."""
+
+
+@dataclass(frozen=True)
+class NeededRow:
+    """A row of keys_needed.csv. The last four are None where every sample would be needed."""
+
+    clip: str
+    mode: str
+    decimation: str
+    as_good_as_hz: str
+    wanted_rms_shell_m: float
+    keys: int | None
+    keys_per_s: float | None
+    share: float | None
+    rms_shell_m: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class KeysNeeded:
+    """What one clip takes. The axes are groups of modes, decimations and rates, in the order of the fields."""
+
+    clip: str
+
+    groups: tuple[tuple[str, ...], ...]
+    """The modes, those together that are one motion on this clip."""
+
+    rates: tuple[str, ...]
+    """Keys a second of the reference."""
+
+    durations: np.ndarray
+    """Seconds from the first key of the reference to the last, shape (rates,). NaN where it has no two keys."""
+
+    reference_keys: np.ndarray
+    """How many keys the reference had, shape (rates,)."""
+
+    targets: np.ndarray
+    """The RMS shell error of the reference, shape (rates,)."""
+
+    keys: np.ndarray
+    """The keys needed, shape (groups, decimations, rates).
+
+    Infinite where nothing less than every sample is as good; NaN where there is nothing to be as good as: where the
+    reference has no two keys, or all samples for keys.
+    """
+
+    reached: np.ndarray
+    """The RMS shell error with these keys, of the shape of `keys`."""
+
+    uniform_errors: np.ndarray
+    """The RMS shell error with as many evenly spaced keys a second as the reference has, shape (groups, rates)."""
+
+    @property
+    def reference_keys_per_s(self) -> np.ndarray:
+        """The keys a second that the reference really had, shape (rates,)."""
+        return (self.reference_keys - 1.0) / self.durations
+
+    @property
+    def shares(self) -> np.ndarray:
+        """The keys as a share of the reference's, of the shape of `keys`."""
+        return self.keys / self.reference_keys
+
+    @property
+    def keys_per_s(self) -> np.ndarray:
+        """The keys a second on average, of the shape of `keys`: those after the first, over the time."""
+        return (self.keys - 1.0) / self.durations
+
+
+class Ways(Protocol):
+    """The ways to have fewer keys of a clip, and how good they are. All errors are RMS shell errors in metres."""
+
+    clip: Clip
+
+    decimations: tuple[str, ...]
+    """Those of `DECIMATIONS` that are tried."""
+
+    def groups(self, modes: tuple[str, ...]) -> Groups:
+        """The modes, those together that are one motion on the clip."""
+
+    def between(self, first: int, last: int) -> Ways:
+        """The same for the part of the clip from one sample to another."""
+
+    def error(self, keys: np.ndarray, mode: str) -> float:
+        """Of a mode that has these samples for keys."""
+
+    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
+        """The keys, and their error, in each of the ways but for evenly spaced ones, of which it takes so many."""
+
+
+def keys_needed(ways: Ways, modes: Iterable[str], *, advance: Callable[[], object] = lambda: None) -> KeysNeeded:
+    """Find the keys that each mode needs on a clip.
+
+    Parameters
+    ----------
+    ways : Ways
+        The clip, and what can be done with it.
+    modes : iterable of str
+    advance : callable
+        Called once for each of `RATES`.
+
+    Notes
+    -----
+    The adaptive keys begin and end where the reference's do. Evenly spaced ones are searched for by bisection, as if
+    the error fell with every key: the result is as good as the reference, one key fewer is not.
+    """
+    clip, groups = ways.clip, ways.groups(tuple(modes))
+    shape = len(groups), len(ways.decimations), len(RATES)
+    keys, reached = np.full(shape, np.nan), np.full(shape, np.nan)
+    durations, reference_keys, targets = np.full((3, len(RATES)), np.nan)
+    errors = np.full((len(groups), len(RATES)), np.nan)
+    for place, rate in enumerate(RATES):
+        kept = decimate(clip.times, float(rate))
+        stretch = ways.between(int(kept[0]), int(kept[-1]))
+        times, kept = stretch.clip.times, kept - kept[0]
+        if len(kept) >= 2:
+            durations[place] = times[-1] - times[0]
+            reference_keys[place] = len(kept)
+            targets[place] = stretch.error(kept, REFERENCE)
+            errors[:, place] = [stretch.error(kept, group[0]) for group in groups]
+        if targets[place] > NOTHING:
+            for row, group in enumerate(groups):
+                evenly = kept if REFERENCE in group else _fewest_evenly(stretch, group[0], targets[place], kept)
+                found = [(evenly, stretch.error(evenly, group[0]))]
+                found += stretch.by_motion(group[0], targets[place], len(evenly))
+                for column, (own, error) in enumerate(found):
+                    keys[row, column, place] = np.inf if len(own) == len(times) else len(own)
+                    reached[row, column, place] = error
+        advance()
+    return KeysNeeded(clip.name, groups, RATES, durations, reference_keys, targets, keys, reached, errors)
+
+
+def evenly_spaced(clip: Clip, segments: int) -> np.ndarray:
+    """The samples nearest to the ends of so many segments of equal duration, from the first sample to the last."""
+    return decimate(clip.times, segments / float(clip.times[-1] - clip.times[0]))
+
+
+def _fewest_evenly(ways: Ways, mode: str, target: float, start: np.ndarray) -> np.ndarray:
+    """The fewest evenly spaced keys with which a mode is within the target, searched from as many as `start`."""
+
+    def good(segments: int) -> bool:
+        return ways.error(evenly_spaced(ways.clip, segments), mode) <= target
+
+    # Twice the samples are ticks enough for every sample to be a key, which is always good.
+    most = 2 * len(ways.clip.times)
+    enough = len(start) - 1
+    too_few = 0
+    while enough < most and not good(enough):
+        too_few, enough = enough, min(2 * enough, most)
+    while enough - too_few > 1:
+        middle = (enough + too_few) // 2
+        if good(middle):
+            enough = middle
+        else:
+            too_few = middle
+    return evenly_spaced(ways.clip, enough)
+
+
+def part_of(clip: Clip, first: int, last: int) -> Clip:
+    """A clip from one sample to another."""
+    part = slice(first, last + 1)
+    return replace(clip, times=clip.times[part], poses=clip.poses[..., part])
+
+
+@dataclass(frozen=True)
+class OfRigidBody:
+    """Keys of a single rigid body: where the motion needs them, and moved to where they fit best."""
+
+    clip: Clip
+
+    radius: float
+    """Of the shell, in metres."""
+
+    fit: bool = False
+    """Whether to find fitted keys too, which takes two to three times as long."""
+
+    @property
+    def decimations(self) -> tuple[str, ...]:
+        return DECIMATIONS if self.fit else DECIMATIONS[:2]
+
+    def groups(self, modes: tuple[str, ...]) -> Groups:
+        return same_motions(self.clip, modes, self.radius)
+
+    def between(self, first: int, last: int) -> OfRigidBody:
+        return replace(self, clip=part_of(self.clip, first, last))
+
+    def error(self, keys: np.ndarray, mode: str, poses: Poses | None = None) -> float:
+        """Where the keys have other poses than their own, these."""
+        clip = self.clip
+        filled = interpolate(clip.times[keys], clip.poses[keys] if poses is None else poses, clip.times, mode)
+        return rms(shell_error(clip.in_metres(filled), clip.in_metres(clip.poses), self.radius))
+
+    def by_motion(self, mode: str, target: float, evenly: int) -> list[tuple[np.ndarray, float]]:
+        adaptive = self._reduced(mode, target)
+        found = [(adaptive, self.error(adaptive, mode))]
+        return [*found, self._fewest_fitted(mode, target, *found[0])] if self.fit else found
+
+    def _reduced(self, mode: str, target: float) -> np.ndarray:
+        clip, scale = self.clip, self.clip.metres_per_unit
+        return reduce_keys(clip.times, clip.poses, mode, target / scale, self.radius / scale, rms=True)
+
+    def _fewest_fitted(
+        self, mode: str, target: float, adaptive: np.ndarray, reached: float
+    ) -> tuple[np.ndarray, float]:
+        """The fewest keys, and their error, that are within the target when fitted.
+
+        They are searched from the adaptive ones on, which have reached this error without.
+        """
+        clip, best, keys, aim = self.clip, adaptive, adaptive, target
+        for number in range(TRIES):
+            if number:
+                keys = self._reduced(mode, aim)
+            fitted = fit_keys(clip.times, clip.poses, keys, mode, self.radius / clip.metres_per_unit)
+            error = self.error(keys, mode, fitted)
+            if error <= target and len(keys) <= len(best):
+                best, reached = keys, error
+            if error <= NOTHING:
+                break
+            aim *= target / error
+        return best, reached
+
+
+def to_json(found: KeysNeeded) -> str:
+    """As text, of which `from_json` makes it again."""
+    content = {name: one.tolist() if isinstance(one, np.ndarray) else one for name, one in vars(found).items()}
+    return json.dumps(content, indent=1) + "\n"
+
+
+def from_json(text: str) -> KeysNeeded:
+    """What `to_json` wrote."""
+    content = json.loads(text)
+    groups, rates = tuple(map(tuple, content.pop("groups"))), tuple(content.pop("rates"))
+    clip = content.pop("clip")
+    return KeysNeeded(clip, groups, rates, **{name: np.array(one, dtype=float) for name, one in content.items()})
+
+
+# -- over all clips ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Overall:
+    """Geometric means over clips. The axes are groups, decimations and rates."""
+
+    groups: tuple[tuple[str, ...], ...]
+    """The modes, those together that are one motion on every clip."""
+
+    rates: tuple[str, ...]
+
+    clips: np.ndarray
+    """Over how many clips each mean goes, shape (groups, decimations, rates): those where the error was reached."""
+
+    asked: np.ndarray
+    """How many clips there were, shape (rates,): those on which the reference had an error."""
+
+    keys_per_s: np.ndarray
+    """Shape (groups, decimations, rates), NaN over no clips."""
+
+    shares: np.ndarray
+    """Of the reference's keys, shape (groups, decimations, rates)."""
+
+    reached: np.ndarray
+    """The RMS shell error, shape (groups, decimations, rates)."""
+
+    reference_keys_per_s: np.ndarray
+    """Shape (rates,)."""
+
+    uniform_errors: np.ndarray
+    """The RMS shell error with as many evenly spaced keys a second, shape (groups, rates)."""
+
+
+def overall(clips: Sequence[KeysNeeded]) -> Overall:
+    """The geometric means over some clips of one run, at least one."""
+    modes = [mode for group in clips[0].groups for mode in group]
+    places = {mode: tuple(_place(clip, mode) for clip in clips) for mode in modes}
+    groups = tuple(tuple(mode for mode in modes if places[mode] == same) for same in dict.fromkeys(places.values()))
+    rows = [[_place(clip, group[0]) for group in groups] for clip in clips]
+    keys = np.stack([clip.keys[row] for clip, row in zip(clips, rows, strict=True)])
+    there = np.isfinite(keys)
+
+    def mean(values: Callable[[KeysNeeded], np.ndarray], counted: np.ndarray) -> np.ndarray:
+        of_clips = np.stack([values(clip)[row] for clip, row in zip(clips, rows, strict=True)])
+        return geometric_mean(np.where(counted, of_clips, np.nan))
+
+    return Overall(
+        groups=groups,
+        rates=clips[0].rates,
+        clips=there.sum(axis=0),
+        asked=(~np.isnan(keys)).sum(axis=0)[0, 0],
+        keys_per_s=mean(lambda clip: clip.keys_per_s, there),
+        shares=mean(lambda clip: clip.shares, there),
+        reached=mean(lambda clip: clip.reached, there),
+        reference_keys_per_s=geometric_mean(np.stack([clip.reference_keys_per_s for clip in clips])),
+        uniform_errors=mean(lambda clip: clip.uniform_errors, ~np.isnan(keys[:, :, 0])),
+    )
+
+
+def _place(clip: KeysNeeded, mode: str) -> int:
+    """Which group of the clip a mode is in."""
+    return next(place for place, group in enumerate(clip.groups) if mode in group)
+
+
+# -- keys_needed.csv --------------------------------------------------------------------------------------------------
+
+
+def write_keys_needed(path: Path, clips: Iterable[KeysNeeded]) -> None:
+    """Write a row for every clip, mode, decimation and rate, but where the reference has no error to be as good as."""
+    write_rows(path, NeededRow, (row for clip in clips for row in _rows(clip)))
+
+
+def _rows(clip: KeysNeeded) -> Iterator[NeededRow]:
+    for group, decimation, rate in np.argwhere(~np.isnan(clip.keys)).tolist():
+        at = group, decimation, rate
+        found = [None] * 4
+        if np.isfinite(clip.keys[at]):
+            found = [
+                int(clip.keys[at]),
+                *(float(values[at]) for values in (clip.keys_per_s, clip.shares, clip.reached)),
+            ]
+        for mode in clip.groups[group]:
+            yield NeededRow(
+                clip.clip, mode, DECIMATIONS[decimation], clip.rates[rate], float(clip.targets[rate]), *found
+            )

@@ -1,0 +1,254 @@
+"""What a comparison finds of a clip, as arrays and tables: all that a report shows, and what a film is made of.
+
+Poses are in metres with z up; errors in metres and degrees. Numbers that belong together are in one dataclass, and a
+report measures nothing.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.recordings.clips import Clip, ClipWarning
+
+from .bodies import BodyErrors, BodyReconstruction, Ground, identical_body_modes, measure_body, reconstruct_body
+from .body_decimated import KeysOfBody
+from .body_metrics import JointMetrics, joint_rows, key_samples, row_of_body
+from .choices import Choice
+from .metrics import Metrics, measure_reconstruction
+from .modes import BEST_OF
+from .needed import KeysNeeded
+from .radii import Radii
+from .reconstructions import Reconstruction, identical_modes, reconstruct
+
+Keys = tuple[np.ndarray, ...]
+"""The samples that are keys, rising: of a rigid body one array, of a whole body one for each joint."""
+
+
+@dataclass(frozen=True)
+class ClipFacts:
+    """A clip without its samples."""
+
+    name: str
+    source: str
+    axes: str
+    samples: int
+    duration: float
+    """Seconds."""
+
+    repairs: tuple[str, ...]
+
+    joints: int = 0
+    """Of a whole body; 0 for a single rigid one."""
+
+    @classmethod
+    def of(cls, clip: Clip) -> ClipFacts:
+        duration = float(clip.times[-1] - clip.times[0])
+        joints = len(clip.figure.joints) if clip.figure else 0
+        return cls(clip.name, clip.source, clip.axes, len(clip.times), duration, clip.repairs, joints)
+
+
+@dataclass(frozen=True)
+class SegmentModes:
+    """Which modes were best in how many segments, under `best_of`."""
+
+    counts: Mapping[str, int]
+    changes: int
+    """At how many keys the mode changes."""
+
+    best_single: str
+    """The best mode for all segments alike."""
+
+    @classmethod
+    def of(cls, made: Reconstruction) -> SegmentModes | None:
+        """Return None where the run does without `best_of`."""
+        if BEST_OF not in made.keys:
+            return None
+        changes = sum(mode != following for mode, following in pairwise(made.segment_modes))
+        return cls(dict(Counter(made.segment_modes)), changes, made.best_mode)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What one or several modes make of a clip under a choice of keys: a line of the chart, a lane of the film."""
+
+    modes: tuple[str, ...]
+    """Those that give the same motion; the first names it."""
+
+    metrics: tuple[Metrics, ...]
+    """A row for each of the modes."""
+
+    keys: np.ndarray
+    """The samples of the clip that are keys, shape (k,); of a body those that are a key of any joint."""
+
+    poses: Poses
+    """At the samples that are compared, shape (n,); of a body shape (joints, n), where quaternions are the identity."""
+
+    errors: np.ndarray
+    """Shell and position in metres, rotation in degrees, shape (3, n); of a body the largest of all joints."""
+
+    joint_errors: np.ndarray | None = None
+    """The shell errors of a body's joints, shape (joints, n)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChoiceResult:
+    """A clip under one choice of keys."""
+
+    choice: Choice
+
+    first: int
+    """The sample of the clip with which those begin that are compared."""
+
+    motions: tuple[Motion, ...]
+
+    keys: Mapping[str, Keys]
+    """The keys of every mode."""
+
+    segment_modes: SegmentModes | None = None
+
+    mode_of_segments: tuple[str, ...] = ()
+    """The mode of each segment under `best_of`; none where the run does without."""
+
+    joints: tuple[JointMetrics, ...] = ()
+    """A row of each joint of a body under each mode."""
+
+    decimated: tuple[KeysOfBody, ...] = ()
+    """The keys of a body beside those of Blender's Decimate, where that was asked for."""
+
+    @property
+    def rows(self) -> list[Metrics]:
+        """The rows of all modes."""
+        return [row for motion in self.motions for row in motion.metrics]
+
+
+@dataclass(frozen=True, eq=False)
+class ClipResult:
+    """All that was found of a clip."""
+
+    facts: ClipFacts
+
+    times: np.ndarray
+    """Seconds, of all samples of the clip."""
+
+    truth: Poses
+    """The recording, shape (n,); of a body shape (joints, n), where quaternions are the identity."""
+
+    joint_names: tuple[str, ...]
+    parents: np.ndarray | None
+    """Of each joint of a body; -1 for a root."""
+
+    choices: tuple[ChoiceResult, ...]
+    needed: KeysNeeded | None = None
+    """The keys that are needed, where that was looked for."""
+
+    warnings: tuple[ClipWarning, ...] = ()
+
+
+def compare_clip(
+    clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool
+) -> ChoiceResult | None:
+    """Keep keys of a clip, let the modes fill them in, and measure what was lost.
+
+    Parameters
+    ----------
+    clip : Clip
+    choice : Choice
+    modes : sequence of str
+        Of `rigid_motion.motion.MODES`, and `best_of`, which is left out of whole bodies.
+    radii : Radii
+        Of the shells.
+    shared : bool
+        Whether the joints of a body have their keys at the same samples, where the motion chooses them.
+
+    Returns
+    -------
+    ChoiceResult or None
+        None where the clip is too short for two keys.
+    """
+    if clip.figure is None:
+        made = reconstruct(clip, choice, modes, radii.rigid)
+        return None if made is None else _of_rigid_body(made)
+    body = reconstruct_body(clip, choice, modes, of_joints := radii.of(clip.figure.joints), shared=shared)
+    return None if body is None else _of_body(body, of_joints)
+
+
+def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:
+    """Gather what was found of a clip."""
+    figure = clip.figure
+    if figure is None:
+        truth = to_blender(clip.in_metres(clip.poses), clip.axes)
+    else:
+        truth = _places(to_blender(clip.in_metres(figure.skeleton.in_root_space(clip.poses)), clip.axes).positions)
+    return ClipResult(
+        ClipFacts.of(clip),
+        clip.times,
+        truth,
+        figure.joints if figure else (),
+        figure.parents if figure else None,
+        tuple(choices),
+        needed,
+        clip.warnings,
+    )
+
+
+def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
+    rows = {row.mode: row for row in measure_reconstruction(made)}
+    motions = []
+    for group in identical_modes([made]):
+        mode = group[0]
+        errors = made.errors[mode]
+        motions.append(
+            Motion(
+                group,
+                tuple(rows[one] for one in group),
+                made.keys[mode],
+                to_blender(made.clip.in_metres(made.poses[mode]), made.clip.axes),
+                np.stack([errors.shell, errors.position, np.degrees(errors.rotation)]),
+            )
+        )
+    return ChoiceResult(
+        made.choice,
+        made.samples.start,
+        tuple(motions),
+        {mode: (keys,) for mode, keys in made.keys.items()},
+        SegmentModes.of(made),
+        made.segment_modes,
+    )
+
+
+def _of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
+    ground = Ground.of(made)
+    rows: dict[str, Metrics] = {}
+    joints: list[JointMetrics] = []
+    errors: dict[str, BodyErrors] = {}
+    groups = identical_body_modes(made)
+    for mode in made.keys:
+        found = measure_body(made, mode, radii, ground)
+        rows[mode] = row_of_body(made, mode, found, ground)
+        joints += joint_rows(made, mode, found)
+        if mode in (group[0] for group in groups):
+            errors[mode] = found
+    motions = [
+        Motion(
+            group,
+            tuple(rows[mode] for mode in group),
+            key_samples(made.keys[group[0]]),
+            _places(errors[group[0]].places),
+            np.stack([errors[group[0]].shell.max(axis=0), *errors[group[0]].largest]),
+            errors[group[0]].shell,
+        )
+        for group in groups
+    ]
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=tuple(joints))
+
+
+def _places(positions: np.ndarray) -> Poses:
+    """Poses of which only the positions count."""
+    return Poses(positions, np.broadcast_to((1.0, 0.0, 0.0, 0.0), (*positions.shape[:-1], 4)))

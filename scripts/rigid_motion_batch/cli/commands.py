@@ -1,0 +1,149 @@
+"""Every command, and its start: as `rigid-motion NAME`, or as a script of a checkout, also within Blender."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from rigid_motion_batch import standard_streams
+from rigid_motion_batch.command_line import INSTALLED, own_arguments, program_of
+from rigid_motion_batch.places import NAMED, manifest
+from rigid_motion_batch.supervising import begin_child, ended_at_once, stop_signals, supervise
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of the program."""
+
+    module: str
+    """In this package; it has `main(arguments)`, which returns the exit code. Its script has the same name."""
+
+    about: str
+
+    extra: str = "blender"
+    """Of the distribution: what brings the packages that it needs."""
+
+
+RESEARCH = {
+    "paper": "reproduce_paper",
+    "benchmark": "benchmark",
+    "benchmark_batch": "benchmark_batch",
+    "benchmark_live": "benchmark_live",
+    "reduction": "reduction",
+    "subframes": "subframes",
+    "check_release": "check_release",
+}
+"""What `python scripts/research NAME` runs of a checkout: the module of the package `research`."""
+
+COMMANDS = {
+    "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
+    "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
+    "reduce": Command("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
+    "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
+    "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
+    "tasks": Command(".workplan.__main__", "list or run single tasks of a comparison"),
+    "build": Command("build_extension", "build the zip that Blender installs"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `rigid-motion COMMAND ...`, and return the exit code.
+
+    Without arguments given, those of this process are taken, and the work is done in a child of it: see `supervising`.
+    """
+    if arguments is not None:
+        return _main(list(arguments))
+    given = sys.argv[1:]
+    if given and given[0] in COMMANDS:
+        return _as_program(f"{INSTALLED} {given[0]}", lambda: _main(given))
+    return _as_program(INSTALLED, lambda: _main(given), alone=True)
+
+
+def launch(script: str) -> None:
+    """Run the command of a script, given its `__file__`, and end with its exit code."""
+    name = Path(script).name
+    sys.exit(_as_program(program_of(name), lambda: _run(f".{Path(script).stem}", own_arguments(script))))
+
+
+def launch_research(arguments: Sequence[str]) -> None:
+    """Run a study or a benchmark of the checkout, and end with its exit code."""
+    name, *rest = arguments or ["--help"]
+    if name in ("-h", "--help"):
+        print("usage: python scripts/research NAME ...\n\n" + "\n".join(f"  {name}" for name in RESEARCH))
+        sys.exit(0)
+    if name not in RESEARCH:
+        print(f"research: there is no {name!r}; there are {', '.join(RESEARCH)}", file=sys.stderr)
+        sys.exit(2)
+    sys.exit(_as_program(f"research {name}", lambda: _run(f"research.{RESEARCH[name]}", rest)))
+
+
+def _main(arguments: list[str]) -> int:
+    name, *rest = arguments or ["--help"]
+    if name in ("-h", "--help"):
+        print(_help())
+        return 0
+    if name == "--version":
+        print(f"{INSTALLED} {manifest()['version']}")
+        return 0
+    if name not in COMMANDS:
+        print(f"{INSTALLED}: there is no command {name!r}; the commands are {', '.join(COMMANDS)}", file=sys.stderr)
+        return 2
+    sys.argv = [f"{INSTALLED} {name}", *rest]
+    try:
+        return _run(f".{COMMANDS[name].module}", rest)
+    except ModuleNotFoundError as error:
+        if not error.name or error.name.partition(".")[0] in NAMED:
+            raise
+        way_out = f"pip install 'rigid-motion[{COMMANDS[name].extra}]'"
+        print(f"{sys.argv[0]}: {error.name} is not here; {way_out} brings it", file=sys.stderr)
+        return 2
+
+
+def _as_program(program: str, do: Callable[[], int], *, alone: bool = False) -> int:
+    """Do something as a process of its own, with what that has to see to, and return the exit code."""
+    standard_streams.prepare()
+    try:
+        code = do() if begin_child() or alone else supervise(program)
+    except SystemExit as ended:
+        code = ended.code or 0
+    return standard_streams.finish(program, code)
+
+
+def _run(module: str, arguments: Sequence[str]) -> int:
+    received: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    try:
+        with ended_at_once():
+            command = import_module(module, __package__).main
+        for one in stop_signals():
+            signal.signal(one, interrupt)
+        return command(list(arguments))
+    except KeyboardInterrupt:
+        return 128 + (received or [signal.SIGINT])[0]
+
+
+def _help() -> str:
+    width = max(map(len, COMMANDS)) + 2
+    listed = "\n".join(f"  {name:{width}}{command.about}" for name, command in COMMANDS.items())
+    return f"""usage: {INSTALLED} COMMAND ...
+
+Rigid-motion interpolation for keyframes, measured, baked, streamed and rendered.
+
+{listed}
+
+`{INSTALLED} COMMAND --help` shows the options of a command, with examples.
+
+examples:
+  {INSTALLED} compare                                  the motions that come with the program
+  {INSTALLED} compare hand.csv --axes unity
+  {INSTALLED} compare take.csv --decimate adaptive --tolerance 5mm --no-video
+  {INSTALLED} bake shot.blend
+  {INSTALLED} reduce shot.blend --tolerance 5mm"""

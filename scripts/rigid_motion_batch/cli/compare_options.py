@@ -1,0 +1,325 @@
+"""The options of a comparison: what compare.py and job_bundle.py take, and what their help says."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rigid_motion.motion import KEYFRAME_MODES, MODES
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
+from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
+from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.command_line import folder_path, number, parser_of
+from rigid_motion_batch.palette import THEMES
+from rigid_motion_batch.places import ASSETS, from_here, output_folder
+from rigid_motion_batch.recordings import files_of
+from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, StageSettings
+
+DESCRIPTION = """Compare interpolation modes on recorded trajectories.
+
+The program keeps only a few keys a second of each recording, evenly spaced or where the motion needs them. Each mode
+computes the in-betweens again. The program measures how far they are off, and shows it in a report and in a video with
+the modes side by side. Without INPUT it compares the recordings in assets/.
+"""
+
+RATES = "5,10,15,20"
+"""Keys a second where none are asked for."""
+
+STREAM_MODES = tuple(mode for mode in MODES if mode not in KEYFRAME_MODES)
+
+ALL, DISTINCT = "all", "distinct"
+"""Stand for all modes that keyframes can have, with a lane in the film for each, or for each motion that comes out."""
+
+SCRIPT = "compare.py"
+
+EPILOG = """
+inputs:
+  CSV with named columns (t,x,y,z,qx,qy,qz,qw or timestamp_ms,pos_x,...,rot_w and the like, in any order), TUM, EuRoC,
+  Motive (OptiTrack) CSV, A-Frame motion capture JSON, BVH, FBX, glTF, .blend; a folder stands for the recordings in it.
+  FILE:BODY takes one body of several, FILE:* all of them. A BVH, FBX or glTF is a whole body, FILE:JOINT one joint of
+  it. In a .blend, a body is an object (FILE.blend:OBJECT), a bone of a rig (FILE.blend:OBJECT/BONE) or a whole rig
+  (FILE.blend:RIG), moving as Blender shows it in the world, with parents, constraints, drivers and NLA strips.
+  FILE.blend:* takes every animated object.
+
+whole bodies:
+  Each joint has its keys in its parent's space, as in a rig, and its error is measured where the chain of joints puts
+  it. The program works out the unit of a body from its size, and reports it and how sure it is; --scale sets another.
+  OUTPUT/metrics.csv has the whole body, its worst joint, and how far feet slide that should stand still;
+  OUTPUT/metrics_joints.csv has every joint. In the film each mode moves a rig of its
+  own; comparison.blend has these rigs, with the modes set on their bones.
+
+examples:
+  python scripts/compare.py
+  python scripts/compare.py hand_left.csv hand_right.csv --axes unity --output renders/hands
+  python scripts/compare.py log.csv:left --columns t=when,device=who --time-unit ms --scale 0.01
+  python scripts/compare.py unity.csv --axes unity --euler YXZ --degrees
+  python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
+  python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
+  python scripts/compare.py dances/ --no-video
+  python scripts/compare.py dance.bvh --decimate adaptive --tolerance 1cm --shared
+  python scripts/compare.py dance.bvh:LeftHand --object controller
+  python scripts/compare.py shot.blend:Camera --no-video
+  python scripts/compare.py shot.blend:Rig/Hand --no-video
+  python scripts/compare.py hand_left.csv --modes all,best_of
+  python scripts/compare.py take.csv --decimate adaptive --tolerance 5mm
+  python scripts/compare.py take.csv --decimate adaptive --budget 5,10 --rates 10
+  blender --background --python scripts/compare.py -- hand_left.csv --axes unity
+
+choosing keys:
+  --decimate uniform keeps --rates keys a second, evenly spaced in time and the same for every mode. --decimate adaptive
+  chooses keys for each mode among the recorded samples: with --tolerance, the fewest that keep its shell error within
+  that length everywhere; with --budget, so many keys a second on average over the clip, placed so that its RMS shell
+  error is small. Without either, --rates are the budgets; if you give --rates as well, evenly spaced keys at these
+  rates are added for comparison. With adaptive keys, the report also shows error over number of keys, and how many keys
+  each mode needs to be as good as lerp_slerp at 30, 20, 15 and 12 keys a second; this takes up to a second for every
+  100 samples. --fit also counts keys that are not recorded poses, but moved to where the motion follows the recording
+  best; it takes two to three times as long.
+
+choosing modes:
+  best_of takes, in each segment from key to key, the one of the other modes named that comes closest to the recording
+  there. Evenly spaced keys are the same for all modes; with adaptive keys it uses those of the best single mode. A
+  column of best_of.keys.csv has the mode of each segment.
+
+what is written:
+  OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
+  numbers, with adaptive keys also OUTPUT/keys_needed.csv, and for whole bodies OUTPUT/decimated.csv, which compares
+  their keys with Blender's Decimate. Every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
+  /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The
+  last line printed is the path of the report.
+
+one folder, one comparison:
+  You can run again into the same folder with the same recordings, with more of them or fewer. The program refuses a
+  folder that holds another comparison, and does not replace files that it has not written: choose another --output, or
+  replace them with --force. It never replaces inputs. --explain says what a run would do and why, and does nothing.
+
+many clips:
+  The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
+  disk or a crash, the same command continues from there; with other options it does only what these change. A recording
+  that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
+  processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
+Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
+stopped by Ctrl-C, and 143 by SIGTERM; the report then holds what was ready.
+"""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = parser_of(SCRIPT, DESCRIPTION, EPILOG)
+    parser.add_argument("inputs", nargs="*", metavar="INPUT", help="recordings (those in assets/)")
+    parser.add_argument(
+        "--rates", type=_amounts(Uniform), metavar="HZ,...", help=f"keys a second that are kept ({RATES})"
+    )
+    parser.add_argument(
+        "--modes",
+        type=_modes,
+        default=DISTINCT,
+        metavar="MODE,...",
+        help=f"modes to compare: {DISTINCT} for {', '.join(KEYFRAME_MODES)}, with one lane in the film for those that "
+        f"give the same motion (the default); {ALL} for the same modes, each in a lane of its own; or names of these, "
+        f"and of {', '.join(STREAM_MODES)} for streams, which know no later keys, and {BEST_OF} for the best mode of "
+        "each segment",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=folder_path,
+        default=output_folder("comparison"),
+        help="folder to write to (renders/comparison)",
+    )
+    parser.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
+    parser.add_argument(
+        "--radius",
+        type=_radii,
+        default=EVERYWHERE,
+        metavar="M|CSV",
+        help=f"radius of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table "
+        "joint,radius_m for joints by name",
+    )
+    add_reading_options(parser)
+    workers = parser.add_mutually_exclusive_group()
+    workers.add_argument(
+        "--jobs",
+        type=_jobs,
+        metavar="N",
+        help="worker processes; 0 to work in this one (one for each processor)",
+    )
+    workers.add_argument("--scheduler", metavar="ADDRESS", help="use the workers of a Dask scheduler: tcp://HOST:8786")
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="do everything again; replace another comparison, and files of other programs",
+    )
+    parser.add_argument("--explain", action="store_true", help="say what would be done and why, and do nothing")
+    keys = parser.add_argument_group("choosing keys")
+    keys.add_argument(
+        "--decimate",
+        choices=("uniform", "adaptive"),
+        default="uniform",
+        help="keep keys evenly spaced in time, or where each mode needs them (%(default)s)",
+    )
+    keys.add_argument(
+        "--tolerance",
+        type=_amounts(Tolerance),
+        metavar="LENGTH,...",
+        help="largest shell error of adaptive keys: 5mm, 0.5cm, 0.005m; a plain number is in the recording's unit",
+    )
+    keys.add_argument(
+        "--budget", type=_amounts(Budget), metavar="HZ,...", help="adaptive keys a second, on average over the clip"
+    )
+    keys.add_argument(
+        "--shared",
+        action="store_true",
+        help="key poses: all joints of a body have their keys at the same times (each joint where it needs them)",
+    )
+    keys.add_argument(
+        "--fit",
+        action="store_true",
+        help="also count the keys needed if they are fitted, and need not be recorded poses",
+    )
+    video = parser.add_argument_group("video")
+    video.add_argument("--no-video", action="store_true", help="numbers and report only")
+    video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
+    video.add_argument(
+        "--resolution", type=_resolution, default="1280x720", metavar="WxH", help="in pixels (%(default)s)"
+    )
+    video.add_argument("--fps", type=int, default=30, help="frames a second (%(default)s)")
+    video.add_argument(
+        "--slow-motion", type=_positive, default=1.0, metavar="N", help="play N times slower (%(default)s)"
+    )
+    video.add_argument(
+        "--object",
+        default="drill",
+        metavar="OBJECT",
+        help="the object to show: drill, controller, or FILE.blend:NAME (%(default)s)",
+    )
+    video.add_argument(
+        "--films",
+        choices=("fewest", ALL),
+        default="fewest",
+        help="for each recording one video, with the fewest keys, or one for every choice of keys (%(default)s)",
+    )
+    video.add_argument("--theme", choices=THEMES, default="dark", help="colours of the videos (%(default)s)")
+    video.add_argument(
+        "--deviation",
+        type=_positive,
+        metavar="N",
+        help="magnify errors N times; 1 shows them as they are (a round number that shows them well)",
+    )
+    video.add_argument(
+        "--antialiasing",
+        choices=ANTIALIASING,
+        help="for workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
+    )
+    video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
+    options = parser.parse_args(arguments)
+    try:
+        options.stage = StageSettings(
+            engine=options.engine,
+            resolution=options.resolution,
+            fps=options.fps,
+            slow_motion=options.slow_motion,
+            subject=options.object,
+            antialiasing=options.antialiasing,
+            samples=options.samples,
+            theme=options.theme,
+            deviation=options.deviation,
+            distinct=options.modes.distinct,
+        )
+        options.choices = _choices(options)
+        options.reading = reading_options(options)
+    except ValueError as error:
+        parser.error(str(error))
+    if not options.inputs:
+        options.inputs = [str(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
+    options.inputs = [file for source in options.inputs for file in files_of(source)]
+    return options
+
+
+def _choices(options: argparse.Namespace) -> list[Choice]:
+    """All choices of keys of the run. Raises ValueError for options that do not go together."""
+    rates, tolerance, budget, shared = options.rates, options.tolerance, options.budget, options.shared
+    if options.decimate == "uniform":
+        by_motion = (("--tolerance", tolerance), ("--budget", budget), ("--fit", options.fit), ("--shared", shared))
+        for option, given in by_motion:
+            if given:
+                raise ValueError(f"{option} is for keys that are chosen by the motion: add --decimate adaptive")
+        return rates or _amounts(Uniform)(RATES)
+    if tolerance and budget:
+        raise ValueError(
+            "--tolerance and --budget exclude one another: a tolerance decides how many keys there are, a budget how "
+            "large the error is; give one of them"
+        )
+    by_motion = tolerance or budget or [Budget(rate.written) for rate in rates or _amounts(Uniform)(RATES)]
+    return [*(rates or []), *by_motion]
+
+
+def _amounts(kind: type[Choice]) -> Callable[[str], list[Choice]]:
+    """How a list of amounts is read: each as a choice of that kind."""
+
+    def parse_amounts(text: str) -> list[Choice]:
+        written = ["".join(part.split()) for part in text.split(",") if part.strip()] or [text]
+        try:
+            return distinct(map(kind, written))
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return parse_amounts
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The modes of a run."""
+
+    names: tuple[str, ...]
+    distinct: bool
+    """Whether those that are one motion share a lane."""
+
+
+def _modes(text: str) -> Modes:
+    written = [part.strip() for part in text.split(",") if part.strip()]
+    named = list(dict.fromkeys(m for part in written for m in (KEYFRAME_MODES if part in (ALL, DISTINCT) else (part,))))
+    modes = single_modes(named)
+    wrong = [mode for mode in modes if mode not in MODES]
+    if wrong or not named:
+        raise argparse.ArgumentTypeError(
+            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, DISTINCT, ALL, BEST_OF))}"
+        )
+    share = DISTINCT in written
+    if BEST_OF not in named:
+        return Modes(tuple(modes), share)
+    if len(modes) < 2:
+        raise argparse.ArgumentTypeError(
+            f"{BEST_OF} chooses among the other modes that are named: name two or more, or {ALL},{BEST_OF}"
+        )
+    return Modes((*modes, BEST_OF), share)
+
+
+def _jobs(text: str) -> int:
+    if not re.fullmatch(r"\d{1,3}", text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    positive = number(text)
+    if not 0.0 < positive < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return positive
+
+
+def _radii(text: str) -> Radii:
+    try:
+        return read_radii(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text, re.ASCII)
+    if not found:
+        raise argparse.ArgumentTypeError(f"{text!r} is no resolution; give one such as 1280x720")
+    return int(found[1]), int(found[2])

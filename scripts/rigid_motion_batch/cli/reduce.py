@@ -1,0 +1,214 @@
+"""Keep the few keys that a motion needs, in .blend files and of recordings, without a window.
+
+In .blend files the program does what *Reduce Keys to Poses* does in Blender's window, for objects and whole rigs. Of a
+recording it finds the few samples that a mode needs as keys, and writes them as a table or as a .blend file. No point
+is off by more than the tolerance on any frame. The result is a new file; the input stays as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+from rigid_motion_batch.command_line import not_empty, number, parser_of, program_of
+from rigid_motion_batch.system_libraries import require_blender
+
+SCRIPT = "reduce.py"
+PROGRAM = program_of(SCRIPT)
+
+require_blender(SCRIPT)
+
+from rigid_motion.animation.baking.sizes import OF_A_RIG, OF_KEY_POSES
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.radii import RIGID
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.keying.jobs import (
+    BlendRun,
+    Job,
+    add_file_options,
+    add_target_options,
+    jobs_of,
+    refuse_odd_places,
+)
+from rigid_motion_batch.keying.keyed_files import RATES
+from rigid_motion_batch.keying.recordings import TOLERANCE, Reading, Recorded, RecordingRun, Writing, place_and_body
+from rigid_motion_batch.keying.reducing import Wishes, reducing
+from rigid_motion_batch.keying.sessions import Note, Outcome, StopIfAsked, Work, do_all
+from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+
+MODE = "motor_spline"
+
+MOST = 1000000
+"""Keys that can be asked for: Blender's last frame."""
+
+EPILOG = """
+examples:
+  python scripts/reduce.py shot.blend
+  python scripts/reduce.py shots/*.blend --tolerance 2mm --output reduced
+  python scripts/reduce.py shot.blend --objects 'Camera,Rig/*' --shared
+  python scripts/reduce.py shot.blend --keys 12
+  python scripts/reduce.py shot.blend --dry-run
+  python scripts/reduce.py hand.csv --axes unity --tolerance 5mm
+  python scripts/reduce.py hand.csv --axes unity --blend --fps 30
+  python scripts/reduce.py walk.bvh dance.fbx fox.glb --tolerance 1cm --output keyed
+  blender --background --python scripts/reduce.py -- shot.blend
+
+.blend files:
+  The program reduces every object, and all bones of a rig together, with more than two keys of location or rotation. It
+  keeps the keys that the mode needs, and sets the mode on them. The dense keys stay in the file, so that Restore Keys
+  brings them back; with --discard they do not. For bones, the tolerance holds through all parents, and with the rig's
+  own keys. Bones that follow constraints or drivers are not promised, nor is what hangs on them: they are named. Feet
+  that stand on the ground keep to a quarter of the tolerance. An object that needs all of its keys stays as it is, and
+  so does one whose scale has keys everywhere that differ from axis to axis. Without --radius, the radius is the size of
+  the object or the length of the bone.
+
+recordings:
+  The program reads what compare.py reads: CSV, TUM, EuRoC, Motive, A-Frame, BVH, FBX, glTF, and animated objects and
+  rigs of .blend files (shot.blend:Camera). FILE:BODY takes one body of several, FILE:* all. For a rigid motion it
+  writes a table of the keys, t,x,y,z,qw,qx,qy,qz, in the axes and units of the recording. With --blend it also writes
+  a .blend file in which an empty moves by these keys. For a whole body it writes a .blend file with a rig. These files
+  are in metres and Blender's axes, with the mode on the keys; they play in any Blender, with or without the extension.
+  The first sample is on frame 1.
+
+what is written:
+  NAME-reduced.blend for a .blend file, NAME-keys.csv and NAME-keys.blend for a recording, beside it or in --output. A
+  file is moved into place when it is complete, and replaces an existing one only with --overwrite, also where another
+  run has written that meanwhile. With --in-place the program replaces a .blend file itself, and keeps the one before
+  as NAME.blend1. At the end the paths that were written are printed on standard output, one a line; a path with a line
+  break or another control character is printed as JSON, "a\\nb.csv". Everything else goes to standard error: for each
+  object and rig the number of keys before and after, and the largest error.
+
+what is run:
+  Nothing in the files: scripts and Python expressions stay in them, switched off.
+
+exit code:
+  0    all done, or nothing to do
+  1    some objects, bones or files could not be done, and are named with the reason. The others are done. Or Blender
+       crashed at a file, which is named: the files before it are done.
+  2    a wrong option, or none of the files could be read: nothing was done
+  130  stopped by Ctrl-C, and 143 by SIGTERM, within 2 s: the files written by then are complete, nothing else was
+       changed
+"""
+
+
+def parse(arguments: list[str]) -> argparse.Namespace:
+    """The options; a wrong one ends the program with code 2 and a line that says what is wrong."""
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
+    parser.add_argument("inputs", nargs="+", type=not_empty, metavar="INPUT", help=".blend files and recordings")
+    add_target_options(parser, "keys")
+    keys = parser.add_argument_group("keys")
+    keys.add_argument(
+        "--tolerance",
+        type=_tolerance,
+        metavar="LENGTH",
+        help="largest error on any frame: 5mm, 0.5cm, 0.005m; a plain number is in the unit of the file (in .blend "
+        f"files 1mm for objects and {OF_A_RIG:.1%}% of the size of a rig; for recordings {TOLERANCE.written}; with "
+        f"--shared {OF_KEY_POSES:.0%}% of the size of a rig or body)",
+    )
+    keys.add_argument(
+        "--keys",
+        type=_count,
+        metavar="N",
+        help="instead of a tolerance: N keys of each object, or N key poses of each rig, where the error is smallest",
+    )
+    keys.add_argument("--mode", choices=KEYFRAME_MODES, default=MODE, help="mode between the keys (%(default)s)")
+    keys.add_argument(
+        "--radius",
+        type=_radius,
+        metavar="M",
+        help="metres around the origin within which no point is off by more (the size of an object, the length of a "
+        f"bone; for rigid recordings {RIGID})",
+    )
+    keys.add_argument(
+        "--shared", action="store_true", help="key poses: all bones of a rig get their keys on the same frames"
+    )
+    keys.add_argument(
+        "--discard",
+        action="store_true",
+        help="leave the dense keys out of the file, which then has no Restore Keys",
+    )
+    recordings = parser.add_argument_group("recordings")
+    recordings.add_argument("--blend", action="store_true", help="also write rigid motions as .blend files")
+    recordings.add_argument(
+        "--fps", type=_fps, metavar="N", help="frames a second of .blend files (the rate of the recording)"
+    )
+    recordings.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
+    add_reading_options(parser)
+    add_file_options(parser)
+    options = parser.parse_args(arguments)
+    files, recorded = _sorted(options.inputs)
+    options.wishes = Wishes(
+        options.mode, options.tolerance, options.radius, options.shared, options.discard, options.keys
+    )
+    options.action = reducing(options.wishes, options.objects)
+    try:
+        refuse_odd_places(options)
+        if options.keys is not None and options.tolerance is not None:
+            raise ValueError("--keys and --tolerance exclude one another: each decides how many keys there are")
+        if recorded and options.in_place:
+            raise ValueError(f"--in-place is for .blend files, and {recorded[0].source} is a recording: leave one out")
+        if options.objects and not files:
+            raise ValueError("--objects is for .blend files: of a recording name one body with FILE:BODY")
+        options.reading = Reading(options.axes, reading_options(options))
+        options.jobs = [
+            *jobs_of(files, options.action.suffix, options.output, in_place=options.in_place),
+            *recorded,
+        ]
+    except ValueError as error:
+        parser.error(str(error))
+    return options
+
+
+def main(arguments: list[str]) -> int:
+    """Do all inputs, and return the exit code."""
+    options = parse(arguments)
+    action = options.action
+    work = Work(PROGRAM, action.doing, action.done, options.objects, options.dry_run)
+    return do_all(options.jobs, work, lambda *session: _doing(options, *session))
+
+
+def _doing(options: argparse.Namespace, note: Note, stop_if_asked: StopIfAsked) -> Callable[[Job | Recorded], Outcome]:
+    """What does one input, be it a .blend file or a recording."""
+    writing = Writing(options.output, options.overwrite, options.dry_run, options.blend, options.fps)
+    files = BlendRun(options, options.action, note, stop_if_asked)
+    recordings = RecordingRun(options.wishes, options.reading, writing, options.inputs, note, stop_if_asked)
+    return lambda job: recordings.do(job) if isinstance(job, Recorded) else files.do(job)
+
+
+def _sorted(inputs: list[str]) -> tuple[list[Path], list[Recorded]]:
+    """The .blend files and the recordings, each of these once. A body of a .blend file is a recording."""
+    files = [Path(source) for source in inputs if source.lower().endswith(".blend")]
+    recorded: dict[tuple[str, str | None], str] = {}
+    for source in inputs:
+        if not source.lower().endswith(".blend"):
+            recorded.setdefault(place_and_body(source), source)
+    return files, list(map(Recorded, recorded.values()))
+
+
+def _tolerance(text: str) -> Tolerance:
+    try:
+        return Tolerance(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 2 <= int(text) <= MOST):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 2 to {MOST}")
+    return int(text)
+
+
+def _radius(text: str) -> float:
+    radius = number(text)
+    if not 0.0 < radius < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of metres above 0")
+    return radius
+
+
+def _fps(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and RATES[0] <= int(text) <= RATES[1]):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {RATES[0]} to {RATES[1]}")
+    return int(text)

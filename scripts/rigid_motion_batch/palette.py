@@ -1,0 +1,123 @@
+"""Colours: one for each mode wherever it is shown, and those of the stage around it. sRGB, as in a web page.
+
+The modes have the colours of Okabe and Ito (Color Universal Design, 2008), which people with any of the common forms
+of colour blindness can tell apart, but for a lighter blue, and a leaf green beside them that keeps apart from all: each
+reaches a contrast of 3 on the dark stage, and is darkened to reach it on the light one. Nothing here needs Blender.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .analysis.metrics import NOTHING
+
+MODE_COLOURS: dict[str, str] = {
+    "lerp_slerp": "#D55E00",
+    "dq_sclerp": "#56B4E9",
+    "pga_lerp": "#E69F00",
+    "pga_slerp": "#009E73",
+    "cga_lerp": "#CC79A7",
+    "cga_slerp": "#4C72E0",
+    "motor_spline": "#88BB66",
+    "motor_spline_causal": "#F0E442",
+    "best_of": "#963CFF",
+}
+"""Mode id to colour."""
+
+OTHER_COLOURS = ("#B3B3B3", "#A98467", "#B7E4C7")
+"""For modes that have no colour of their own yet."""
+
+
+@dataclass(frozen=True)
+class Theme:
+    """The colours of a stage."""
+
+    background: str
+    card: str
+    """What a lane stands on."""
+
+    track: str
+    """What is yet to come in a graph."""
+
+    faint: str
+    ink: str
+    ghost: str
+    """Of the recording."""
+
+
+THEMES = {
+    "dark": Theme("#14171C", "#242932", "#3A424E", "#9AA4B2", "#EEF1F5", "#C9D3E0"),
+    "light": Theme("#E4E7EB", "#FFFFFF", "#D3D9E0", "#58626E", "#14171C", "#5B6572"),
+}
+DARK = THEMES["dark"]
+
+ERROR_COLOURS = ("#5B7FB0", "#C9B98A", "#F08A24", "#C4162A")
+"""What an error looks like where it is a colour, evenly from none to the largest: calm where all is well, red where it
+is not. They differ in lightness as well, for people who cannot tell red from green."""
+
+NEARLY_ALL = 0.995
+"""The share of all errors that the colours reach up to: a single wild frame would leave no other to be seen."""
+
+LEAST_CONTRAST = 3.0
+"""Of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
+
+
+def colour_of(mode: str) -> str:
+    """The colour of a mode, the same in every run, also for a mode that the table does not know."""
+    return MODE_COLOURS.get(mode) or OTHER_COLOURS[zlib.crc32(mode.encode()) % len(OTHER_COLOURS)]
+
+
+def colour_on(theme: Theme, mode: str) -> str:
+    """The colour of a mode, darkened as far as it needs to be to stand out from a light card."""
+    red, green, blue = linear(colour_of(mode))
+    highest = (luminance(theme.card) + 0.05) / LEAST_CONTRAST - 0.05
+    if luminance(theme.card) < 0.5 or luminance(colour_of(mode)) <= highest:
+        return colour_of(mode)
+    share = highest / luminance(colour_of(mode))
+    return "#" + "".join(f"{int(255.0 * _encoded(share * value)):02X}" for value in (red, green, blue))
+
+
+def error_hex(share: float) -> str:
+    """The colour of an error by its share of the largest, 0 to 1: between those of `ERROR_COLOURS`."""
+    place = min(max(share, 0.0), 1.0) * (len(ERROR_COLOURS) - 1)
+    first = min(int(place), len(ERROR_COLOURS) - 2)
+    low, high = map(_parts, ERROR_COLOURS[first : first + 2])
+    mixed = (a + (place - first) * (b - a) for a, b in zip(low, high, strict=True))
+    return "#" + "".join(f"{round(255.0 * value):02x}" for value in mixed)
+
+
+def full_colour(errors: Iterable[np.ndarray]) -> float:
+    """The error that colours reach up to, so that one scale is good for all of these: nearly the largest.
+
+    In metres. What is only rounding has the colour of nothing.
+    """
+    errors = list(errors)
+    nearly_all = max(float(np.quantile(some, NEARLY_ALL)) for some in errors)
+    largest = max(float(some.max()) for some in errors)
+    return next((size for size in (nearly_all, largest) if size > NOTHING), 1.0)
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance, 0 to 1."""
+    red, green, blue = linear(colour)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def linear(colour: str) -> tuple[float, float, float]:
+    """The linear RGB, 0 to 1, that Blender computes in, of an sRGB colour such as "#56B4E9"."""
+    red, green, blue = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in _parts(colour))
+    return red, green, blue
+
+
+def _parts(colour: str) -> list[float]:
+    """Red, green and blue, 0 to 1, as they are written."""
+    return [int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)]
+
+
+def _encoded(value: float) -> float:
+    """What sRGB has for linear light."""
+    return 12.92 * value if value <= 0.0031308 else 1.055 * value ** (1.0 / 2.4) - 0.055

@@ -1,0 +1,86 @@
+"""Why a task would be done: never done, or its parameters, inputs, rooms, or steps before it have changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from .running import Plan
+from .steps import Task
+from .store import OutputError, Store
+from .values import to_plain
+
+MOST = 3
+"""Of several changes, how many are named."""
+
+
+def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
+    """The tasks of a plan that a run would do, and why. Nothing is written."""
+    latest = store.latest()
+    changed: dict[str, str] = {}
+    """Key to name, of tasks that would be done."""
+    sleeping: dict[str, Task] = {}
+    for task in plan():
+        if task.step.temporary:
+            sleeping[task.key] = task
+            continue
+        before = [sleeping.pop(key) for key in task.after if key in sleeping]
+        result = store.result(task.key)
+        if result and store.is_published(task, result):
+            continue
+        if result:
+            yield task, _unpublished(task, store)
+            continue
+        for one in (*(one for one in before if not store.result(one.key)), task):
+            yield one, _reason(one, store, latest.get(one.name), changed)
+            changed[one.key] = one.shown
+
+
+def _reason(task: Task, store: Store, key: str | None, changed: Mapping[str, str]) -> str:
+    """Why a task without a result would be done, by what its last result was made of."""
+    earlier = store.result(key) if key else None
+    if key == task.key:
+        return "its result is damaged or gone"
+    if earlier is None or not isinstance(made_of := earlier.index.get("made_of"), dict):
+        return "never done" if key is None else "never done of this"
+    reasons = [
+        *_of("program", _differences(made_of.get("versions"), task.step.versions, values=False)),
+        *_of("parameters", _differences(made_of.get("parameters"), to_plain(task.parameters))),
+        *_of("input file", _differences(made_of.get("inputs"), {one.path: one.sha256 for one in task.inputs}, False)),
+    ]
+    if made_of.get("after") != [*task.after]:
+        anew = [changed[key] for key in task.after if key in changed]
+        reasons.append(f"an earlier step changed ({_few(anew)})" if anew else "earlier steps are others")
+    return "; ".join(reasons) or "its step is another"
+
+
+def _of(what: str, differences: list[str]) -> list[str]:
+    return [f"{what} changed ({_few(differences)})"] if differences else []
+
+
+def _differences(before: Any, now: Any, values: bool = True, name: str = "") -> list[str]:
+    """What differs between two pieces of plain data, by its names: "fps: 24 -> 30"."""
+    if isinstance(before, dict) and isinstance(now, Mapping):
+        prefix = f"{name}." if name else ""
+        names = [key for key in {**before, **now} if key != "$"]
+        return [one for key in names for one in _differences(before.get(key), now.get(key), values, f"{prefix}{key}")]
+    if before == now:
+        return []
+    shown = f"{before} -> {now}"
+    return [f"{name}: {shown}" if values and len(shown) < 60 else name]
+
+
+def _unpublished(task: Task, store: Store) -> str:
+    missing = [path for path in task.publish.values() if not (store.output / path).exists()]
+    if missing:
+        return f"{_few(missing)} missing"
+    try:
+        others = store.strangers(task, store.result(task.key))
+    except OutputError as error:
+        return str(error)
+    return f"{_few(others)} edited" if others else "published of something else"
+
+
+def _few(names: Iterable[str]) -> str:
+    names = [*names]
+    return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")

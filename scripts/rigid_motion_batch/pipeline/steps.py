@@ -1,0 +1,231 @@
+"""Steps and tasks: what can be done, and what is to be done, of what.
+
+A step is a function that writes the files of a result, by parameters, from results of other tasks and from files. A
+task is a step with all of these, and has a key, a digest of everything its result depends on. So all keys are known
+before anything is done, and equal tasks have one result. Standard library alone: Blender's own Python loads this.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from rigid_motion_batch import places
+
+from .values import to_plain
+
+DIGITS = 32
+"""Of SHA-256, in a key: 128 bits, and short enough for the paths of Windows."""
+
+OWN = ".rigid-motion"
+"""The folder in an output folder where the pipeline keeps its own files."""
+
+
+class TaskError(Exception):
+    """What is wrong with the input of a task, and what to do about it, in one line."""
+
+
+class Job:
+    """A task's view of its files while it is done.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the result's files are to be written; there, and empty.
+    before : sequence of Path or None
+        The folders of the results of the tasks before it; None for those that failed, in partial steps alone.
+    inputs : sequence of Path
+    tell : callable
+        Takes the share that is done and what is being done.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        before: Sequence[Path | None] = (),
+        inputs: Sequence[Path] = (),
+        tell: Callable[[float, str], object] = lambda share, doing: None,
+    ) -> None:
+        self.folder, self.before, self.inputs = folder, tuple(before), tuple(inputs)
+        self.notes: list[str] = []
+        self._tell = tell
+
+    def progress(self, done: float, total: float = 1.0, doing: str = "") -> None:
+        """Say how far it is, and what is being done. Cheap enough to be called often."""
+        self._tell(min(done / total, 1.0) if total else 1.0, doing)
+
+    def note(self, text: str) -> None:
+        """Say something that the user should know, in a line, when the task is done."""
+        self.notes.append(text)
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A function of a job and parameters that writes files into the job's folder, and may return facts for JSON."""
+
+    function: Callable[[Job, Any], Mapping[str, Any] | None]
+
+    rooms: tuple[str, ...] = ()
+    """The files and folders of the program that it may use, as `places.place_of` names them, or below this package."""
+
+    stage: str = ""
+    """The part of the work that it belongs to, for `--only`."""
+
+    partial: bool = False
+    """Goes on with what there is where some of the tasks before it failed."""
+
+    temporary: bool = False
+    """Its result is for one other task, is made when that needs it, and goes when that is done."""
+
+    blender: bool = False
+    """Needs bpy: done by the Blender that the user names, if any."""
+
+    @property
+    def name(self) -> str:
+        """Package.module:function, which finds it again."""
+        return f"{self.function.__module__}:{self.function.__name__}"
+
+    @cached_property
+    def parameters(self) -> Any:
+        """The type of its parameters."""
+        hints = get_type_hints(self.function)
+        return next(kind for name, kind in [*hints.items()][1:] if name != "return")
+
+    @cached_property
+    def versions(self) -> Mapping[str, str]:
+        """Of the program, and in a checkout of every room and of the function's own module."""
+        found = {"program": places.manifest()["version"]}
+        if places.CHECKOUT:
+            module = importlib.import_module(self.function.__module__)
+            found |= {room: digest_of(place_of_room(room)) for room in self.rooms}
+            found[self.function.__module__] = digest_of(Path(module.__file__))
+        return found
+
+    @cached_property
+    def digest(self) -> str:
+        """Of its name and versions."""
+        return _digest([self.name, self.versions])
+
+    def __reduce__(self) -> tuple[Callable[[str], Step], tuple[str]]:
+        return step_named, (self.name,)
+
+
+def step(**options: Any) -> Callable[[Callable[[Job, Any], Mapping[str, Any] | None]], Step]:
+    """Make a step of a function, with the fields of `Step`."""
+    return lambda function: Step(function, **options)
+
+
+def step_named(name: str) -> Step:
+    """The step of a name. Raises ValueError where there is none."""
+    module, _, function = name.partition(":")
+    found = getattr(importlib.import_module(module), function, None)
+    if not isinstance(found, Step):
+        raise ValueError(f"{name}: no such step")
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A file that a task reads, as it was when the work was planned."""
+
+    path: str
+    sha256: str
+    """Of its content; empty where it is missing or no file."""
+
+    size: int = -1
+    mtime_ns: int = 0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Task:
+    """Something to do once, unless its result is there."""
+
+    step: Step
+    parameters: Any
+    """A frozen dataclass."""
+
+    name: str
+    """What it is about, for people and from one plan to the next: "measure hand/10"."""
+
+    after: tuple[str, ...] = ()
+    """The keys of tasks whose results it reads."""
+
+    inputs: tuple[Input, ...] = ()
+
+    publish: Mapping[str, str] = field(default_factory=dict)
+    """Files of the result to where they go in the output folder, with slashes."""
+
+    title: str = ""
+    weight: float = 1.0
+    """About how many seconds it takes."""
+
+    amount: int = 0
+    unit: str = ""
+    """What is counted over all tasks, and how many it makes: 120 "frame"."""
+
+    group: str = ""
+    """Tasks of one group are the share of one worker, where a job is split."""
+
+    key: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        for path in self.publish.values():
+            require_inside(path)
+        object.__setattr__(self, "key", self.key_after(self.after))
+
+    def key_after(self, after: Iterable[str | None]) -> str:
+        """Its key where the tasks before it had these keys; None for one that failed."""
+        inputs = [one.sha256 for one in self.inputs]
+        return _digest([self.step.digest, to_plain(self.parameters), list(after), inputs])[:DIGITS]
+
+    @property
+    def shown(self) -> str:
+        return self.title or self.name
+
+
+def require_inside(path: str) -> None:
+    """Make sure that a path of an output, with slashes, leads into the output folder on every system.
+
+    Raises
+    ------
+    ValueError
+        Where it does not, or leads to where the pipeline keeps its own files.
+    """
+    parts = path.split("/")
+    # A colon in the first part would be a drive of Windows, and in another a stream of a file.
+    if not path.isprintable() or "\\" in path or ":" in path or {"", ".", ".."} & {*parts}:
+        raise ValueError(f"{path!r} is no path below the output folder")
+    if parts[0].casefold() == OWN:
+        raise ValueError(f"{path!r} is where the program keeps its own files")
+
+
+def place_of_room(room: str) -> Path:
+    """The file or folder of a room."""
+    own = places.PACKAGE / room
+    return own if own.exists() else places.place_of(room)
+
+
+@cache
+def digest_of(place: Path) -> str:
+    """Of the content of a file, or of all files of a folder, once in the life of this process."""
+    files = sorted(path for path in place.rglob("*") if _is_source(path)) if place.is_dir() else [place]
+    return _digest([[path.relative_to(place).as_posix(), sha256_of(path)] for path in files])[:12]
+
+
+def sha256_of(path: Path | str) -> str:
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _is_source(path: Path) -> bool:
+    return path.is_file() and path.suffix != ".pyc" and not path.name.startswith(".")
+
+
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

@@ -1,0 +1,449 @@
+"""An output folder: results by key, the files that are published from them, and a record of whose a file is.
+
+Below `.rigid-motion/` of the folder:
+
+    results/KEY/        what a task made, with an index of its files; there if and only if the task is done
+    scratch/SESSION/    what is being made, by a process that holds SESSION.lock
+    published/          what this program has put into the output folder: lines of JSON, a file for each folder
+    latest.jsonl        task to key of its last result, for `--explain`
+    inputs.json         digests of inputs, by size, time of change and inode
+    lock                held by a run that has the folder for itself
+
+Whatever is written is written beside its place and moved there. So any process may be killed at any moment, and any
+number may write at the same time.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import socket
+import stat
+import time
+import uuid
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from filelock import FileLock, Timeout
+
+from rigid_motion_batch.files import write_text, written_beside
+
+from .steps import OWN, Input, Task, sha256_of
+from .values import to_plain
+
+INDEX = ".index.json"
+"""Of a result: its files with size, time of change and digest; what it was made of, in how long, and facts."""
+
+UNSETTLED = 2.0
+"""Seconds since its last change, by which a file that was hashed may have changed again without a trace in its time."""
+
+KEPT = 7 * 86400.0
+"""Seconds that a result is kept that the last plan did not ask for."""
+
+Files = Mapping[str, tuple[int, int, str]]
+"""Name to size, time of change in ns and SHA-256."""
+
+
+class FolderInUse(Exception):
+    """Another run works in the folder. The message says which, in one line."""
+
+
+class OutputError(Exception):
+    """What must not be replaced or read, and the way out, in one line."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a task made."""
+
+    folder: Path
+    index: Mapping[str, Any]
+
+
+class Store:
+    """An output folder, as a context.
+
+    Parameters
+    ----------
+    output : Path
+        Made where it is missing, and taken away again where nothing came of it.
+    alone : bool
+        Whether no other run may have the folder meanwhile; not for workers that do a part each.
+    overwrite : bool
+        Whether files that this program has not written may be replaced. Inputs and folders never are.
+
+    Raises
+    ------
+    FolderInUse, OSError
+        On entering.
+    """
+
+    def __init__(self, output: Path, *, alone: bool = True, overwrite: bool = False) -> None:
+        self.output, self.overwrite = output.absolute(), overwrite
+        self.own = self.output / OWN
+        self._results, self._scratch = self.own / "results", self.own / "scratch"
+        self._lock = FileLock(self.own / "lock", blocking=False) if alone else None
+        self._missing = [folder for folder in (self.output, *self.output.parents) if not folder.exists()]
+        self._cache = _inputs_known(self.output)
+        self._identities: dict[tuple[int, int], str] = {}
+        """Of inputs, in the file system, to their paths."""
+        self._session: FileLock | None = None
+        self._number = 0
+
+    # -- opening and closing ------------------------------------------------------------------------------------------
+
+    def __enter__(self) -> Self:
+        for folder in (self.own, self._results, self._scratch, self.own / "published"):
+            if os.path.lexists(folder) and not folder.is_dir():
+                folder.unlink()
+            folder.mkdir(parents=True, exist_ok=True)
+        if self._lock:
+            try:
+                self._lock.acquire()
+            except Timeout:
+                raise FolderInUse(
+                    f"{self.output}: another run is at work in this folder{self._holder()}; wait for it, or choose "
+                    "another"
+                ) from None
+            holder = {"process": os.getpid(), "host": socket.gethostname(), "since": time.strftime("%Y-%m-%d %H:%M")}
+            write_text(self.own / "holder.json", json.dumps(holder))
+        self._clear_dead_sessions()
+        while self._session is None:
+            session = FileLock(self._scratch / f"{uuid.uuid4().hex[:8]}.lock")
+            session.acquire()
+            # Another process may have taken it for a dead one's before it was locked.
+            self._session = session if os.path.exists(session.lock_file) else None
+        self.scratch.mkdir(parents=True)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        shutil.rmtree(self.scratch, ignore_errors=True)
+        if self._identities:
+            with suppress(OSError):
+                write_text(self.own / "inputs.json", json.dumps(self._cache))
+        lock = self._session.lock_file
+        self._session.release()
+        Path(lock).unlink(missing_ok=True)
+        for name in ("results", "scratch", "published"):
+            _remove_if_empty(self.own / name)
+        if self._lock:
+            (self.own / "holder.json").unlink(missing_ok=True)
+            if not self._results.exists():
+                for name in ("inputs.json", "latest.jsonl", "failures.json", "lock"):
+                    (self.own / name).unlink(missing_ok=True)
+            self._lock.release()
+        for folder in (self.own, *self._missing):
+            if not _remove_if_empty(folder):
+                break
+
+    @property
+    def scratch(self) -> Path:
+        """The folder of this process for what is being made."""
+        return Path(self._session.lock_file).with_suffix("")
+
+    def new_scratch(self) -> Path:
+        """A path for the result of a task that is begun; nothing is there."""
+        self._number += 1
+        return self.scratch / str(self._number)
+
+    def _clear_dead_sessions(self) -> None:
+        for path in self._scratch.glob("*.lock"):
+            lock = FileLock(path, blocking=False)
+            with suppress(Timeout, OSError), lock:
+                shutil.rmtree(path.with_suffix(""), ignore_errors=True)
+                path.unlink(missing_ok=True)
+
+    def _holder(self) -> str:
+        try:
+            holder = json.loads((self.own / "holder.json").read_text(encoding="utf-8"))
+            return f" (process {holder['process']} on {holder['host']}, since {holder['since']})"
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            return ""
+
+    # -- inputs -------------------------------------------------------------------------------------------------------
+
+    def input(self, path: Path | str) -> Input:
+        """A file as it is now.
+
+        Raises
+        ------
+        OutputError
+            Where this program has written it into this folder.
+        """
+        shown = os.fspath(path)
+        try:
+            found = os.stat(path)
+        except (OSError, ValueError):
+            return Input(shown, "")
+        self._require_no_output(shown)
+        if not stat.S_ISREG(found.st_mode):
+            return Input(shown, "")
+        place = os.path.abspath(path)
+        self._identities |= {(found.st_dev, found.st_ino): place}
+        with suppress(OSError):
+            link = os.lstat(path)
+            self._identities |= {(link.st_dev, link.st_ino): place}
+        seen = [found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino]
+        known = self._cache.get(place)
+        if known and known[:-1] == seen:
+            digest = known[-1]
+        else:
+            try:
+                digest = sha256_of(path)
+            except OSError:
+                return Input(shown, "", found.st_size, found.st_mtime_ns)
+            settled = time.time() - max(found.st_mtime, found.st_ctime) > UNSETTLED
+            self._cache[place] = [*(seen if settled else [0, 0, 0, 0]), digest]
+        return Input(shown, digest, found.st_size, found.st_mtime_ns)
+
+    def _require_no_output(self, path: str) -> None:
+        real, output = os.path.realpath(path), os.path.realpath(self.output)
+        if not real.startswith(output + os.sep):
+            return
+        inside = Path(real).relative_to(output)
+        if inside.parts[0] == OWN:
+            raise OutputError(f"{path}: this input lies in {self.own}, where the program works; move it elsewhere")
+        if any(self._published(inside.as_posix())):
+            raise OutputError(f"{path}: this input was written by a run into this folder; choose another with --output")
+
+    # -- results ------------------------------------------------------------------------------------------------------
+
+    def result(self, key: str, *, thoroughly: bool = False) -> Result | None:
+        """What the task of a key made; None where it is not there, or damaged.
+
+        With `thoroughly` the content of all files is looked at, otherwise of those that changed since they were made.
+        """
+        folder = f"{self._results}/{key}"
+        try:
+            with open(f"{folder}/{INDEX}", "rb") as stream:
+                index = json.loads(stream.read())
+            for name, (size, mtime, digest) in index["files"].items():
+                found = os.lstat(f"{folder}/{name}")
+                if not stat.S_ISREG(found.st_mode) or found.st_size != size:
+                    return None
+                if (found.st_mtime_ns != mtime or thoroughly) and sha256_of(f"{folder}/{name}") != digest:
+                    return None
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return None
+        return Result(Path(folder), index)
+
+    def folder_of(self, key: str) -> Path:
+        """Where the result of a key is, if it is there."""
+        return self._results / key
+
+    def keep(self, task: Task, key: str, made: Path, index: Mapping[str, Any]) -> Result:
+        """Take a folder as the result of a task. Raises OSError where that cannot be."""
+        made_of = {
+            "step": task.step.name,
+            "versions": task.step.versions,
+            "inputs": {one.path: one.sha256 for one in task.inputs},
+            "after": list(task.after),
+        }
+        content = {**index, "made_of": {**made_of, "parameters": to_plain(task.parameters)}}
+        (made / INDEX).write_text(json.dumps(content), encoding="utf-8")
+        target = self._results / key
+        try:
+            os.rename(made, target)
+        except OSError:
+            if self.result(key):  # Another worker was quicker.
+                shutil.rmtree(made, ignore_errors=True)
+            else:
+                self.discard(key)
+                self._results.mkdir(exist_ok=True)  # A worker that made nothing may have taken it away.
+                os.rename(made, target)
+        self._append(self.own / "latest.jsonl", [{"name": task.name, "key": key}])
+        return Result(target, content)
+
+    def discard(self, key: str) -> None:
+        """Delete a result."""
+        place, away = self._results / key, self.new_scratch()
+        if not os.path.lexists(place):
+            return
+        with suppress(FileNotFoundError):
+            os.rename(place, away)
+        shutil.rmtree(away, ignore_errors=True)
+        with suppress(OSError):
+            away.unlink()
+
+    def sweep(self, wanted: Iterable[str]) -> None:
+        """Delete results that are not among these, and older than a week."""
+        wanted = frozenset(wanted)
+        for entry in os.scandir(self._results):
+            if entry.name not in wanted and time.time() - entry.stat(follow_symlinks=False).st_mtime > KEPT:
+                self.discard(entry.name)
+
+    def latest(self) -> dict[str, str]:
+        """Task to the key of its last result, of all tasks that were ever done."""
+        return {line["name"]: line["key"] for line in _lines(self.own / "latest.jsonl") if {"name", "key"} <= {*line}}
+
+    # -- published files ----------------------------------------------------------------------------------------------
+
+    def is_published(self, task: Task, result: Result) -> bool:
+        """Whether all files that a task publishes are in place, and are those of this result."""
+        return all(self._is_same(f"{result.folder}/{name}", path) for name, path in task.publish.items())
+
+    def strangers(self, task: Task, result: Result | None) -> list[str]:
+        """The paths where a task would replace a file that this program has not written, or that was edited since.
+
+        Raises
+        ------
+        OutputError
+            Where there is an input, or a folder, or a file where a folder must be: nothing of that is ever replaced.
+        """
+        return [
+            path
+            for name, path in task.publish.items()
+            if not (result and self._is_same(f"{result.folder}/{name}", path)) and not self._is_ours(path)
+        ]
+
+    def publish(self, task: Task, result: Result) -> None:
+        """Put files of a result where they belong.
+
+        Raises
+        ------
+        OutputError
+            Where something is there that must not be replaced; what was put in place before that stays.
+        OSError
+        """
+        if not self.overwrite and (found := self.strangers(task, result)):
+            raise OutputError(not_written([os.fspath(self.output / path) for path in found]))
+        for name, path in task.publish.items():
+            original, target = result.folder / name, self.output / path
+            if self._is_same(os.fspath(original), path):
+                continue
+            self._is_ours(path)  # Raises OutputError for inputs and folders.
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if not Path(os.path.realpath(target.parent)).is_relative_to(os.path.realpath(self.output)):
+                raise OutputError(f"{target.parent}: this leads out of the output folder; choose another with --output")
+            found, (_, _, digest) = os.lstat(original), result.index["files"][name]
+            line = {"path": path, "size": found.st_size, "mtime_ns": found.st_mtime_ns, "sha256": digest}
+            # Killed from here on, what was moved is known to be the program's own.
+            self._append(self._record_of(path), [line])
+            beside = self.new_scratch()
+            try:
+                os.link(original, beside)
+            except OSError:  # This file system has no links.
+                shutil.copy2(original, beside)
+            try:
+                os.replace(beside, target)
+            except OSError as error:
+                beside.unlink(missing_ok=True)
+                if error.errno != errno.EXDEV:
+                    raise OSError(error.errno, error.strerror, os.fspath(target)) from None
+                with written_beside(target) as near:
+                    shutil.copy2(original, near)
+
+    def withdraw(self, paths: Iterable[str]) -> None:
+        """Delete files of this program that nobody wants any more, and folders that are empty then."""
+        for path in paths:
+            with suppress(OSError, OutputError):
+                if not self._is_ours(path) or not (self.output / path).is_file():
+                    continue
+                (self.output / path).unlink()
+                for folder in (self.output / path).parents:
+                    if folder == self.output or not _remove_if_empty(folder):
+                        break
+
+    def _is_same(self, original: str, path: str) -> bool:
+        """Whether a published file is that of a result: the same, or a copy."""
+        try:
+            wanted, found = os.lstat(original), os.lstat(f"{self.output}/{path}")
+        except OSError:
+            return False
+        return stat.S_ISREG(found.st_mode) and (
+            (wanted.st_size, wanted.st_mtime_ns) == (found.st_size, found.st_mtime_ns)
+        )
+
+    def _is_ours(self, path: str) -> bool:
+        """Whether at a path there is nothing, or what this program wrote. Raises OutputError for what always stays."""
+        target = f"{self.output}/{path}"
+        try:
+            found = os.lstat(target)
+        except FileNotFoundError:
+            return True
+        except NotADirectoryError:
+            found = None
+        if found is None or stat.S_ISDIR(found.st_mode):
+            kind = "a folder where a file" if found else "a file where a folder"
+            raise OutputError(f"{target}: there is {kind} goes; move it, or choose another folder with --output")
+        if source := self._identities.get((found.st_dev, found.st_ino)):
+            raise OutputError(f"{source}: this input lies where {target} goes; choose another folder with --output")
+        if not stat.S_ISREG(found.st_mode):
+            return False
+        lines = [line for line in self._published(path) if line["size"] == found.st_size]
+        if any(line["mtime_ns"] == found.st_mtime_ns for line in lines):
+            return True
+        return bool(lines) and sha256_of(target) in {line["sha256"] for line in lines}
+
+    def _record_of(self, path: str) -> Path:
+        """The file of the record of what was published into the same folder."""
+        folder = path.rpartition("/")[0].casefold()
+        return self.own / "published" / f"{uuid.uuid5(uuid.NAMESPACE_URL, folder).hex[:16]}.jsonl"
+
+    def _published(self, path: str) -> Iterator[dict[str, Any]]:
+        """What was ever published at a path, on file systems that ignore case under names that differ in it alone."""
+        wanted = {"path": str, "size": int, "mtime_ns": int, "sha256": str}
+        for line in _lines(self._record_of(path)):
+            is_whole = all(isinstance(line.get(name), kind) for name, kind in wanted.items())
+            if is_whole and line["path"].casefold() == path.casefold():
+                yield line
+
+    def _append(self, path: Path, lines: Iterable[Mapping[str, Any]]) -> None:
+        """Add lines to a file at once: of two who do so at the same time each line stays whole."""
+        text = "".join(f"{json.dumps(line)}\n" for line in lines)
+        path.parent.mkdir(exist_ok=True)
+        opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        try:
+            os.write(opened, f"\n{text}".encode())  # A line that was cut off ends here.
+        finally:
+            os.close(opened)
+
+
+def not_written(paths: list[str]) -> str:
+    """What to say of files in the way that this program has not written."""
+    some = ", ".join(paths[:3]) + (f" and {len(paths) - 3} more" if len(paths) > 3 else "")
+    were, them = ("was", "it") if len(paths) == 1 else ("were", "them")
+    return (
+        f"{some} {were} not written by this program, or edited since; choose another folder with --output, or replace "
+        f"{them} with --overwrite"
+    )
+
+
+def inputs_known(output: Path) -> dict[str, str]:
+    """The inputs of the runs into a folder: path to SHA-256."""
+    return {path: seen[-1] for path, seen in _inputs_known(output).items()}
+
+
+def _inputs_known(output: Path) -> dict[str, list[Any]]:
+    try:
+        content = json.loads((output / OWN / "inputs.json").read_text(encoding="utf-8"))
+        return {path: seen for path, seen in content.items() if len(seen) == 5 and isinstance(seen[-1], str)}
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        return {}
+
+
+def _lines(path: Path) -> Iterator[dict[str, Any]]:
+    """The objects of a file with a line of JSON for each; lines that are damaged are left out."""
+    try:
+        if not stat.S_ISREG(os.lstat(path).st_mode):
+            return
+        text = path.read_bytes()
+    except OSError:
+        return
+    for line in text.splitlines():
+        with suppress(ValueError, RecursionError):
+            if isinstance(content := json.loads(line), dict):
+                yield content
+
+
+def _remove_if_empty(folder: Path) -> bool:
+    try:
+        folder.rmdir()
+    except OSError:
+        return False
+    return True

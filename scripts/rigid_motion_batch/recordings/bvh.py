@@ -1,0 +1,349 @@
+"""BVH: a hierarchy of joints with offsets and channels, and a row of channel values for every frame.
+
+Without a name it is the whole body. The poses of joints that are named are their world poses: a joint without any
+rotation has the world's axes. Positions are in the file's unit, which BVH does not tell; angles are degrees, applied in
+the order of the channels. Position channels replace the joint's offset, as Blender's importer has it. That importer
+itself is not used: it works in single precision, needs Blender, and a file that it cannot read ends in an IndexError
+or, unnoticed, in a wrong skeleton.
+Source: Meredith and Maddock, Motion capture file formats explained, Sheffield 2001.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import placed
+from rigid_motion.motion.quaternions import align_signs
+from rigid_motion_batch.recordings.figures import Figure
+
+from .euler import quaternions_from_intrinsic_eulers
+from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
+from .tables import lines_of, parse_rows
+
+CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
+
+MOST_JOINTS = 3000
+"""Of a body, three times what the most detailed rigs have. With more, what follows takes minutes."""
+
+DEEPEST = 500
+"""Joints that hang on one another: five times what the longest tails have."""
+
+MOST_POSES = 50_000_000
+"""Of all joints together: a file may hold any number of joints and frames in little space."""
+
+LONGEST_NAME = 100
+"""Words of a joint's name."""
+
+
+@dataclass
+class Joint:
+    """One joint of the hierarchy."""
+
+    name: str
+    parent: int | None
+    """The index of the parent, which is lower than its own. None for a root."""
+
+    offset: tuple[float, ...] = (0.0, 0.0, 0.0)
+    channels: list[tuple[str, str]] = field(default_factory=list)
+    """Axis and kind, in the order of the file: ("Z", "rotation")."""
+
+    end: tuple[float, ...] | None = None
+    """The offset of its end site, where it has one."""
+
+
+def read(path: Path, selection: Selection) -> list[Trajectory]:
+    """The whole body; or joints that are named, or all, in the order of the file. A single joint is no body."""
+    joints, motion = _read_hierarchy(path)
+    names = [joint.name for joint in joints]
+    as_body = selection.wanted is None and len(joints) > 1
+    taken = names if as_body else selection.of(names)
+    values, frame_time, warnings = _read_motion(path, motion, joints)
+    if len(taken) * len(values) > MOST_POSES:
+        problem = f"{len(taken)} joints in {len(values)} frames are more than {MOST_POSES} poses"
+        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
+    # What is not finite in the file is not in the poses either, and no news.
+    with np.errstate(invalid="ignore", over="ignore"):
+        times = np.arange(len(values)) * frame_time
+        if as_body:
+            body = Trajectory(path.stem, times, _local_poses(joints, values), figure=figure_of(joints))
+            return [replace(body, warnings=warnings)]
+        poses = world_poses(joints, values, taken)
+    first, *others = (Trajectory(name, times, poses[name]) for name in taken)
+    return [replace(first, warnings=warnings), *others]
+
+
+def figure_of(joints: list[Joint]) -> Figure:
+    """The body of a hierarchy at rest, where no joint is turned: every bone ends in the middle of its children."""
+    parents = np.array([-1 if joint.parent is None else joint.parent for joint in joints])
+    offsets = np.array([joint.offset for joint in joints])
+    places, tails, ends = offsets.copy(), np.zeros_like(offsets), np.zeros(len(joints))
+    for index, joint in enumerate(joints):
+        if joint.parent is not None:
+            places[index] += places[joint.parent]
+            tails[joint.parent] += offsets[index]
+            ends[joint.parent] += 1
+        if joint.end is not None:
+            tails[index] += joint.end
+            ends[index] += 1
+    tails /= np.maximum(ends, 1.0)[:, None]
+    unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(joints), 1))
+    return Figure(tuple(joint.name for joint in joints), parents, Poses(places, unturned), tails)
+
+
+def world_poses(joints: list[Joint], values: np.ndarray, wanted: Iterable[str]) -> dict[str, Poses]:
+    """Forward kinematics: the world poses of some joints.
+
+    Parameters
+    ----------
+    joints : list of Joint
+        Parents before their children, names unique.
+    values : array, shape (n, channels of all joints)
+    wanted : iterable of str
+        Names of joints.
+
+    Returns
+    -------
+    dict of Poses, each of shape (n,)
+        By name, in the order of `joints`.
+    """
+    wanted = set(wanted)
+    begins = _begins(joints)
+    children = Counter(_needed(joints, wanted))
+    world: dict[int, Poses] = {}
+    for index, joint in enumerate(joints):
+        if joint.name not in wanted and not children[index]:
+            continue
+        own = _local(joint, values[:, begins[index] : begins[index + 1]])
+        world[index] = own if joint.parent is None else placed(world[joint.parent], own)
+        # An hour of a whole skeleton is much: what nothing more hangs on is let go.
+        children[joint.parent] -= 1
+        if joint.parent is not None and not children[joint.parent] and joints[joint.parent].name not in wanted:
+            del world[joint.parent]
+    return {joints[index].name: poses for index, poses in world.items()}
+
+
+def _needed(joints: list[Joint], wanted: set[str]) -> Iterator[int | None]:
+    """The parent of each joint that is wanted or carries a wanted one, once for each such joint."""
+    carrying = [joint.name in wanted for joint in joints]
+    for index in reversed(range(len(joints))):
+        if carrying[index]:
+            parent = joints[index].parent
+            yield parent
+            if parent is not None:
+                carrying[parent] = True
+
+
+def _local_poses(joints: list[Joint], values: np.ndarray) -> Poses:
+    """All joints in their parents' space, shape (joints, n), from values of shape (n, channels of all joints).
+
+    The signs of quaternions that Euler angles give say nothing, and are aligned.
+    """
+    begins = _begins(joints)
+    poses = Poses(np.empty((len(joints), len(values), 3)), np.empty((len(joints), len(values), 4)))
+    for index, joint in enumerate(joints):
+        poses[index] = _local(joint, values[:, begins[index] : begins[index + 1]])
+    return Poses(poses.positions, align_signs(poses.quaternions))
+
+
+def _begins(joints: list[Joint]) -> list[int]:
+    """The first column of each joint, and the end of the last one."""
+    return np.cumsum([0, *(len(joint.channels) for joint in joints)]).tolist()
+
+
+def _local(joint: Joint, own: np.ndarray) -> Poses:
+    """A joint's poses in its parent's space, from its own channels (n, channels)."""
+    positions = np.tile(joint.offset, (len(own), 1))
+    turns = []
+    for column, (axis, kind) in enumerate(joint.channels):
+        if kind == "position":
+            positions[:, "XYZ".index(axis)] = own[:, column]
+        else:
+            turns.append(column)
+    order = "".join(joint.channels[column][0] for column in turns)
+    return Poses(positions, quaternions_from_intrinsic_eulers(np.radians(own[:, turns]), order))
+
+
+class _Words:
+    """The words of the hierarchy, one after another, with the line that each is in."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.line = 1
+        self._words = self._split()
+
+    def _split(self) -> Iterator[str]:
+        for number, line in lines_of(self.path):
+            self.line = number
+            yield from line.replace("{", " { ").replace("}", " } ").split()
+
+    def next(self, expected: str) -> str:
+        word = next(self._words, None)
+        if word is None:
+            self.fail(f"the file ends where {expected} is expected")
+        return word
+
+    def number(self, expected: str) -> float:
+        word = self.next(expected)
+        try:
+            number = float(word)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            self.fail(f"{shown(word)} where {expected} is expected")
+        return number
+
+    def until_brace(self) -> str:
+        words = []
+        while (word := self.next("{")) != "{":
+            words.append(word)
+            if len(words) > LONGEST_NAME:
+                self.fail("a { is missing behind a name")
+        return "_".join(words)
+
+    def fail(self, problem: str, way_out: str = "export the BVH again") -> NoReturn:
+        raise TrajectoryError(self.path, problem, way_out, self.line)
+
+
+def _read_hierarchy(path: Path) -> tuple[list[Joint], int]:
+    """The joints with unique names, and the line of the word MOTION."""
+    words = _Words(path)
+    first = words.next("HIERARCHY")
+    if first.upper() != "HIERARCHY":
+        words.fail(f"a BVH file begins with HIERARCHY, not with {shown(first)}")
+    joints: list[Joint] = []
+    # The joints that are open, innermost last. An end site has no pose of its own and is None.
+    opened: list[int | None] = []
+    while (word := words.next("MOTION")).upper() != "MOTION":
+        if len(joints) > MOST_JOINTS:
+            words.fail(f"more than {MOST_JOINTS} joints", "export fewer, such as one body at a time")
+        if len(opened) > DEEPEST:
+            words.fail(f"more than {DEEPEST} joints hang on one another", "export a shorter chain")
+        joint = joints[opened[-1]] if opened and opened[-1] is not None else None
+        match word.upper():
+            case "ROOT" if not opened:
+                joints.append(Joint(words.until_brace(), None))
+                opened.append(len(joints) - 1)
+            case "JOINT" if joint:
+                joints.append(Joint(words.until_brace(), opened[-1]))
+                opened.append(len(joints) - 1)
+            case "END" if joint:
+                words.until_brace()
+                opened.append(None)
+            case "OFFSET" if opened:
+                offset = tuple(words.number("a number of the OFFSET") for _ in range(3))
+                if joint:
+                    joint.offset = offset
+                else:
+                    joints[opened[-2]].end = offset
+            case "CHANNELS" if joint and not joint.channels:
+                joint.channels = _read_channels(words)
+            case "}" if opened:
+                opened.pop()
+            case _:
+                words.fail(f"{shown(word)} is out of place")
+    if opened:
+        words.fail("a } is missing before MOTION")
+    if not joints:
+        words.fail("no ROOT before MOTION")
+    for joint, name in zip(joints, unique([joint.name or "joint" for joint in joints]), strict=True):
+        joint.name = name
+    return joints, words.line
+
+
+def _read_channels(words: _Words) -> list[tuple[str, str]]:
+    count = words.number("the number of CHANNELS")
+    if count not in range(len(CHANNELS) + 1):
+        words.fail(f"{count:g} CHANNELS for a joint")
+    names = [words.next("the name of a channel") for _ in range(int(count))]
+    for name in names:
+        if name.lower() not in CHANNELS:
+            words.fail(f"{shown(name)} is no channel")
+    channels = [CHANNELS[name.lower()] for name in names]
+    if len(set(channels)) < len(channels):
+        words.fail("a channel occurs twice in a joint")
+    return channels
+
+
+def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[str, ...]]:
+    """What is behind the line `motion`.
+
+    Returns
+    -------
+    values : array, shape (frames, channels)
+    frame_time : float
+        Seconds between frames.
+    warnings : tuple of str
+        Where there are more or fewer frames than the file says.
+    """
+    cut: list[tuple[int, str]] = []
+    rows = _finished(lines_of(path, after=motion), cut)
+    settings = list(islice(rows, 2))
+    count = _read_setting(path, settings[:1], "Frames:", motion)
+    frame_time = _read_setting(path, settings[1:], "Frame Time:", motion)
+    labels = [f"{joint.name} {axis}{kind}" for joint in joints for axis, kind in joint.channels]
+    if not labels:
+        raise TrajectoryError(path, "no joint has CHANNELS", "export the BVH again", motion)
+    columns = {label: index for index, label in enumerate(labels)}
+    values = parse_rows(path, rows, None, columns, len(columns))
+    warnings = []
+    if cut:
+        lost = _is_cut_off(cut[0][1], len(columns))
+        if not lost:
+            last = parse_rows(path, cut, None, columns, len(columns))
+            # Where more were to come, its last number may lack digits.
+            lost = len(values) + 1 < count
+            values = values if lost else np.concatenate((values, last))
+        if lost:
+            warnings.append(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out")
+    if count != len(values):
+        told = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
+        warnings.append(f"{path.name}:{settings[0][0]}: {told}; export the BVH again if that is not all")
+    return values, frame_time, tuple(warnings)
+
+
+def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers, without blank ones and blanks around them; a last one without an end goes to a list."""
+    before = None
+    for number, line in lines:
+        if before:
+            yield before
+        before = (number, text) if (text := line.strip()) else None
+    if before:
+        unfinished.append(before)
+
+
+def _is_cut_off(row: str, width: int) -> bool:
+    """Whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
+    *cells, last = row.split()
+    return all(map(_is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not _is_number(last))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:
+    """The positive number behind `name` in a row, which is empty where the file has ended at the line `motion`."""
+    number, text = row[0] if row else (motion, "")
+    label, _, value = text.partition(":")
+    try:
+        setting = float(value)
+    except ValueError:
+        setting = math.nan
+    if " ".join(label.split()).lower() != name.lower().rstrip(":") or not 0.0 < setting < math.inf:
+        problem = f"{shown(text)} where {name} and a positive number are expected"
+        raise TrajectoryError(path, problem, "export the BVH again", number)
+    return setting

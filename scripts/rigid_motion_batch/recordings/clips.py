@@ -1,0 +1,74 @@
+"""Clips: what a comparison is about, the motion of one rigid body, or of a whole figure of joints, in one recording.
+
+Times are seconds and poses are in the recording's own axes and units, repaired. Errors are in metres and do not depend
+on the axes; only what Blender shows is converted (`rigid_motion_batch.axes`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.recordings.figures import Figure
+
+
+@dataclass(frozen=True)
+class ClipWarning:
+    """What changes the meaning of the numbers, and what to do about it."""
+
+    text: str
+    way_out: str
+    start_s: float | None = None
+    """Where in the recording that is, in seconds of its times; None where it is everywhere."""
+
+    end_s: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """One body of one recording, of n samples."""
+
+    name: str
+    """Unique among the clips of a run, and safe as the name of a folder."""
+
+    source: str
+    """What the user gave: the file, and the body where one was named."""
+
+    axes: str
+    """The convention of the recording: a name in `rigid_motion_batch.axes.AXES`."""
+
+    times: np.ndarray
+    """Seconds, strictly rising, shape (n,)."""
+
+    poses: Poses
+    """Shape (n,), signs aligned. Of a figure shape (joints, n), each joint's in its parent's space."""
+
+    repairs: tuple[str, ...]
+    """What is hard to believe of the recording, and what had to be repaired in it, a sentence each."""
+
+    metres_per_unit: float = 1.0
+    """The length of the recording's unit. Errors, and what Blender shows, are in metres."""
+
+    body: str = ""
+    """The body that the user asked for by name. It becomes part of the clip's where another clip has the same."""
+
+    figure: Figure | None = None
+    """What a whole body is made of; None for a single rigid body."""
+
+    rate: float | None = None
+    """Samples a second, where there may be more between these."""
+
+    warnings: tuple[ClipWarning, ...] = ()
+
+    @property
+    def samples_a_second(self) -> float:
+        """The rate of the recording, which tells it or has it between most samples."""
+        return self.rate or 1.0 / float(np.median(np.diff(self.times)))
+
+    def in_metres(self, poses: Poses) -> Poses:
+        """Poses of this clip with positions in metres."""
+        if self.metres_per_unit == 1.0:
+            return poses
+        return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)

@@ -1,0 +1,172 @@
+"""What reading gives: the trajectories of the bodies that were asked for, the names of the others, or one clear error.
+
+Times are seconds; positions are in the unit of the file; quaternions are w, x, y, z with the signs of the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.recordings.figures import Figure
+
+ALL = "*"
+"""Asks for every body of a file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """One body of one file, exactly as recorded: unrepaired, native axes, units and signs."""
+
+    name: str
+    """The body: CSV file stem, Motive rigid body, A-Frame device, BVH joint, Blender object, or OBJECT/BONE."""
+
+    times: np.ndarray
+    """Seconds, shape (n,). Neither rising nor finite unless the recording is sound."""
+
+    poses: Poses
+    """Shape (n,). A sample that was not tracked is NaN; scales are None unless the file has one that is not 1.
+
+    Of a whole body shape (joints, n), each joint's in its parent's space, without scales."""
+
+    metres_per_unit: float = 1.0
+    """The length of one unit of the positions, where the file tells it; 1 otherwise."""
+
+    remark: str = ""
+    """What whoever asked for this body should know of it."""
+
+    warnings: tuple[str, ...] = ()
+    """What is hard to believe of this recording, a sentence each with the way out."""
+
+    dated: bool = False
+    """Whether its times were dates or clock times, whose unit nobody can mistake."""
+
+    figure: Figure | None = None
+    """Of a whole body, what it is made of."""
+
+    rate: float | None = None
+    """Samples a second, where there may be more between these."""
+
+    @property
+    def rigid(self) -> Poses:
+        """A single rigid body of it, shape (n,): of a whole body its first root."""
+        return self.poses if self.figure is None else self.poses[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What was read of a file."""
+
+    path: Path
+
+    trajectories: tuple[Trajectory, ...]
+    """The bodies that were asked for, in the order of the file."""
+
+    others: tuple[str, ...] = ()
+    """The names of the bodies that were left."""
+
+    note: str = ""
+    """For a file of several bodies of which none was named: what was taken, what is left, how to name it. And what
+    there is to say of those that were taken."""
+
+    body: str = ""
+    """The body that was asked for by name; empty where the first was, or all."""
+
+    axes: str = "blender"
+    """The convention of its format: a name in `axes.AXES`."""
+
+
+class TrajectoryError(ValueError):
+    """Why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
+
+    def __init__(self, path: Path | str, problem: str, way_out: str, line: int | None = None) -> None:
+        where = f"{path}:{line}" if line else f"{path}"
+        self.problem = printable(problem)
+        super().__init__(printable(f"{where}: {problem}; {way_out}"))
+
+
+class Selection:
+    """Which bodies of a file are wanted: the first, all, or one by name."""
+
+    def __init__(self, path: Path, wanted: str | None) -> None:
+        self.path = path
+        self.wanted = wanted
+        self.names: tuple[str, ...] = ()
+
+    def of(self, names: Sequence[str], unlisted: Sequence[str] = (), more: int = 0) -> list[str]:
+        """The wanted ones among the bodies of the file.
+
+        Parameters
+        ----------
+        names : sequence of str
+            The bodies, in the order of the file.
+        unlisted : sequence of str
+            More bodies, to be had by name only.
+        more : int
+            How many of those there are besides, which an error counts and does not name.
+
+        Raises
+        ------
+        TrajectoryError
+            Where the file has no body of that name, or none at all.
+        """
+        self.names = tuple(names)
+        if self.wanted in (None, ALL):
+            if not names:
+                way_out = (
+                    f"name one with {self.path}:NAME: {listed(unlisted, more=more)}"
+                    if unlisted
+                    else "record at least one"
+                )
+                raise TrajectoryError(self.path, "no moving body in this file", way_out)
+            return list(names) if self.wanted == ALL else [names[0]]
+        if self.wanted not in names and self.wanted not in unlisted:
+            way_out = f"it holds {listed([*names, *unlisted], more=more)}"
+            raise TrajectoryError(self.path, f"no body named {shown(self.wanted)}", way_out)
+        return [self.wanted]
+
+    def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
+        """The result, with what there is to say about the bodies that were taken, and those that were not."""
+        taken = {trajectory.name for trajectory in trajectories}
+        others = tuple(name for name in self.names if name not in taken)
+        notes = [trajectory.remark for trajectory in trajectories if trajectory.remark]
+        if others and self.wanted is None:
+            notes.append(
+                f"{self.path} holds {len(self.names)} bodies; took {self.names[0]}; others: {listed(others)}; "
+                f"name one with {self.path}:NAME, all with {self.path}:{ALL}"
+            )
+        named = "" if self.wanted in (None, ALL) else self.wanted
+        return Recording(self.path, tuple(trajectories), others, printable("; ".join(notes)), named)
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """The names, a repeated one numbered as Blender does: Hand, Hand.001, Hand.002."""
+    result: list[str] = []
+    unavailable = set(names)
+    numbers: dict[str, int] = {}
+    for name in names:
+        candidate = name
+        if name in numbers:
+            while candidate in unavailable:
+                numbers[name] += 1
+                candidate = f"{name}.{numbers[name]:03d}"
+            unavailable.add(candidate)
+        numbers.setdefault(name, 0)
+        result.append(candidate)
+    return result
+
+
+def listed(names: Sequence[str], limit: int = 30, more: int = 0) -> str:
+    """The names with commas, cut off where they become too many to read; `more` there are that are not among them."""
+    shown_names, left = ", ".join(names[:limit]), max(len(names) - limit, 0) + more
+    return f"{shown_names} and {left} more" if left else shown_names
+
+
+def shown(text: str, limit: int = 24) -> str:
+    """A piece of a file, in quotes and short enough for a line of error."""
+    return repr(text if len(text) <= limit else f"{text[:limit]}...")

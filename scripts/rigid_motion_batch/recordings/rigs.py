@@ -1,0 +1,319 @@
+"""Armatures of the open Blender: their bones as the joints of a body, where Blender shows them.
+
+Matrices of Blender are in single precision, and may scale and shear. Of a joint the position is kept as it is, and of
+its axes the direction of the bone (y); x is made square to it, z square to both, and all of length 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import align_signs, conjugate, rotate
+from rigid_motion_batch.recordings.figures import Figure, size_of, unit_of
+
+from .bvh import MOST_POSES
+from .recordings import Trajectory, TrajectoryError, shown
+from .sampling import OF_JOINTS, Moments, sampled
+from .skins import carried_by, skin_of
+from .stages import probe
+
+if TYPE_CHECKING:
+    import bpy
+
+LAST_FRAME = 1048574
+"""Blender goes no further; a damaged file could, and would keep it at work for hours."""
+
+BLOCK = 256
+"""Frames whose matrices are kept at once."""
+
+SHORTEST_AXIS = 1e-12
+"""An axis that is shorter has no direction: bones are hidden by scaling them to nothing."""
+
+
+@dataclass(frozen=True)
+class Joints:
+    """The bones of an armature that count."""
+
+    names: tuple[str, ...]
+    parents: np.ndarray
+    """Shape (joints,): the number of the nearest bone above that counts, -1 for none."""
+
+    left_out: tuple[str, ...] = ()
+    """Bones that deform nothing, and only control others."""
+
+    @property
+    def remark(self) -> str:
+        count = len(self.names)
+        return f"took the {count} bones that deform of {count + len(self.left_out)}" if self.left_out else ""
+
+
+def joints_of(rig: bpy.types.Object) -> Joints:
+    """The bones that deform, if any do, or else all; parents before their children."""
+    bones = list(rig.data.bones)  # Blender lists the hierarchy from its roots on.
+    kept = [bone for bone in bones if bone.use_deform] or bones
+    numbers = {bone.name: number for number, bone in enumerate(kept)}
+    nearest: dict[str, int] = {}
+    for bone in bones:
+        above = nearest[bone.parent.name] if bone.parent else -1
+        nearest[bone.name] = numbers.get(bone.name, above)
+    parents = [nearest[bone.parent.name] if bone.parent else -1 for bone in kept]
+    left = tuple(bone.name for bone in bones if bone.name not in numbers)
+    return Joints(tuple(numbers), np.array(parents, dtype=np.int64), left)
+
+
+def whole_body(
+    path: Path,
+    rig: bpy.types.Object,
+    name: str,
+    moments: Moments,
+    metres_per_unit: float = 1.0,
+    scale: float | None = None,
+    *,
+    made_up: bool = False,
+) -> Trajectory:
+    """The whole skeleton of an armature, and the skin that it carries.
+
+    Parameters
+    ----------
+    path : Path
+        The file that it is of, for errors.
+    rig : bpy.types.Object
+        An armature, of the open file or linked.
+    name : str
+        What the body is to be called.
+    moments : Moments
+        Where it is looked at; and between them where it bends.
+    metres_per_unit : float
+    scale : float, optional
+        The same as the user says it. Without, a size tells whether it can be.
+    made_up : bool
+        Whether an importer made up where the bones end.
+
+    Raises
+    ------
+    TrajectoryError
+        Where it has no bones, or too many for so many frames.
+    """
+    joints = joints_of(rig)
+    if not joints.names:
+        raise TrajectoryError(path, f"{shown(rig.name)} has no bones at all", "export it again with its skeleton")
+    meshes, metres = carried_by(rig), scale or _metres(rig, metres_per_unit)
+    with looking(path, rig, joints.names, meshes) as look:
+        seen = sampled(moments, look, joints.parents, OF_JOINTS, metres)
+    # What a damaged file has beyond all measure is for the repair to say.
+    with np.errstate(invalid="ignore", over="ignore"):
+        figure = _figure(rig, joints, look.first, meshes, made_up=made_up)
+        poses = _in_parents(_filled(seen.poses), joints.parents)
+    body = Trajectory(name, moments.times(seen.frames), poses, metres_per_unit, joints.remark, figure=figure)
+    return seen.told(body, moments, metres)
+
+
+def single_joints(
+    path: Path, rig: bpy.types.Object, bones: Sequence[str], moments: Moments, scale: float | None = None
+) -> list[Trajectory]:
+    """The motions of some bones in the world, a trajectory each; otherwise as `whole_body`."""
+    metres = scale or _metres(rig, 1.0)
+    with looking(path, rig, bones) as look:
+        seen = sampled(moments, look, np.full(len(bones), -1), OF_JOINTS, metres)
+    times, poses = moments.times(seen.frames), _filled(seen.poses)
+    rate = moments.fps / moments.step
+    first, *others = (
+        Trajectory(name, times, Poses(poses.positions[joint], align_signs(poses.quaternions[joint])), rate=rate)
+        for joint, name in enumerate(bones)
+    )
+    return [seen.told(first, moments, metres), *others]
+
+
+def _metres(rig: bpy.types.Object, metres_per_unit: float) -> float:
+    """The length of the unit that a rig is likely to be in, from where its joints rest."""
+    joints, there = joints_of(rig), _matrix(rig)
+    with np.errstate(invalid="ignore", over="ignore"):
+        heads = np.array([rig.data.bones[name].head_local for name in joints.names]) @ there[:3, :3].T
+        size = size_of(joints.parents, heads) * metres_per_unit
+    return metres_per_unit * (unit_of(size)[1] if np.isfinite(size) else 1.0)
+
+
+@contextmanager
+def looking(
+    path: Path, rig: bpy.types.Object, bones: Sequence[str], followed: Sequence[bpy.types.Object] = ()
+) -> Iterator[_Look]:
+    """Look at bones in the world, with everything that moves them; `followed` are evaluated as well."""
+    with probe() as obj:
+        # The bones are evaluated that something depends on.
+        held = obj.constraints.new("ARMATURE")
+        for bone in bones:
+            target = held.targets.new()
+            target.target, target.subtarget = rig, bone
+        for other in followed:
+            obj.constraints.new("COPY_TRANSFORMS").target = other
+        yield _Look(path, rig, bones, followed)
+
+
+@dataclass(eq=False)
+class _Look:
+    """What is seen of the bones of an armature."""
+
+    path: Path
+    rig: bpy.types.Object
+    bones: Sequence[str]
+    followed: Sequence[bpy.types.Object]
+    first: dict[bpy.types.Object, np.ndarray] = field(default_factory=dict)
+    """Where the armature and what else is followed were at first, shape (4, 4) each."""
+
+    def __call__(self, frames: np.ndarray) -> Poses:
+        """The bones on some frames (n,), shape (bones, n): NaN is the quaternion of one that has no direction.
+
+        Raises
+        ------
+        TrajectoryError
+            Where that is too much, or beyond where Blender goes, or where the pose of the armature lacks a bone.
+        """
+        import bpy
+
+        refuse_too_many(self.path, self.rig.name, len(self.bones), frames)
+        count = len(self.bones)
+        poses = Poses(np.empty((count, len(frames), 3)), np.empty((count, len(frames), 4)))
+        matrices = np.empty((min(BLOCK, len(frames)), count, 4, 4))
+        scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+        rows = None
+        for number, frame in enumerate(frames.tolist()):
+            whole = int(np.floor(frame))
+            scene.frame_set(whole, subframe=frame - whole)
+            seen = self.rig.evaluated_get(depsgraph)
+            if rows is None:
+                rows = _rows(self.path, seen, self.bones)
+                raw = np.empty(16 * len(seen.pose.bones), dtype=np.float32)
+                for one in (self.rig, *self.followed):
+                    self.first.setdefault(one, _matrix(one.evaluated_get(depsgraph)))
+            seen.pose.bones.foreach_get("matrix", raw)
+            row = number % BLOCK
+            # They come column by column.
+            columns = raw.reshape(-1, 4, 4)[rows].astype(np.float64)
+            with np.errstate(invalid="ignore", over="ignore"):
+                matrices[row] = _matrix(seen) @ columns.transpose(0, 2, 1)
+            if row == BLOCK - 1 or number == len(frames) - 1:
+                poses[:, number - row : number + 1] = rigid(matrices[: row + 1].transpose(1, 0, 2, 3))
+        return poses
+
+
+def _matrix(obj: bpy.types.Object) -> np.ndarray:
+    """Where an object is in the world, shape (4, 4), in double precision: NumPy takes it as Blender has it."""
+    return np.array(obj.matrix_world, dtype=np.float64)
+
+
+def refuse_too_many(path: Path, name: str, joints: int, frames: np.ndarray) -> None:
+    """Raise TrajectoryError for more than can be kept, or where Blender does not go."""
+    if not (np.abs(frames) <= LAST_FRAME).all():
+        problem = f"{shown(name)} moves from frame {frames.min():g} to {frames.max():g}, where Blender does not go"
+        raise TrajectoryError(path, problem, "delete the keys that are far off")
+    if joints * len(frames) > MOST_POSES:
+        problem = f"{joints} joints in {len(frames)} frames are more than {MOST_POSES} poses"
+        raise TrajectoryError(path, problem, f"name one joint with {path}:NAME, or split the recording")
+
+
+def rigid(matrices: np.ndarray) -> Poses:
+    """The rigid poses of matrices (..., 4, 4). NaN is the quaternion of one whose x or y axis is nothing."""
+    x, y = matrices[..., :3, 0], matrices[..., :3, 1]
+    with np.errstate(invalid="ignore", over="ignore"):
+        y = _unit(y)
+        x = _unit(x)
+        x = _unit(x - np.sum(x * y, axis=-1, keepdims=True) * y)
+        return Poses(matrices[..., :3, 3], _quaternions(np.stack([x, y, np.cross(x, y)], axis=-1)))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(lengths > SHORTEST_AXIS, lengths, np.nan)
+
+
+def _quaternions(rotations: np.ndarray) -> np.ndarray:
+    """Of rotation matrices (..., 3, 3). Each of four ways divides by one component: the largest is taken."""
+    (a, b, c), (d, e, f), (g, h, i) = (np.moveaxis(rotations[..., row, :], -1, 0) for row in range(3))
+    ways = np.stack(
+        [
+            np.stack([1.0 + a + e + i, h - f, c - g, d - b], axis=-1),
+            np.stack([h - f, 1.0 + a - e - i, b + d, c + g], axis=-1),
+            np.stack([c - g, b + d, 1.0 - a + e - i, f + h], axis=-1),
+            np.stack([d - b, c + g, f + h, 1.0 - a - e + i], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.einsum("...ii->...i", ways), axis=-1)
+    taken = np.take_along_axis(ways, largest[..., None, None], axis=-2)[..., 0, :]
+    return taken / np.linalg.norm(taken, axis=-1, keepdims=True)
+
+
+def _filled(poses: Poses) -> Poses:
+    """Poses (bones, n) in which quaternions that are none are the last before, or else the first after, or no turn."""
+    for own in poses.quaternions:
+        good = np.isfinite(own).all(axis=-1)
+        if good.all():
+            continue
+        if not good.any():
+            own[:] = (1.0, 0.0, 0.0, 0.0)
+            continue
+        last = np.maximum.accumulate(np.where(good, np.arange(len(own)), -1))
+        own[:] = own[np.where(last >= 0, last, np.argmax(good))]
+    return poses
+
+
+def _rows(path: Path, seen: bpy.types.Object, bones: Sequence[str]) -> np.ndarray:
+    """Where these bones are in the list of the pose, which has an order of its own."""
+    places = {bone.name: row for row, bone in enumerate(seen.pose.bones)} if seen.pose else {}
+    if missing := [bone for bone in bones if bone not in places]:
+        problem = f"the pose of {shown(seen.name)} lacks the bone {shown(missing[0])}"
+        raise TrajectoryError(path, problem, "save the file again from Blender")
+    return np.array([places[bone] for bone in bones])
+
+
+def _in_parents(world: Poses, parents: np.ndarray) -> Poses:
+    """Poses in the world (joints, n), each in its parent's space and without flips of signs."""
+    # Joint by joint: what is whole is large.
+    local = Poses(np.empty_like(world.positions), np.empty_like(world.quaternions))
+    for joint, parent in enumerate(parents.tolist()):
+        own = world[joint] if parent < 0 else placed(inverse(world[parent]), world[joint])
+        local.positions[joint], local.quaternions[joint] = own.positions, align_signs(own.quaternions)
+    return local
+
+
+def _figure(
+    rig: bpy.types.Object,
+    joints: Joints,
+    matrices: dict[bpy.types.Object, np.ndarray],
+    meshes: Sequence[bpy.types.Object],
+    *,
+    made_up: bool,
+) -> Figure:
+    bones, there = rig.data.bones, matrices[rig]
+    rest = rigid(there @ np.array([bones[name].matrix_local for name in joints.names]))
+    rest = _filled(Poses(rest.positions[:, None], rest.quaternions[:, None]))[:, 0]
+    ends = np.array([bones[name].tail_local for name in joints.names]) @ there[:3, :3].T + there[:3, 3]
+    tails = rotate(conjugate(rest.quaternions), ends - rest.positions)
+    largest = 0.0 if made_up else float(np.ptp(rest.positions, axis=0).max())
+    tails = _shortened(tails, rest.positions, joints.parents, largest)
+    skin = skin_of(meshes, joints.names, matrices)
+    return Figure(joints.names, joints.parents, rest, np.ascontiguousarray(tails), skin)
+
+
+def _shortened(tails: np.ndarray, heads: np.ndarray, parents: np.ndarray, largest: float) -> np.ndarray:
+    """Tails (joints, 3) of bones that reach no farther than to their children, or else as far as from their parents.
+
+    Bones up to the largest length stay: longer ones than a body is large are an importer's, where it took other units.
+    """
+    hanging = np.flatnonzero(parents >= 0)
+    gaps = np.linalg.norm(heads[hanging] - heads[parents[hanging]], axis=-1)
+    reach = np.zeros(len(parents))
+    np.maximum.at(reach, parents[hanging], gaps)
+    ends = reach[hanging] == 0.0
+    reach[hanging[ends]] = gaps[ends]
+    lengths = np.linalg.norm(tails, axis=-1)
+    longer = (reach > 0.0) & (lengths > np.maximum(reach, largest))
+    return np.where(longer[:, None], tails * (reach / np.where(longer, lengths, 1.0))[:, None], tails)

@@ -1,0 +1,155 @@
+"""Armatures: the bones of a figure as an ordinary rig, and its motion in the channels of these bones.
+
+A bone begins at its joint and points along y to where the joint's bone ends, so it is turned from the joint by a turn
+of its own. Interpolation does not mind: every mode gives the same motion in a frame that is fixed to another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from rigid_motion import animation
+from rigid_motion.motion import KEYFRAME_MODES, Poses
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import align_signs, conjugate, multiply, rotate
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.rigs import rigid
+
+LEAST_BONE = 0.02
+"""A bone is no shorter than so much of the figure: Blender removes bones of no length."""
+
+STEADY = 1e-5
+"""Metres and parts of a quaternion: a channel that varies less is set, and not keyed."""
+
+STILL = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A figure at rest, in Blender's axes and metres, parents before their children."""
+
+    parents: np.ndarray
+    """Shape (joints,), -1 for roots."""
+
+    joints: Poses
+    """Shape (joints,), in the space of the armature."""
+
+    tails: np.ndarray
+    """Where their bones end, there too: shape (joints, 3)."""
+
+    origin: np.ndarray
+    """Where that space begins in the figure's world: below it, on the ground. Shape (3,)."""
+
+    @classmethod
+    def of(cls, figure: Figure, metres_per_unit: float, axes: str) -> Rest:
+        """The figure in metres; it may be in any unit and axes, and at rest anywhere."""
+        metres = Poses(figure.rest.positions * metres_per_unit, figure.rest.quaternions)
+        joints = to_blender(metres, axes)
+        turned = np.tile(STILL, (len(figure.tails), 1))
+        arms = to_blender(Poses(figure.tails * metres_per_unit, turned), axes).positions
+        lengths = np.linalg.norm(arms, axis=1)
+        least = LEAST_BONE * max(float(np.ptp(joints.positions, axis=0).max(initial=0.0)), float(lengths.max()), 1e-3)
+        short = lengths < least
+        along = np.where(lengths[:, None] > 1e-9, arms / np.maximum(lengths, 1e-9)[:, None], (0.0, 1.0, 0.0))
+        arms[short] = least * along[short]
+        tails = joints.positions + rotate(joints.quaternions, arms)
+        origin = np.append(joints.positions[:, :2].mean(axis=0), min(joints.positions[:, 2].min(), tails[:, 2].min()))
+        return cls(figure.parents, Poses(joints.positions - origin, joints.quaternions), tails - origin, origin)
+
+
+class Rig:
+    """An armature of a figure, and what it takes to move it.
+
+    Parameters
+    ----------
+    name : str
+    rest : Rest
+    names : iterable of str
+        What its bones are to be called; Blender may cut and number them.
+    collection : bpy.types.Collection
+        What it is put into: one of the scene that is shown.
+    like : Rig, optional
+        One of the same rest, whose bones it shares.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        rest: Rest,
+        names: Iterable[str],
+        collection: bpy.types.Collection,
+        like: Rig | None = None,
+    ) -> None:
+        self.obj = bpy.data.objects.new(name, like.obj.data if like else bpy.data.armatures.new(name))
+        collection.objects.link(self.obj)
+        self.bones = like.bones if like else _with_bones(self.obj, rest, names)
+        bpy.context.view_layer.update()  # A pose comes with it.
+        for bone in self.obj.pose.bones:
+            bone.rotation_mode = "QUATERNION"
+        bones = self.obj.data.bones
+        there = rigid(np.array([bones[bone].matrix_local for bone in self.bones], dtype=np.float64).reshape(-1, 4, 4))
+        turns = multiply(conjugate(rest.joints.quaternions), there.quaternions)
+        none = np.zeros((len(turns), 3))
+        above = np.where(rest.parents >= 0, rest.parents, 0)
+        roots = (rest.parents < 0)[:, None]
+        # A bone's channels are before * joint in its parent's space * after.
+        to_parents = Poses(none, np.where(roots, STILL, conjugate(turns[above])))
+        parents_rest = Poses(
+            np.where(roots, 0.0, there.positions[above]), np.where(roots, STILL, there.quaternions[above])
+        )
+        from_rest = placed(inverse(there), parents_rest)
+        self._before, self._after = placed(from_rest, to_parents), Poses(none, turns)
+
+    def channels_of(self, joints: Poses) -> Poses:
+        """The channels of all bones where the joints have these poses in their parents' space, shape (joints, n)."""
+        return placed(self._before[:, None], placed(joints, self._after[:, None]))
+
+    def channels_of_bone(self, bone: int, joint: Poses) -> Poses:
+        """The same of one bone, shape (n,)."""
+        return placed(self._before[bone], placed(joint, self._after[bone]))
+
+    def joints_of(self, channels: Poses) -> Poses:
+        """The joints in their parents' space where the bones have these channels, shape (joints, n)."""
+        return placed(inverse(self._before)[:, None], placed(channels, inverse(self._after)[:, None]))
+
+    def key(self, bone: int, frames: np.ndarray, channels: Poses) -> None:
+        """Key a bone at frames (n,), or set it where it does not vary; its channels have the shape (n,)."""
+        pose_bone = self.obj.pose.bones[self.bones[bone]]
+        quaternions = align_signs(channels.quaternions)
+        for name, values in (("location", channels.positions), ("rotation_quaternion", quaternions)):
+            if len(values) > 1 and np.ptp(values, axis=0).max() > STEADY:
+                path = pose_bone.path_from_id(name)
+                animation.write_channel(self.obj, path, frames, values, group=pose_bone.name)
+            else:
+                setattr(pose_bone, name, values[0])
+
+    def fill_in(self, mode: str) -> None:
+        """Have what happens between the keys of all bones be that of a mode of `KEYFRAME_MODES`."""
+        if mode not in KEYFRAME_MODES:
+            raise ValueError(f"{mode} is no mode of keys")
+        keyed = [bone for bone in self.obj.pose.bones if len(animation.key_frames(bone))]
+        if keyed:
+            animation.set_mode(keyed, mode)
+
+
+def _with_bones(obj: bpy.types.Object, rest: Rest, names: Iterable[str]) -> tuple[str, ...]:
+    """Make the bones of an armature, and return what they are called."""
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    made: list[bpy.types.EditBone] = []
+    sides = rotate(rest.joints.quaternions, np.tile((0.0, 0.0, 1.0), (len(rest.parents), 1)))
+    for joint, name in enumerate(names):
+        bone = obj.data.edit_bones.new(name)
+        bone.head, bone.tail = rest.joints.positions[joint], rest.tails[joint]
+        bone.align_roll(Vector(sides[joint]))
+        bone.parent = made[rest.parents[joint]] if rest.parents[joint] >= 0 else None
+        made.append(bone)
+    called = tuple(bone.name for bone in made)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return called

@@ -1,0 +1,312 @@
+"""Bodies: a figure that moves under every mode as an ordinary rig, coloured by its errors, and the recording, a ghost.
+
+How far off which joint is when lies on a mesh of its own, a vertex for each bone and frame, from which node groups
+colour the bones, flash the joints at their keys, and put a ring around the worst: the saved file plays for anyone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from rigid_motion.motion import KEYFRAME_MODES, Poses
+from rigid_motion.motion.quaternions import conjugate, rotate
+from rigid_motion_batch.palette import error_hex
+from rigid_motion_batch.recordings.figures import Figure
+
+from . import layout, physique, trails
+from .armature import Rest, Rig
+from .lanes import Cast, Lane
+from .materials import ghost, ink, surface
+from .nodes import Group, Socket, apply_group
+
+SHADES = 16
+"""Of the bones."""
+
+ERROR, FLASH, WORST = "error", "flash", "worst"
+"""The attributes of the errors: in metres; how much a joint flashes and whether it has the ring, 0 to 1."""
+
+GHOST_ALPHA = 0.7
+"""Its parts are thin."""
+
+IN_FRONT = 0.45
+"""How far towards the camera what marks joints is, in units of the frame's height."""
+
+RINGED = 0.02
+"""Of the error that colours reach up to: with less, the worst joint has no ring."""
+
+# In units of the frame's height.
+FLASH_RADIUS = 0.0046
+RING_RADIUS = 0.024
+RING_THICKNESS = 0.0021
+GRID_RADIUS = 0.0013
+
+CELLS = 0.5
+"""Metres between the lines of the ground; a figure of another size has others, as its size is to `TALL`."""
+
+TALL = 1.7
+GRID_STEPS = 4
+"""Points of a line of the ground from one crossing to the next, at which it may end."""
+
+MOST_CELLS = 120
+"""Lines of the ground each way, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """What moves on the stage, in metres and Blender's axes, around the middle of the recording: n frames."""
+
+    figure: Figure
+    rest: Rest
+    recording: Poses
+    """The joints in their parents' space at each frame, shape (joints, n)."""
+
+    modes: Mapping[str, Poses]
+    """Mode id to the same."""
+
+    keys: Mapping[str, list[tuple[np.ndarray, Poses]]]
+    """Mode id to the frames of the keys of each joint, and the poses there."""
+
+    errors: Mapping[str, np.ndarray]
+    """Mode id to how far off each joint is, shape (joints, n)."""
+
+    flashes: Mapping[str, np.ndarray]
+    """Mode id to how much each joint flashes, 0 to 1, shape (joints, n)."""
+
+    def places(self, poses: Poses) -> np.ndarray:
+        """Where the bones begin and end that are seen, of joints in their parents' space (joints, n): (n, m, 3)."""
+        seen = physique.seen_bones(self.rest)
+        joints = self.figure.skeleton.in_root_space(poses)[seen]
+        back = conjugate(self.rest.joints.quaternions[seen])
+        arms = rotate(back, self.rest.tails[seen] - self.rest.joints.positions[seen])
+        tails = joints.positions + rotate(joints.quaternions, arms[:, None])
+        return np.concatenate((joints.positions, tails)).transpose(1, 0, 2)
+
+
+class Bodies:
+    """Figures for the lanes, out of materials, groups and meshes that they share."""
+
+    def __init__(self, cast: Cast, motion: BodyMotion, shape: physique.Physique, full: float) -> None:
+        self.cast, self.motion = cast, motion
+        self.names = motion.figure.joints
+        self.size = physique.figure_size(motion.rest)
+        self.rig: Rig | None = None
+        self.ghost_action: bpy.types.Action | None = None
+        self.figure = physique.Carried.figure("Figure", shape)
+        self.recording = physique.Carried.ghost("Figure recording", shape, self.size)
+        self.recording.mesh.materials.append(ghost(cast.theme, GHOST_ALPHA))
+        for shade in range(SHADES):
+            name = f"Error {1e3 * full * shade / (SHADES - 1):.3g} mm"
+            self.figure.mesh.materials.append(surface(name, error_hex(shade / (SHADES - 1)), roughness=0.55))
+        self.joints = physique.Carried.joints("Joints", motion.rest)
+        self.full = full
+        self.colours, self.flashes, self.rings = _colours_group(), _flashes_group(), _rings_group()
+        self.grid = ground_grid(motion, CELLS * 2.0 ** round(np.log2(self.size / TALL)))
+        self.trail_group = trails.trail_group(windowed=True)
+        self.track = ink("Ground", cast.theme.track)
+
+    def enter(self, lane: Lane) -> None:
+        """Add the figure of a mode, its ghost, and the ground."""
+        mode, motion = lane.mode, self.motion
+        figure = self._rig(mode, lane)
+        if mode in KEYFRAME_MODES:
+            self._key(figure, motion.keys[mode])
+            figure.fill_in(mode)
+        else:
+            frames = self.cast.timeline.frames
+            self._key(figure, [(frames, motion.modes[mode][joint]) for joint in range(len(self.names))])
+        if figure.obj.animation_data and figure.obj.animation_data.action:
+            figure.obj.animation_data.action.name = mode
+        self._add_ghost(lane)
+        self._dress(figure, lane)
+        self._add_ground(lane)
+
+    def _rig(self, name: str, lane: Lane) -> Rig:
+        rig = Rig(name, self.motion.rest, self.names, lane.collection, like=self.rig)
+        self.rig = self.rig or rig
+        rig.obj.parent = lane.empty
+        rig.obj.show_in_front = True
+        rig.obj.data.display_type = "STICK"
+        return rig
+
+    @staticmethod
+    def _key(rig: Rig, keys: list[tuple[np.ndarray, Poses]]) -> None:
+        """Key every bone; the joints of keys are in their parents' space."""
+        for bone, (frames, poses) in enumerate(keys):
+            rig.key(bone, frames, rig.channels_of_bone(bone, poses))
+
+    def _add_ghost(self, lane: Lane) -> None:
+        rig = self._rig(f"{lane.mode} recording", lane)
+        if self.ghost_action is None:
+            frames, recording = self.cast.timeline.frames, self.motion.recording
+            self._key(rig, [(frames, recording[joint]) for joint in range(len(self.names))])
+            if rig.obj.animation_data:
+                self.ghost_action = rig.obj.animation_data.action
+                self.ghost_action.name = "recording"
+                self.still = [(bone.location.copy(), bone.rotation_quaternion.copy()) for bone in rig.obj.pose.bones]
+        else:
+            rig.obj.animation_data_create().action = self.ghost_action
+            rig.obj.animation_data.action_slot = self.ghost_action.slots[0]
+            for bone, (place, turn) in zip(rig.obj.pose.bones, self.still, strict=True):
+                bone.location, bone.rotation_quaternion = place, turn
+        self._carried(f"{lane.mode} recording figure", self.recording, rig, lane)
+
+    @staticmethod
+    def _carried(name: str, carried: physique.Carried, rig: Rig, lane: Lane) -> bpy.types.Object:
+        obj = lane.child(name, carried.mesh)
+        carried.hang_on(rig, obj)
+        return obj
+
+    def _dress(self, rig: Rig, lane: Lane) -> None:
+        mode, metres = lane.mode, self.cast.layout.metres
+        errors = self._errors(lane)
+        figure = self._carried(f"{mode} figure", self.figure, rig, lane)
+        bones = float(len(self.names))
+        apply_group(figure, self.colours, Errors=errors, Bones=bones, Shades=SHADES / self.full)
+        # Square to the camera, and in front of the figure: of the lane's turn there is nothing else.
+        turn = -self.cast.framing.yaw
+        towards = rotate(layout.yaw_quaternion(turn), -layout.AWAY * IN_FRONT * metres).tolist()
+        shared = {"Errors": errors, "Bones": bones, "Towards": towards, "Material": self.cast.ink}
+        joints = self._carried(f"{mode} keys", self.joints, rig, lane)
+        apply_group(joints, self.flashes, Radius=FLASH_RADIUS * metres, **shared)
+        ring = self._carried(f"{mode} worst joint", self.joints, rig, lane)
+        facing = (np.pi / 2.0 - layout.ELEVATION, 0.0, turn)
+        apply_group(
+            ring, self.rings, Radius=RING_RADIUS * metres, Thickness=RING_THICKNESS * metres, Facing=facing, **shared
+        )
+
+    def _errors(self, lane: Lane) -> bpy.types.Object:
+        """The errors of a mode: a vertex for each bone and frame, all bones of a frame one after another."""
+        mode = lane.mode
+        errors = self.motion.errors[mode]
+        mesh = bpy.data.meshes.new(f"{mode} errors")
+        mesh.vertices.add(errors.size)
+        worst = (errors == errors.max(axis=0)) & (errors > RINGED * self.full)
+        for name, values in ((ERROR, errors), (FLASH, self.motion.flashes[mode]), (WORST, worst)):
+            mesh.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", values.T.astype(np.float32).ravel())
+        obj = lane.child(f"{mode} errors", mesh)
+        obj.hide_render = True
+        return obj
+
+    def _add_ground(self, lane: Lane) -> None:
+        cast, cell, metres = self.cast, lane.cell, self.cast.layout.metres
+        width, height = cell.room * metres / 2.0
+        apply_group(
+            lane.child(f"{lane.mode} ground", self.grid),
+            self.trail_group,
+            Past=4.0 * cast.timeline.count,
+            Ahead=0.0,
+            Radius=GRID_RADIUS * metres,
+            Taper=0.0,
+            Material=self.track,
+            Middle=layout.unproject(np.append(cell.view * metres, 0.0)),
+            Right=layout.RIGHT / width,
+            Up=layout.UP / height,
+        )
+
+
+def ground_grid(motion: BodyMotion, spacing: float) -> bpy.types.Mesh:
+    """Lines on the ground around the way of a body, so many metres apart, as a mesh of edges."""
+    reach = 2.5 * physique.figure_size(motion.rest)
+    way = motion.places(motion.recording).mean(axis=1)[:, :2]
+    low, high = way.min(axis=0) - reach, way.max(axis=0) + reach
+    spacing = max(spacing, float((high - low).max()) / MOST_CELLS)
+    first, last = np.floor(low / spacing).astype(int), np.ceil(high / spacing).astype(int)
+    points, edges = [], []
+    for along in (0, 1):
+        across = 1 - along
+        steps = np.arange(first[along] * GRID_STEPS, last[along] * GRID_STEPS + 1) * spacing / GRID_STEPS
+        for line in np.arange(first[across], last[across] + 1) * spacing:
+            own = np.zeros((len(steps), 3))
+            own[:, along], own[:, across] = steps, line
+            begin = sum(map(len, points))
+            points.append(own)
+            numbers = begin + np.arange(len(steps))
+            edges.append(np.stack((numbers[:-1], numbers[1:]), axis=-1))
+    places = np.concatenate(points)
+    mesh = bpy.data.meshes.new("Ground")
+    mesh.from_pydata(places.tolist(), np.concatenate(edges).tolist(), [])
+    mesh.attributes.new(trails.FRAME, "FLOAT", "POINT").data.foreach_set("value", np.zeros(len(places), np.float32))
+    return mesh
+
+
+def flashes(key_frames: list[np.ndarray], frames: np.ndarray, fade: float) -> np.ndarray:
+    """How much joints with keys at these frames flash at others (n,), 0 to 1: all at once, then less for `fade` frames.
+
+    Shape (joints, n). A joint with a single key does not.
+    """
+    found = np.zeros((len(key_frames), len(frames)))
+    for own, flash in zip(key_frames, found, strict=True):
+        if len(own) > 1:
+            last = np.searchsorted(own, frames + 1e-3, side="right") - 1
+            age = frames - own[np.maximum(last, 0)]
+            flash[:] = np.where(last >= 0, np.clip(1.0 - age / fade, 0.0, 1.0), 0.0)
+    return found
+
+
+def _looked_up(group: Group, name: str) -> Socket:
+    """What the errors have of the bone of each face or point at the frame that is shown."""
+    bone = group.add("GeometryNodeInputNamedAttribute", physique.BONE, settings={"data_type": "INT"})
+    frame = group.math("SUBTRACT", group.frame(), 1.0)
+    # Numbers are cut off to be an index.
+    number = group.math("ADD", group.math("MULTIPLY_ADD", frame, group.inputs["Bones"], bone), 0.5)
+    source = group.add("GeometryNodeObjectInfo", group.inputs["Errors"]).node.outputs["Geometry"]
+    sample = group.add("GeometryNodeSampleIndex", source, settings={"data_type": "FLOAT", "domain": "POINT"}).node
+    sample.clamp = True
+    inputs = {socket.name: socket for socket in sample.inputs if socket.enabled}
+    group.tree.links.new(group.attribute(name), inputs["Value"])
+    group.tree.links.new(number, inputs["Index"])
+    return next(socket for socket in sample.outputs if socket.enabled)
+
+
+def _colours_group() -> bpy.types.NodeTree:
+    """The material of each face by the error of its bone: one of `Shades` for each metre."""
+    group = Group("Colours of errors", Errors="Object", Bones="Float", Shades="Float")
+    shade = group.math("MULTIPLY", _looked_up(group, ERROR), group.inputs["Shades"])
+    shade = group.math("MINIMUM", group.math("MAXIMUM", shade, 0.0), SHADES - 0.5)
+    geometry = group.add("GeometryNodeSetMaterialIndex", group.inputs["Geometry"]).node
+    group.tree.links.new(shade, geometry.inputs["Material Index"])
+    return group.finish(geometry.outputs[0])
+
+
+def _flashes_group() -> bpy.types.NodeTree:
+    """A ball at each joint that has just had a key."""
+    group = Group("Key flashes", Errors="Object", Bones="Float", Radius="Float", Towards="Vector", Material="Material")
+    flash = _looked_up(group, FLASH)
+    dark = group.math("LESS_THAN", flash, 0.02)
+    points = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], dark, settings={"domain": "POINT"})
+    points = _shifted(group, points)
+    ball = group.add("GeometryNodeMeshIcoSphere", 1.0, 2)
+    ball = group.add("GeometryNodeSetMaterial", ball, Material=group.inputs["Material"])
+    radius = group.math("MULTIPLY", group.inputs["Radius"], flash)
+    return group.finish(group.add("GeometryNodeInstanceOnPoints", points, Instance=ball, Scale=radius))
+
+
+def _rings_group() -> bpy.types.NodeTree:
+    """A ring around the joint that is off the most."""
+    inputs = {"Radius": "Float", "Thickness": "Float", "Towards": "Vector", "Facing": "Vector", "Material": "Material"}
+    group = Group("Ring around the worst", Errors="Object", Bones="Float", **inputs)
+    other = group.math("LESS_THAN", _looked_up(group, WORST), 0.5)
+    points = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], other, settings={"domain": "POINT"})
+    points = _shifted(group, points)
+    circle = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=48)
+    group.tree.links.new(group.inputs["Radius"], _input(circle, "Radius"))
+    profile = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=6)
+    group.tree.links.new(group.inputs["Thickness"], _input(profile, "Radius"))
+    ring = group.add("GeometryNodeCurveToMesh", circle, profile)
+    ring = group.add("GeometryNodeSetMaterial", ring, Material=group.inputs["Material"])
+    turn = group.inputs["Facing"]
+    return group.finish(group.add("GeometryNodeInstanceOnPoints", points, Instance=ring, Rotation=turn))
+
+
+def _shifted(group: Group, points: Socket) -> Socket:
+    """Towards the camera, where nothing hides them; its rays are parallel, so they are seen where they were."""
+    return group.add("GeometryNodeSetPosition", points, Offset=group.inputs["Towards"])
+
+
+def _input(socket: Socket, name: str) -> Socket:
+    """The input of a socket's node that is in use, of several that have the name."""
+    return next(one for one in socket.node.inputs if one.name == name and one.enabled)

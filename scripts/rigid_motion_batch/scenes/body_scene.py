@@ -1,0 +1,218 @@
+"""The stage of whole bodies: one scene in which every mode moves its own figure, side by side, as an ordinary rig.
+
+As `scene`, whose frame, header, camera and lights these are. The bones have their keys and their modes, as an animator
+would give them; whoever opens the file with the extension can choose others, and without it they play as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from rigid_motion import animation
+from rigid_motion.motion import Poses, interpolate, shell_error
+from rigid_motion_batch.analysis.bodies import BodyReconstruction, identical_body_modes
+from rigid_motion_batch.analysis.body_metrics import key_samples
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.palette import THEMES, error_hex, full_colour
+from rigid_motion_batch.recordings.figures import short_names
+
+from . import captions, layout
+from .armature import Rest
+from .bodies import SHADES, Bodies, BodyMotion, flashes
+from .framing import SMOOTHING, Framing, Jointed
+from .lanes import Cast
+from .materials import ink
+from .physique import Physique, figure_size
+from .scene import LEGEND, Header, put_on_stage
+from .settings import StageSettings
+from .timeline import Timeline
+
+FADE, FADE_SHARE = 5.0, 0.6
+"""Frames in which a flash fades; where keys are near to one another, so much of what lies between them."""
+
+BAR, BAR_GAP = 0.24, 0.012
+"""How wide the bar of colours is, and what is left free beside it, in units of the frame's height."""
+
+LEAST = "shell error 0"
+
+MARGIN = 0.04
+"""The room around all joints, in units of the figure: its flesh."""
+
+GROUND = 0.05
+"""What is seen of the ground below the feet, in units of the figure."""
+
+
+def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: np.ndarray) -> bpy.types.Scene:
+    """Make the scene of a comparison of whole bodies, in a file that is emptied for it.
+
+    Parameters
+    ----------
+    made : BodyReconstruction
+    settings : StageSettings
+        But for the subject and the deviation: a body shows itself, as it is.
+    radii : array, shape (joints,)
+        Of the balls by which errors are measured, in metres.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.name = f"{made.clip.name} {made.choice.name}"
+    theme = THEMES[settings.theme]
+    timeline = Timeline.between(float(made.times[0]), float(made.times[-1]), settings.fps, settings.slow_motion)
+    lanes_of = identical_body_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
+    rest = Rest.of(made.clip.figure, made.clip.metres_per_unit, made.clip.axes)
+    motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest, radii)
+
+    framing = Framing.of(Jointed(motion.places(motion.recording)), SMOOTHING * settings.fps)
+    low, high = framing.extent([Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values())])
+    size = figure_size(rest)
+    low, high = low - MARGIN * size, high + MARGIN * size
+    low[1] -= GROUND * size
+    width, height = settings.resolution
+    plan = layout.arrange(len(lanes_of), (high - low)[:2], width / height)
+    in_mm = {mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()}
+    cast = Cast(
+        timeline=timeline,
+        framing=framing,
+        framing_steps=1,
+        layout=plan,
+        middle=np.append((low + high)[:2] / 2.0, high[2]),
+        errors=in_mm,
+        largest_error=max(float(error.max()) for error in in_mm.values()),
+        notes=_notes(made, motion.modes),
+        theme=theme,
+        ink=ink("Ink", theme.ink),
+        faint=ink("Faint", theme.faint),
+        joints=tuple(short_names(made.clip.figure.joints)),
+        worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
+    )
+    full = full_colour(motion.errors.values())
+    shape = Physique.of(made.clip.figure, rest, made.clip.metres_per_unit, made.clip.axes)
+    bar = _Bar.of(1e3 * full, cast.largest_error)
+    header = Header(made.clip.name, made.choice.title, _legend(made, settings), bar.width + 2.0 * BAR_GAP)
+    with _extension():
+        actors = Bodies(cast, motion, shape, full)
+        put_on_stage(scene, settings, cast, lanes_of, actors, header, depth=float(high[2] - low[2]))
+    bar.put(cast)
+    scene["recording_centre_m"] = centre.tolist()
+    scene["recording_start_s"] = timeline.start
+    return scene
+
+
+def shown_motion(
+    made: BodyReconstruction, modes: Sequence[str], timeline: Timeline, rest: Rest, radii: np.ndarray
+) -> tuple[BodyMotion, np.ndarray]:
+    """What moves on the stage, and what became its origin: the middle of the recording, on the ground, shape (3,)."""
+    clip = made.clip
+    times = timeline.times_of(timeline.frames)
+
+    def in_blender(poses: Poses) -> Poses:
+        return to_blender(clip.in_metres(poses), clip.axes)
+
+    recording = in_blender(interpolate(clip.times, clip.poses, times, "dq_sclerp"))
+    skeleton = made.skeleton
+    truth = skeleton.in_root_space(recording)
+    low, high = truth.positions.min(axis=(0, 1)), truth.positions.max(axis=(0, 1))
+    centre = np.append((low + high)[:2] / 2.0, low[2])
+
+    def around(poses: Poses, joint: int | None = None) -> Poses:
+        """With the roots, or the joint if it is one, moved by the centre."""
+        if joint is not None:
+            return Poses(poses.positions - centre, poses.quaternions) if clip.figure.parents[joint] < 0 else poses
+        positions = poses.positions.copy()
+        positions[clip.figure.parents < 0] -= centre
+        return Poses(positions, poses.quaternions)
+
+    shown = {mode: in_blender(made.filled_in(mode, times)) for mode in modes}
+    keys = {
+        mode: [
+            (timeline.frames_of(clip.times[own]), around(in_blender(clip.poses[joint][own]), joint))
+            for joint, own in enumerate(made.keys[mode])
+        ]
+        for mode in modes
+    }
+    errors = {mode: shell_error(skeleton.in_root_space(poses), truth, radii[:, None]) for mode, poses in shown.items()}
+    moment = {mode: [own for own, _ in some] for mode, some in keys.items()}
+    most = max(len(own) for some in moment.values() for own in some)
+    fade = float(np.clip(FADE_SHARE * timeline.frames_per_key(most), 1.0, FADE))
+    return BodyMotion(
+        figure=clip.figure,
+        rest=rest,
+        recording=around(recording),
+        modes={mode: around(poses) for mode, poses in shown.items()},
+        keys=keys,
+        errors=errors,
+        flashes={mode: flashes(own, timeline.frames, fade) for mode, own in moment.items()},
+    ), centre
+
+
+def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
+    """Mode id to its own number of keys, where the modes have different ones."""
+    kind = "key poses" if made.shared else "keys"
+    counts = {
+        mode: len(key_samples(made.keys[mode])) if made.shared else sum(map(len, made.keys[mode])) for mode in modes
+    }
+    return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
+
+
+def _legend(made: BodyReconstruction, settings: StageSettings) -> str:
+    """How to read the picture, but for the colours."""
+    parts = [
+        "grey: recording",
+        "ring: the worst joint",
+        f"dots: {'key poses' if made.shared else 'keys'}",
+    ]
+    if settings.slow_motion != 1.0:
+        parts.append(f"{settings.slow_motion:g} times slower than life")
+    return "   \u00b7   ".join(parts)
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """What the colours of bones mean, at the right below the lanes."""
+
+    most: str
+
+    @classmethod
+    def of(cls, full: float, largest: float) -> _Bar:
+        """Of colours up to an error, and the largest there is, both in millimetres."""
+        top = f"{full:.{captions.decimals_for(full)}f} mm"
+        return cls(
+            f"{top} and more, to {largest:.{captions.decimals_for(largest)}f}" if largest > 1.005 * full else top
+        )
+
+    @property
+    def width(self) -> float:
+        return LEGEND * (captions.width_of(LEAST) + captions.width_of(self.most)) + BAR + 2.0 * BAR_GAP
+
+    def put(self, cast: Cast) -> None:
+        collection, frame = bpy.data.collections["Captions"], bpy.data.objects["Frame"]
+        foot, right = -0.5 + layout.MARGIN + 0.004, -cast.layout.cells[0].left
+
+        def put(obj: bpy.types.Object, x: float, y: float) -> None:
+            captions.put(obj, frame, collection, x, y)
+
+        put(captions.words("Largest shade", self.most, LEGEND, cast.faint, "RIGHT"), right, foot)
+        left = right - captions.width_of(self.most) * LEGEND - BAR_GAP - BAR
+        for step in range(SHADES):
+            colour = ink(f"Shade {step}", error_hex(step / (SHADES - 1)))
+            part = captions.card(f"Shade {step}", BAR / SHADES, 0.7 * LEGEND, colour, corner=0.0)
+            put(bpy.data.objects.new(part.name, part), left + (step + 0.5) * BAR / SHADES, foot + 0.35 * LEGEND)
+        put(captions.words("Least shade", LEAST, LEGEND, cast.faint, "RIGHT"), left - BAR_GAP, foot)
+
+
+@contextmanager
+def _extension() -> Iterator[None]:
+    """With what the extension brings, which stays out of the way otherwise."""
+    there = hasattr(bpy.types.PoseBone, "rigid_motion")
+    if not there:
+        animation.register()
+    try:
+        yield
+    finally:
+        if not there:
+            animation.unregister()

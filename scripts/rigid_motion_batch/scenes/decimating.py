@@ -1,0 +1,183 @@
+"""A whole body as a rig with a key on every sample, and what Blender's Decimate leaves of these keys.
+
+F-curves are read as Blender evaluates them, at the samples, and errors are those of `study.bodies`: in metres, in the
+root's space, through the hierarchy, of balls around the joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from rigid_motion.animation.actions.channels import replace_keys
+from rigid_motion.motion import Poses, shell_error
+from rigid_motion.motion.quaternions import normalise
+from rigid_motion_batch.analysis.bodies import BodyReconstruction
+from rigid_motion_batch.analysis.body_decimated import DECIMATE, KeysOfBody, ours
+from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.scenes.decimated_bodies import (
+    FREE,
+    Decimations,
+    Left,
+    fcurves_of,
+    key_frames_of,
+    left_of_fcurves,
+    values_of,
+    varying,
+)
+
+from .armature import Rest, Rig
+
+EVEN = 0.1
+"""Frames that evenly spaced samples may be off a whole one: times are often rounded to milliseconds."""
+
+APART = 1e-3
+"""Frames between two keys, at least: Blender has them in single precision."""
+
+
+class DecimatedBody:
+    """A recording on a rig of its own, in an empty file.
+
+    Parameters
+    ----------
+    made : BodyReconstruction
+        All its modes begin and end with the same samples; Decimate gets these and all between.
+    radius : float or array, shape (joints,)
+        Of the balls at the joints, in metres.
+
+    Raises
+    ------
+    RuntimeError
+        Where Blender cannot have the keys.
+    """
+
+    def __init__(self, made: BodyReconstruction, radius: float | np.ndarray) -> None:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        clip = made.clip
+        self.frames = frames_of(made.times)
+        self._skeleton, self._radius = made.skeleton, np.broadcast_to(radius, (len(made.skeleton),))[:, None]
+        joints = to_blender(clip.in_metres(clip.poses[:, made.samples]), clip.axes)
+        roots = clip.figure.parents < 0
+        places = joints.positions[roots]
+        # Single precision is best around the origin.
+        joints.positions[roots] -= (places.min(axis=(0, 1)) + places.max(axis=(0, 1))) / 2.0
+        self._truth = self._skeleton.in_root_space(joints)
+        rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
+        self.rig = Rig("Body", rest, clip.figure.joints, bpy.context.scene.collection)
+        channels = self.rig.channels_of(joints)
+        for bone in range(len(self.rig.bones)):
+            self.rig.key(bone, self.frames, channels[bone])
+        self._counted = varying(values_of(self.rig.obj, self.frames))
+        self.decimations = [Decimations(self.rig.obj, self.left)] if self._counted else []
+        if self._counted:
+            smooth(self.rig.obj)
+            self.decimations.append(Decimations(self.rig.obj, self.left))
+
+    def errors(self) -> np.ndarray:
+        """How far off each joint is by the F-curves that the rig has now, in metres, shape (joints, n)."""
+        shown = self._skeleton.in_root_space(self.rig.joints_of(self._channels()))
+        return shell_error(shown, self._truth, self._radius)
+
+    def left(self) -> Left:
+        """The keys that the rig has now, and their largest error."""
+        keys = key_frames_of(self.rig.obj, self._counted)
+        return left_of_fcurves(DECIMATE, keys, float(self.errors().max()), FREE)
+
+    def within(self, largest: float) -> Left | None:
+        """The fewest keys whose error is nowhere larger than this, in metres.
+
+        None where it is smaller than what Blender can keep in single precision, or no channel varies.
+        """
+        found = [left for decimations in self.decimations if (left := decimations.within(largest))]
+        if self._counted and (everything := self.left()).largest <= largest:
+            found.append(everything)
+        return min(found, key=lambda left: left.keys, default=None)
+
+    def _channels(self) -> Poses:
+        """Of all bones at the samples, shape (joints, n)."""
+        values = values_of(self.rig.obj, self.frames)
+        bones = [self.rig.obj.pose.bones[name] for name in self.rig.bones]
+
+        def channels(name: str) -> np.ndarray:
+            return np.stack([self._filled(values, bone.path_from_id(name), getattr(bone, name)) for bone in bones])
+
+        return Poses(channels("location"), normalise(channels("rotation_quaternion")))
+
+    def _filled(self, values: Mapping[tuple[str, int], np.ndarray], path: str, still: Sequence[float]) -> np.ndarray:
+        """A property at the samples, shape (n, components): what is not keyed stays as it is."""
+        columns = [values.get((path, index), np.full(len(self.frames), value)) for index, value in enumerate(still)]
+        return np.stack(columns, axis=-1)
+
+
+def beside_decimate(
+    made: BodyReconstruction, radius: float | np.ndarray, measured: Sequence[Metrics]
+) -> list[KeysOfBody]:
+    """The keys of each mode, and behind each what Decimate needs for the largest error that these have.
+
+    Parameters
+    ----------
+    made : BodyReconstruction
+    radius : float or array, shape (joints,)
+        Of the balls at the joints, in metres.
+    measured : sequence of Metrics
+        Of the modes. One whose error Blender cannot keep to, in single precision, has no row of Decimate.
+
+    Raises
+    ------
+    RuntimeError
+        Where Blender cannot have the keys, or cannot decimate.
+    """
+    body = DecimatedBody(made, radius)
+    rows = []
+    for row in measured:
+        own = ours(made, row)
+        rows.append(own)
+        # What was tried for one mode is known for the next, and their errors are often nearly the same.
+        if left := body.within(row.max_shell_m):
+            rows.append(
+                replace(
+                    own,
+                    how=DECIMATE,
+                    frames_with_keys=left.frames,
+                    keys=left.keys,
+                    numbers=left.numbers,
+                    max_shell_m=left.largest,
+                )
+            )
+    return rows
+
+
+def smooth(obj: bpy.types.Object) -> None:
+    """Give an object an Action of its own like the one it has, with curves through the keys in place of straight lines.
+
+    Decimate takes both, and leaves fewer keys now of the one, now of the other.
+    """
+    animated = obj.animation_data
+    animated.action = animated.action.copy()
+    for fcurve in fcurves_of(obj).values():
+        keys = np.array([key.co for key in fcurve.keyframe_points])
+        replace_keys(fcurve, keys[:, 0], keys[:, 1], interpolation="BEZIER", handle_type="AUTO_CLAMPED")
+
+
+def frames_of(times: np.ndarray) -> np.ndarray:
+    """Frames for samples at these times (n,), from 1 on, at their own rate: whole ones where they are evenly spaced.
+
+    Raises
+    ------
+    RuntimeError
+        Where two of them are too close for Blender.
+    """
+    frames = 1.0 + (times - times[0]) / float(np.median(np.diff(times)))
+    even = 1.0 + np.arange(len(times))
+    rate = (len(times) - 1) / float(times[-1] - times[0])
+    if np.abs(1.0 + (times - times[0]) * rate - even).max() <= EVEN:
+        return even
+    kept = frames.astype(np.float32).astype(np.float64)
+    close = np.diff(kept) < APART
+    if close.any():
+        raise RuntimeError(f"two samples are too close for Blender's frames, at {times[:-1][close][0]:.6g} s")
+    return kept

@@ -1,0 +1,56 @@
+"""Materials that look alike in every engine: Workbench takes their viewport colour, EEVEE and Cycles their nodes."""
+
+from __future__ import annotations
+
+import bpy
+
+from rigid_motion_batch.palette import Theme, linear
+
+GLOSS, BOUNCE = 0.0142, 0.878
+"""What Workbench's light `paint.sl` shows of a rough colour c that faces the camera: GLOSS + BOUNCE c (measured)."""
+
+
+GHOST_ALPHA = 0.3
+
+
+def ghost(theme: Theme, alpha: float = GHOST_ALPHA) -> bpy.types.Material:
+    """What the recording is made of."""
+    return surface("Recording", theme.ghost, alpha=alpha)
+
+
+def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
+    """A lit surface, translucent where alpha is below 1."""
+    material, nodes, output = _new(name)
+    rgb = linear(colour)
+    material.diffuse_color = (*rgb, alpha)
+    material.roughness = roughness
+    principled = nodes.new("ShaderNodeBsdfPrincipled")
+    principled.inputs["Base Color"].default_value = (*rgb, 1.0)
+    principled.inputs["Roughness"].default_value = roughness
+    principled.inputs["Alpha"].default_value = alpha
+    material.node_tree.links.new(principled.outputs[0], output.inputs["Surface"])
+    if alpha < 1.0:
+        material.surface_render_method = "BLENDED"
+        material.use_transparency_overlap = False
+    return material
+
+
+def ink(name: str, colour: str) -> bpy.types.Material:
+    """A flat colour that no light changes, for what is read rather than seen."""
+    material, nodes, output = _new(name)
+    rgb = linear(colour)
+    material.diffuse_color = (*(max(0.0, (value - GLOSS) / BOUNCE) for value in rgb), 1.0)
+    material.roughness, material.specular_intensity = 1.0, 0.0
+    emission = nodes.new("ShaderNodeEmission")
+    emission.inputs["Color"].default_value = (*rgb, 1.0)
+    material.node_tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def _new(name: str) -> tuple[bpy.types.Material, bpy.types.Nodes, bpy.types.Node]:
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # Blender 5 makes it, and warns of the switch.
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    return material, nodes, nodes.new("ShaderNodeOutputMaterial")

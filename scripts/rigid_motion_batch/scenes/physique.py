@@ -1,0 +1,223 @@
+"""Physique: what a figure looks like. Its skin where it has one, or else a solid for each bone.
+
+A mesh is of the figure at rest, in the space of its armature; each vertex is carried by bones, as numbers and weights,
+and each face knows the bone that its colour is of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.recordings.figures import Figure, carrying
+
+from .armature import Rest, Rig
+from .subject import shrink
+
+BONE = "bone"
+"""The attribute of a face or point: the number of its bone."""
+
+SLENDER = 0.13
+"""How thick a solid is, relative to its length: its radius."""
+
+THICKNESS = 0.008, 0.034
+"""The thinnest and the thickest, relative to the figure."""
+
+LINK = 0.5
+"""How thick what joins a bone to a child beside its end is, relative to a solid."""
+
+AT_END = 0.02
+"""A bone that ends so near to a child, relative to the figure, leads to it."""
+
+STUB = 0.04
+"""The length of a solid at a joint without children, relative to the figure, where bones do not lead to children: then
+they are of some program's making, and where they end means nothing."""
+
+THINNER = 0.8
+"""A ghost's solids, beside those that hide them where both agree."""
+
+INSET = 0.004
+"""How far inside of a skin its ghost is, relative to the figure."""
+
+SIDES = 8
+WAIST = 0.22
+"""Where along it a solid is thickest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Physique:
+    """The surface of a figure at rest."""
+
+    vertices: np.ndarray
+    """Shape (v, 3), metres."""
+
+    thinner: np.ndarray
+    """The same of thinner solids, for a ghost: where both agree, the figure hides it. Of a skin the same."""
+
+    faces: list[tuple[int, ...]]
+    carriers: np.ndarray
+    """Shape (v, k): the bones that carry each vertex."""
+
+    weights: np.ndarray
+    """Shape (v, k)."""
+
+    smooth: bool
+
+    @property
+    def bones(self) -> np.ndarray:
+        """The bone of each face: the one that carries most of its first vertex."""
+        foremost = np.take_along_axis(self.carriers, self.weights.argmax(axis=1)[:, None], axis=1)[:, 0]
+        return foremost[[face[0] for face in self.faces]]
+
+    @classmethod
+    def of(cls, figure: Figure, rest: Rest, metres_per_unit: float, axes: str) -> Physique:
+        """The skin, or else solids."""
+        if figure.skin is None:
+            return cls._of_solids(rest)
+        skin = figure.skin
+        unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(skin.vertices), 1))
+        vertices = to_blender(Poses(skin.vertices * metres_per_unit, unturned), axes).positions - rest.origin
+        faces = [*map(tuple, skin.triangles.tolist())]
+        return cls(vertices, vertices, faces, skin.joints, skin.weights, smooth=True)
+
+    @classmethod
+    def _of_solids(cls, rest: Rest) -> Physique:
+        size = figure_size(rest)
+        vertices, thinner, faces, carriers = [], [], [], []
+        for bone, head, tail, share in _parts(rest, size):
+            corners, own_thinner, own = _solid(head, tail, share, size)
+            faces += [tuple(len(vertices) * len(corners) + corner for corner in face) for face in own]
+            vertices.append(corners)
+            thinner.append(own_thinner)
+            carriers.append(np.full(len(corners), bone))
+        joints = np.concatenate(carriers)[:, None]
+        return cls(
+            np.concatenate(vertices), np.concatenate(thinner), faces, joints, np.ones(joints.shape), smooth=False
+        )
+
+
+def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
+    """The bone of each solid, where it begins and ends, and how thick it is, relative to others."""
+    heads, tails, seen = rest.joints.positions, rest.tails, seen_bones(rest)
+    children = {joint: np.flatnonzero(rest.parents == joint) for joint in seen}
+    gaps = {joint: np.linalg.norm(heads[own] - tails[joint], axis=1) for joint, own in children.items() if len(own)}
+    lead = not gaps or np.mean([gap.min() < AT_END * size for gap in gaps.values()]) > 0.5
+    for joint in seen:
+        own = children[joint]
+        if not len(own):
+            along = tails[joint] - heads[joint]
+            length = float(np.linalg.norm(along))
+            yield joint, heads[joint], heads[joint] + along * min(1.0, 1.0 if lead else STUB * size / length), 1.0
+            continue
+        straight = lead and gaps[joint].min() < AT_END * size
+        if lead and not straight:
+            yield joint, heads[joint], tails[joint], 1.0
+        for child in own.tolist():
+            is_next = straight and child == own[gaps[joint].argmin()]
+            alone = not lead and len(own) == 1
+            if np.linalg.norm(heads[child] - heads[joint]) > 1e-3 * size:
+                yield joint, heads[joint], heads[child], 1.0 if is_next or alone else LINK
+
+
+def figure_size(rest: Rest) -> float:
+    """The largest extent of the joints of a figure at rest, without what only carries it about.
+
+    Where bones end is often made up by importers, and counts for a single joint alone.
+    """
+    seen = seen_bones(rest)
+    heads = rest.joints.positions[seen]
+    extent = float(np.ptp(heads, axis=0).max())
+    return max(extent or float(np.ptp(np.concatenate((heads, rest.tails[seen])), axis=0).max()), 1e-6)
+
+
+def seen_bones(rest: Rest) -> list[int]:
+    """The bones but for roots that carry a single child about: they may reach to wherever the body was left."""
+    carries = carrying(rest.parents)
+    return np.flatnonzero(~carries if not carries.all() else carries).tolist()
+
+
+def _solid(
+    head: np.ndarray, tail: np.ndarray, share: float, size: float
+) -> tuple[np.ndarray, np.ndarray, list[tuple[int, ...]]]:
+    """A spindle from head to tail, thickest near its head: its corners, those of a thinner one, and the faces."""
+    along = tail - head
+    length = float(np.linalg.norm(along))
+    radius = share * float(np.clip(SLENDER * length, THICKNESS[0] * size, THICKNESS[1] * size))
+    along = along / max(length, 1e-9)
+    side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    side /= np.linalg.norm(side)
+    other = np.cross(along, side)
+    angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    ring = np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other
+    rings = ((0.0, 0.45), (WAIST, 1.0), (1.0, 0.35))
+    corners, thinner = (
+        np.concatenate([head + place * length * along + scale * radius * width * ring for place, width in rings])
+        for scale in (1.0, THINNER)
+    )
+    steps = np.arange(SIDES)
+    faces = [
+        (first + step, first + (step + 1) % SIDES, first + SIDES + (step + 1) % SIDES, first + SIDES + step)
+        for first in (0, SIDES)
+        for step in steps.tolist()
+    ]
+    return corners, thinner, [*faces, tuple(steps[::-1].tolist()), tuple((2 * SIDES + steps).tolist())]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A mesh of the figure at rest, for as many objects as there are rigs to carry it."""
+
+    mesh: bpy.types.Mesh
+    carriers: np.ndarray
+    """Shape (v, k): the bones that carry each vertex."""
+
+    weights: np.ndarray
+    """Shape (v, k)."""
+
+    @classmethod
+    def figure(cls, name: str, physique: Physique) -> Carried:
+        """A physique. Its faces know their bones."""
+        return cls._of(name, physique, physique.vertices)
+
+    @classmethod
+    def ghost(cls, name: str, physique: Physique, size: float) -> Carried:
+        """The same of a figure of this size a little further inside."""
+        carried = cls._of(name, physique, physique.thinner)
+        if physique.smooth:
+            shrink(carried.mesh, INSET * size)
+        return carried
+
+    @classmethod
+    def _of(cls, name: str, physique: Physique, vertices: np.ndarray) -> Carried:
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(vertices.tolist(), [], physique.faces)
+        mesh.attributes.new(BONE, "INT", "FACE").data.foreach_set("value", physique.bones.astype(np.int32))
+        mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), physique.smooth))
+        mesh.update()
+        return cls(mesh, physique.carriers, physique.weights)
+
+    @classmethod
+    def joints(cls, name: str, rest: Rest) -> Carried:
+        """A vertex at each joint, which knows its bone."""
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(rest.joints.positions.tolist(), [], [])
+        numbers = np.arange(len(rest.parents))[:, None]
+        mesh.attributes.new(BONE, "INT", "POINT").data.foreach_set("value", numbers[:, 0].astype(np.int32))
+        return cls(mesh, numbers, np.ones(numbers.shape))
+
+    def hang_on(self, rig: Rig, obj: bpy.types.Object) -> None:
+        """Have a rig carry an object of this mesh."""
+        if not obj.vertex_groups:  # They are the mesh's: the first object brings them for all.
+            vertices = np.arange(len(self.carriers))
+            for bone, name in enumerate(rig.bones):
+                group = obj.vertex_groups.new(name=name)
+                for column, shares in zip(self.carriers.T, self.weights.T, strict=True):
+                    own = (column == bone) & (shares > 0.0)
+                    for share in np.unique(shares[own]).tolist():
+                        group.add(vertices[own & (shares == share)].tolist(), share, "ADD")
+        obj.modifiers.new("Armature", "ARMATURE").object = rig.obj

@@ -1,0 +1,272 @@
+"""The stage: one scene in which every mode moves its own object, side by side, as ordinary keyed animation.
+
+Lanes stand side by side in front of the `Frame`, an empty in the plane of the picture on which everything is written.
+What changes over time is either a key or a node group that reads the frame: the saved file plays for anyone,
+without scripts. The scene's custom properties tell where the recording's origin is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
+from rigid_motion_batch.palette import DARK, THEMES, linear
+
+from . import captions, layout
+from .deviations import largest_deviation, magnification, magnified
+from .framing import SMOOTHING, Framing, Solid
+from .lanes import Actors, Cast, Lanes
+from .materials import ink
+from .settings import SMALL_PICTURE, StageSettings
+from .solids import Shape, Solids
+from .subject import load_subject, vertices_of
+from .timeline import ShownMotion, Timeline
+
+LEGEND = 0.032
+"""The size of the letters below the lanes, in units of the frame's height, where there is room."""
+
+
+def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.types.Scene:
+    """Make the scene of a comparison, in a file that is emptied for it.
+
+    Raises
+    ------
+    SubjectError
+        Where the object to show cannot be had.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.name = f"{reconstruction.clip.name} {reconstruction.choice.name}"
+    theme = THEMES[settings.theme]
+    timeline = Timeline.of(reconstruction, settings.fps, settings.slow_motion)
+    motion = ShownMotion.of(reconstruction, timeline)
+    lanes_of = identical_modes([reconstruction]) if settings.distinct else tuple((mode,) for mode in motion.modes)
+
+    mesh = load_subject(settings.subject)
+    smoothing = SMOOTHING * settings.fps * timeline.steps
+    outline = layout.outermost(vertices_of(mesh))
+    framing = Framing.of(Solid(motion.recording, outline), smoothing)
+    enlarged = layout.display_scale(motion.recording.positions - framing.focus, float(np.ptp(outline, axis=0).max()))
+    mesh.transform(Matrix.Scale(enlarged, 4))
+    outline = outline * enlarged
+
+    size, middle = float(np.ptp(outline, axis=0).max()), (outline.min(axis=0) + outline.max(axis=0)) / 2.0
+    farthest = max(largest_deviation(poses, motion.recording, outline) for poses in motion.modes.values())
+    deviation = settings.deviation or magnification(farthest, size)
+    deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
+    low, high = framing.extent([Solid(poses, outline) for poses in (motion.recording, *deviated.values())])
+    width, height = settings.resolution
+    plan = layout.arrange(len(lanes_of), (high - low)[:2], width / height)
+    errors = _errors_in_mm(reconstruction, timeline)
+    cast = Cast(
+        timeline=timeline,
+        framing=framing,
+        framing_steps=timeline.steps,
+        layout=plan,
+        middle=np.append((low + high)[:2] / 2.0, high[2]),
+        errors=errors,
+        largest_error=max(float(error.max()) for error in errors.values()),
+        notes=_notes(reconstruction),
+        theme=theme,
+        ink=ink("Ink", theme.ink),
+        faint=ink("Faint", theme.faint),
+    )
+    shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
+    header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
+    put_on_stage(scene, settings, cast, lanes_of, Solids(cast, shape), header, depth=float(high[2] - low[2]))
+    scene["recording_centre_m"] = motion.centre.tolist()
+    scene["recording_start_s"] = timeline.start
+    scene["deviation_shown_times"] = deviation
+    return scene
+
+
+@dataclass(frozen=True)
+class Header:
+    """What is written above and below the lanes."""
+
+    clip: str
+    choice: str
+
+    legend: str
+    """How to read the picture."""
+
+    reserved: float = 0.0
+    """What has to be left free to the right of that, in units of the frame's height."""
+
+
+def put_on_stage(
+    scene: bpy.types.Scene,
+    settings: StageSettings,
+    cast: Cast,
+    lanes_of: Groups,
+    actors: Actors,
+    header: Header,
+    depth: float,
+) -> None:
+    """Make the lanes, what is written around them, camera and lights; the depth of what moves in metres."""
+    plan = cast.layout
+    frame = make_frame(plan.metres)
+    lanes = Lanes(cast, frame, actors)
+    for modes, cell in zip(lanes_of, plan.cells, strict=True):
+        lanes.build(modes, cell)
+    _make_header(header, cast, frame)
+    make_camera(scene, plan.metres, depth)
+    make_lights(scene)
+    set_up_render(scene, settings, cast.timeline.count, cast.theme.background)
+
+
+def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[str, np.ndarray]:
+    """Mode id to the shell error at each frame."""
+    times = timeline.times_of(timeline.frames)
+    return {
+        mode: 1e3 * np.interp(times, reconstruction.times, errors.shell)
+        for mode, errors in reconstruction.errors.items()
+    }
+
+
+def _notes(reconstruction: Reconstruction) -> dict[str, str]:
+    """Mode id to its own number of keys, where the modes have different ones."""
+    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items()}
+    if len(set(counts.values())) == 1:
+        return {}
+    duration = float(np.ptp(reconstruction.times[[0, -1]]))
+    return {mode: f"{(count - 1) / duration:.1f} keys/s" for mode, count in counts.items()}
+
+
+def _legend(cast: Cast, settings: StageSettings, deviation: float, enlarged: float) -> str:
+    """How to read the picture."""
+    full = f"{cast.largest_error:.{captions.decimals_for(cast.largest_error)}f}"
+    drawn = f", deviation drawn {deviation:g} times as large" if deviation > 1.0 else ""
+    parts = ["grey: recording", f"colour: mode{drawn}", "dots: keys", f"mm: shell error (graphs up to {full})"]
+    if settings.slow_motion != 1.0:
+        parts.append(f"{settings.slow_motion:g} times slower than life")
+    if enlarged > 1.0:
+        parts.append(f"object shown {enlarged:.3g} times its size")
+    return "   \u00b7   ".join(parts)
+
+
+def make_frame(metres: float) -> bpy.types.Object:
+    """The plane of the picture, behind everything that moves."""
+    frame = bpy.data.objects.new("Frame", None)
+    frame.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
+    frame.scale = (metres, metres, metres)
+    frame.empty_display_size = 0.1
+    return frame
+
+
+def _make_header(header: Header, cast: Cast, frame: bpy.types.Object) -> None:
+    """What is written above and below the lanes: clip, rate and time, and how to read the picture."""
+    collection = bpy.data.collections.new("Captions")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(frame)
+    left, line = cast.layout.cells[0].left, 0.5 - layout.MARGIN - 0.042
+    right = -left
+
+    def put(obj: bpy.types.Object, x: float, y: float) -> None:
+        captions.put(obj, frame, collection, x, y)
+
+    name_width = captions.width_of(header.clip)
+    size = min(0.046, 0.5 * (right - left) / name_width)
+    put(captions.words("Clip", header.clip, size, cast.ink), left, line)
+    rate = captions.words("Choice of keys", header.choice, 0.034, cast.faint)
+    put(rate, left + name_width * size + 0.03, line)
+    timeline = cast.timeline
+    ends = timeline.frames[[0, -1]]
+    decimals = captions.readout_group("Time in s", 2, cast.ink)
+    put(captions.readout("Time", decimals, 0.046, ends, timeline.times_of(ends) - timeline.start), right - 0.03, line)
+    put(captions.words("Seconds", "s", 0.034, cast.faint, "RIGHT"), right, line)
+
+    size = min(LEGEND, (right - left - header.reserved) / captions.width_of(header.legend))
+    put(captions.words("Legend", header.legend, size, cast.faint), left, -0.5 + layout.MARGIN + 0.004)
+
+
+def make_camera(scene: bpy.types.Scene, metres: float, depth: float) -> None:
+    """A camera square to the frame, in front of all that moves, with parallel rays."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.rotation_euler.x = math.pi / 2.0 - layout.ELEVATION
+    camera.location = -layout.AWAY * (depth + metres)
+    camera.data.type = "ORTHO"
+    camera.data.sensor_fit = "VERTICAL"
+    camera.data.ortho_scale = metres
+    camera.data.clip_start = 0.5 * metres
+    camera.data.clip_end = depth + 1.5 * metres
+
+
+def make_lights(scene: bpy.types.Scene) -> None:
+    """Two suns for EEVEE and Cycles. Workbench brings its own light."""
+    for name, strength, pitch, yaw in (("Key light", 3.0, 40.0, -35.0), ("Fill light", 1.2, 60.0, 50.0)):
+        light = bpy.data.lights.new(name, "SUN")
+        light.energy = strength
+        light.angle = math.radians(5.0)
+        obj = bpy.data.objects.new(name, light)
+        obj.rotation_euler = (math.radians(pitch), 0.0, math.radians(yaw))
+        scene.collection.objects.link(obj)
+
+
+def set_up_render(
+    scene: bpy.types.Scene, settings: StageSettings, frames: int, background: str = DARK.background
+) -> None:
+    """Engine, size, colours and encoder of a scene of so many frames."""
+    scene.frame_start, scene.frame_end = 1, frames
+    scene.frame_set(1)
+    render = scene.render
+    render.resolution_x, render.resolution_y = settings.resolution
+    render.resolution_percentage = 100
+    render.fps, render.fps_base = settings.fps, 1.0
+    render.engine = _engine_id(settings.engine)
+    scene.view_settings.view_transform = "Standard"
+    _set_background(scene, background)
+    _set_up_video(scene)
+    scene.display.render_aa = settings.antialiasing or ("FXAA" if render.resolution_y < SMALL_PICTURE else "OFF")
+    shading = scene.display.shading
+    shading.light, shading.studio_light = "STUDIO", "paint.sl"
+    shading.color_type = "MATERIAL"
+    shading.show_object_outline = shading.show_shadows = shading.show_cavity = False
+    scene.eevee.taa_render_samples = settings.samples
+    if hasattr(scene, "cycles"):  # An add-on, which may be off.
+        scene.cycles.samples = settings.samples
+        scene.cycles.use_denoising = False
+
+
+def _set_up_video(scene: bpy.types.Scene) -> None:
+    """H.264 in an MP4 beside the .blend, wherever that is taken, by Blender's own encoder."""
+    image, video = scene.render.image_settings, scene.render.ffmpeg
+    if hasattr(image, "media_type"):  # Blender 5 asks for the kind of output first.
+        image.media_type = "VIDEO"
+    image.file_format = "FFMPEG"
+    image.color_mode = "RGB"
+    video.format, video.codec, video.audio_codec = "MPEG4", "H264", "NONE"
+    video.constant_rate_factor = "HIGH"  # Thin lines and small letters stay sharp.
+    video.ffmpeg_preset = "REALTIME"
+    video.gopsize = scene.render.fps
+    scene.render.use_file_extension = True
+    scene.render.use_stamp_date = False  # The same film is the same file, whenever it is made.
+    scene.render.filepath = "//comparison.mp4"
+
+
+def _set_background(scene: bpy.types.Scene, background: str) -> None:
+    """One colour, for Workbench and for the others."""
+    scene.world = bpy.data.worlds.new("World")
+    colour = linear(background)
+    scene.world.color = colour
+    if scene.world.node_tree is None:  # Blender 5 makes it, and warns of the switch.
+        scene.world.use_nodes = True
+    nodes = scene.world.node_tree.nodes
+    next(node for node in nodes if node.bl_idname == "ShaderNodeBackground").inputs["Color"].default_value = (
+        *colour,
+        1.0,
+    )
+
+
+def _engine_id(engine: str) -> str:
+    """Blender's name of an engine. EEVEE's was another before Blender 5."""
+    if engine == "eevee":
+        return "BLENDER_EEVEE" if bpy.app.version >= (5, 0) else "BLENDER_EEVEE_NEXT"
+    return {"workbench": "BLENDER_WORKBENCH", "cycles": "CYCLES"}[engine]

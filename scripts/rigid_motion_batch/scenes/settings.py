@@ -1,0 +1,100 @@
+"""How a comparison is to be shown, and which object: all that can be said of it before Blender is loaded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigid_motion_batch.palette import THEMES
+from rigid_motion_batch.places import ASSETS
+
+ENGINES = ("workbench", "eevee", "cycles")
+ANTIALIASING = ("OFF", "FXAA", "5", "8", "11", "16", "32")
+
+SMALL_PICTURE = 500
+"""Lines below which edges need smoothing."""
+
+MODELS_FILE = ASSETS / "models.blend"
+MODELS = {"drill": "Drill", "controller": "Controller"}
+
+
+@dataclass(frozen=True)
+class StageSettings:
+    """How a comparison is shown."""
+
+    engine: str = "workbench"
+    """One of `ENGINES`."""
+
+    resolution: tuple[int, int] = (960, 540)
+    """Width and height in pixels, even: the codec wants that."""
+
+    fps: int = 30
+
+    slow_motion: float = 1.0
+    """How many times slower than life."""
+
+    subject: str = "drill"
+    """The object that moves: "drill", "controller" or "file.blend:Name"."""
+
+    antialiasing: str | None = None
+    """Of Workbench: one of `ANTIALIASING`; numbers are samples.
+
+    Where nothing is asked for, FXAA below `SMALL_PICTURE` lines, and OFF from there on: in software rendering FXAA
+    takes as long as three times the pixels, which look better.
+    """
+
+    samples: int = 16
+    """Of EEVEE and Cycles."""
+
+    theme: str = "dark"
+    """One of `palette.THEMES`."""
+
+    deviation: float | None = None
+    """How many times larger than it is a mode's deviation from the recording is shown; None for what shows it well."""
+
+    distinct: bool = False
+    """Whether modes that are one motion share a lane."""
+
+    def __post_init__(self) -> None:
+        if self.engine not in ENGINES:
+            raise ValueError(f"engine {self.engine!r}: there are {', '.join(ENGINES)}")
+        if min(self.resolution) < 2 or any(size % 2 for size in self.resolution):
+            raise ValueError(f"resolution {self.resolution[0]}x{self.resolution[1]}: give two even numbers of pixels")
+        if not 1 <= self.fps <= 240:
+            raise ValueError(f"{self.fps} frames a second: give 1 to 240")
+        if not (math.isfinite(self.slow_motion) and self.slow_motion > 0.0):
+            raise ValueError(f"slow motion by {self.slow_motion}: give a number above 0; 4 is four times slower")
+        if not 1 <= self.samples <= 4096:
+            raise ValueError(f"{self.samples} samples: give 1 to 4096")
+        if self.theme not in THEMES:
+            raise ValueError(f"theme {self.theme!r}: there are {', '.join(THEMES)}")
+        if self.deviation is not None and not 1.0 <= self.deviation <= 1000.0:
+            raise ValueError(f"deviations {self.deviation:g} times as large: give 1 to 1000")
+        if self.antialiasing not in (None, *ANTIALIASING):
+            raise ValueError(f"antialiasing {self.antialiasing!r}: there are {', '.join(ANTIALIASING)}")
+
+
+class SubjectError(ValueError):
+    """The object to show cannot be had. The message says why, in one line."""
+
+
+def place_of_subject(wanted: str) -> tuple[Path, str]:
+    """The file that an object is in, whether or not it is there, and its name in that.
+
+    Parameters
+    ----------
+    wanted : str
+        A key of `MODELS`, or "file.blend:Name".
+
+    Raises
+    ------
+    SubjectError
+        Where no object is named.
+    """
+    if wanted in MODELS:
+        return MODELS_FILE, MODELS[wanted]
+    file, colon, name = wanted.rpartition(":")
+    if not colon or not file.lower().endswith(".blend"):
+        raise SubjectError(f"object {wanted!r}: give {', '.join(MODELS)} or file.blend:Name")
+    return Path(file), name

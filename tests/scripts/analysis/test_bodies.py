@@ -1,0 +1,265 @@
+"""Whole bodies under few keys: which keys there are, and that errors do not depend on how they are worked out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigid_motion.motion import KEYFRAME_MODES, Poses
+from rigid_motion_batch.analysis import bodies
+from rigid_motion_batch.analysis.bodies import (
+    BodyErrors,
+    BodyReconstruction,
+    Ground,
+    identical_body_modes,
+    measure_body,
+    moving,
+    reconstruct_body,
+    rms_of_body,
+    same_body_motions,
+)
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.recordings.clips import Clip
+from tests.motion.bodies import body_errors
+from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
+from tests.scripts.comparison.recordings import swinging_clip
+
+MODES = ("lerp_slerp", "dq_sclerp", "motor_spline")
+
+RADII = np.linspace(0.02, 0.12, len(JOINTS))
+
+GLOVE = JOINTS.index("Glove")
+
+
+def evenly(clip: Clip, rate: str = "5", modes: tuple[str, ...] = MODES) -> BodyReconstruction:
+    return reconstruct_body(clip, Uniform(rate), modes, RADII)
+
+
+def measured(made: BodyReconstruction, mode: str = "lerp_slerp", radii: np.ndarray | float = RADII) -> BodyErrors:
+    return measure_body(made, mode, radii, Ground.of(made))
+
+
+def independently(made: BodyReconstruction, mode: str) -> np.ndarray:
+    """The shell errors by matrices, in metres."""
+    clip = made.clip
+    metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)
+    keys = tuple(np.resize(own, max(len(own), 1)) for own in made.keys[mode])
+    return body_errors(clip.times, metres, PARENTS, keys, mode, RADII)[:, made.samples]
+
+
+# -- keys -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_joint_that_stays_as_it_is_has_one_key_and_the_others_are_key_poses() -> None:
+    made = evenly(swinging_body())
+    assert made.shared
+    for keys in made.keys.values():
+        assert keys[GLOVE].tolist() == [0]
+        assert {tuple(own) for joint, own in enumerate(keys) if joint != GLOVE} == {tuple(range(0, 61, 6))}
+    assert np.flatnonzero(~moving(made.clip)).tolist() == [GLOVE]
+
+
+@pytest.mark.parametrize("metres_per_unit", [0.001, 0.01, 1.0])
+def test_how_little_a_joint_may_move_to_stay_does_not_depend_on_the_unit(metres_per_unit: float) -> None:
+    still = still_body()
+    clip = replace(still, metres_per_unit=metres_per_unit)
+    for micrometres, moves in ((0.9, False), (1.1, True)):
+        clip.poses.positions[2, 5, 1] = clip.poses.positions[2, 4, 1] + 1e-6 * micrometres / metres_per_unit
+        assert moving(clip).tolist() == [moves and joint == 2 for joint in range(len(JOINTS))]
+
+
+@pytest.mark.parametrize("choice", [Uniform("5"), Budget("5"), Tolerance("1cm")], ids=str)
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_body_of_which_nothing_moves_is_everywhere_as_it_was(choice: Choice, shared: bool) -> None:
+    made = reconstruct_body(still_body(), choice, MODES, RADII, shared=shared)
+    for mode in MODES:
+        assert [len(own) for own in made.keys[mode]] == [1] * len(JOINTS)
+        errors = measured(made, mode)
+        assert errors.shell.shape == (len(JOINTS), len(made.times))
+        assert errors.shell.max() == pytest.approx(0.0, abs=1e-12)
+        assert errors.slide == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("shared", [False, True])
+def test_keys_that_the_motion_chooses_keep_every_joint_within_the_tolerance(mode: str, shared: bool) -> None:
+    made = reconstruct_body(swinging_body(), Tolerance("15mm"), (mode,), RADII, shared=shared)
+    errors = measured(made, mode)
+    assert errors.shell.max() <= 0.015 * (1.0 + 1e-9)
+    np.testing.assert_allclose(errors.shell, independently(made, mode), atol=1e-9)
+    moved = [tuple(own) for own in made.keys[mode] if len(own) > 1]
+    assert (len(set(moved)) == 1) == shared
+    assert all(own[0] == 0 and own[-1] == len(made.clip.times) - 1 for own in moved)
+
+
+def test_key_poses_are_no_more_keys_than_a_budget_has_and_a_joints_own_are_worth_as_many() -> None:
+    clip = swinging_body()
+    for shared in (False, True):
+        made = reconstruct_body(clip, Budget("6"), ("lerp_slerp",), RADII, shared=shared)
+        keys = made.keys["lerp_slerp"]
+        assert sum(map(len, keys)) <= 13 * len(JOINTS)
+        if shared:
+            assert max(map(len, keys)) == 13
+
+
+@pytest.mark.parametrize("choice", [Uniform("0.3"), Budget("0.3")], ids=str)
+def test_a_body_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
+    assert reconstruct_body(swinging_body(), choice, MODES, RADII) is None
+
+
+@pytest.mark.parametrize("samples", [2, 3, 5, 8, 12])
+@pytest.mark.parametrize("choice", [Uniform("30"), Budget("30"), Tolerance("1mm")], ids=str)
+def test_bodies_of_a_few_samples_have_keys_too(samples: int, choice: Choice) -> None:
+    clip = swinging_body()
+    few = replace(clip, times=clip.times[:samples], poses=clip.poses[:, 30 : 30 + samples])
+    made = reconstruct_body(few, choice, MODES, RADII)
+    for mode in MODES:
+        assert measured(made, mode).shell.max() <= 1e-3
+
+
+# -- errors -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_errors_are_had_again_by_matrices(mode: str) -> None:
+    made = evenly(swinging_body(seed=5), "4", (mode,))
+    errors = measured(made, mode).shell
+    np.testing.assert_allclose(errors, independently(made, mode), atol=1e-9)
+    assert rms_of_body(made, mode, RADII) == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-12)
+
+
+@pytest.mark.parametrize("block", [1, 2, 7, 60, 61])
+def test_blocks_of_any_size_give_the_same_numbers(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = evenly(swinging_body())
+    whole, ground = measured(made), Ground.of(made)
+    monkeypatch.setattr(bodies, "BLOCK", block)
+    pieces, of_pieces = measured(made), Ground.of(made)
+    for name in ("shell", "position", "rotation", "velocity", "slide"):
+        np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=1e-9, atol=1e-15)
+    assert pieces.worst == whole.worst
+    assert np.array_equal(of_pieces.joints, ground.joints)
+    assert np.array_equal(of_pieces.stands, ground.stands)
+    assert rms_of_body(made, "lerp_slerp", RADII) == pytest.approx(np.sqrt(np.mean(whole.shell**2)), rel=1e-12)
+
+
+@given(seed=st.integers(0, 2**16), rate=st.sampled_from(["2", "3.5", "7", "15"]), mode=st.sampled_from(MODES))
+def test_at_key_poses_there_is_no_error_and_with_every_sample_none_anywhere(seed: int, rate: str, mode: str) -> None:
+    clip = swinging_body(seed=seed, seconds=1.0)
+    made = evenly(clip, rate, (mode,))
+    at_keys = made.keys[mode][0] - made.samples.start
+    errors = measured(made, mode)
+    assert errors.shell[:, at_keys].max() < 1e-9
+    assert errors.shell.max() > 1e-6
+    assert measured(evenly(clip, "30", (mode,)), mode).shell.max() < 1e-9
+
+
+@given(seed=st.integers(0, 2**16), power=st.integers(-3, 3))
+def test_errors_are_in_metres_whatever_the_unit(seed: int, power: int) -> None:
+    clip = swinging_body(seed=seed, seconds=1.0)
+    poses = Poses(clip.poses.positions * 10.0**power, clip.poses.quaternions)
+    other = replace(clip, poses=poses, metres_per_unit=clip.metres_per_unit / 10.0**power)
+    one, same = measured(evenly(clip)), measured(evenly(other))
+    np.testing.assert_allclose(same.shell, one.shell, rtol=1e-6, atol=1e-12)
+    assert same.slide == pytest.approx(one.slide, rel=1e-6)
+
+
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+def test_a_body_of_one_joint_has_the_errors_of_a_single_rigid_one(mode: str) -> None:
+    single = swinging_clip(seconds=1.0)
+    figure = replace(
+        swinging_body().figure,
+        joints=("Only",),
+        parents=np.array([-1]),
+        rest=Poses(np.zeros((1, 3)), np.eye(4)[:1]),
+        tails=np.zeros((1, 3)),
+    )
+    poses = Poses(single.poses.positions[None], single.poses.quaternions[None])
+    made = reconstruct_body(replace(single, poses=poses, figure=figure), Uniform("6"), (mode,), 0.1)
+    errors, expected = measured(made, mode, 0.1), reconstruct(single, Uniform("6"), (mode,), 0.1).errors[mode]
+    np.testing.assert_allclose(errors.shell[0], expected.shell, atol=1e-12)
+    assert errors.velocity[0] == pytest.approx(np.sqrt(np.mean(expected.velocity**2)))
+    assert errors.rotation[0] == pytest.approx(np.sqrt(np.mean(expected.rotation**2)))
+
+
+def test_what_hangs_on_a_joint_has_its_errors_too_and_what_does_not_has_none() -> None:
+    clip = still_body()
+    shoulder = JOINTS.index("Arm")
+    swing = swinging_body()
+    clip.poses.quaternions[shoulder] = swing.poses.quaternions[shoulder]
+    errors = measured(evenly(clip, "3")).shell.max(axis=1)
+    hanging = [JOINTS.index(name) for name in ("Arm", "Hand", "Glove")]
+    assert (errors[hanging] > 1e-4).all()
+    assert np.delete(errors, hanging).max() < 1e-12
+    assert errors[hanging[1]] > errors[hanging[0]], "it is further from the axis"
+
+
+# -- feet -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_foot_that_stands_is_seen_and_how_far_it_slides_is_the_farthest_from_where_it_began() -> None:
+    clip = swinging_body()
+    made = evenly(clip, "1.5")
+    ground = Ground.of(made)
+    foot = JOINTS.index("Foot")
+    assert foot in ground.joints
+    row = ground.joints.tolist().index(foot)
+    stands = np.flatnonzero(ground.stands[row])
+    assert stands[0] == 0
+    assert 0.4 <= made.times[stands[-1]] - made.times[0] <= 0.7
+    assert ground.slide < 0.01
+    errors = measured(made)
+    shown = made.shown("lerp_slerp", made.times).positions[foot, : stands[-1] + 1]
+    assert errors.slide == pytest.approx(np.linalg.norm(shown - shown[0], axis=-1).max(), rel=1e-9)
+    assert errors.slide > ground.slide
+
+
+def test_a_body_in_the_air_has_nothing_that_stands() -> None:
+    clip = swinging_body()
+    clip.poses.positions[0] += np.linspace(0.0, 500.0, len(clip.times))[:, None] * (1.0, 0.0, 0.0)
+    ground = Ground.of(evenly(clip))
+    assert len(ground.joints) == 0
+    assert ground.slide == 0.0
+
+
+# -- modes that are one motion ----------------------------------------------------------------------------------------
+
+
+def test_modes_that_are_one_motion_are_together_and_have_the_same_keys() -> None:
+    clip = swinging_body(seed=3)
+    groups = same_body_motions(clip, tuple(KEYFRAME_MODES))
+    assert ("dq_sclerp", "pga_slerp", "cga_slerp") in groups
+    assert sorted(mode for group in groups for mode in group) == sorted(KEYFRAME_MODES)
+    made = reconstruct_body(clip, Tolerance("2cm"), tuple(KEYFRAME_MODES), RADII)
+    assert tuple(made.keys) == tuple(KEYFRAME_MODES)
+    for group in groups:
+        for mode in group:
+            assert made.keys[mode] is made.keys[group[0]]
+    assert identical_body_modes(evenly(clip, "5", tuple(KEYFRAME_MODES))) == groups
+
+
+def test_where_joints_only_turn_about_where_they_are_a_screw_is_a_turn() -> None:
+    clip = swinging_body(seed=4)
+    clip.poses.positions[0] = clip.poses.positions[0, :1]
+    groups = same_body_motions(clip, ("lerp_slerp", "dq_sclerp", "motor_spline"))
+    assert groups == (("lerp_slerp", "dq_sclerp"), ("motor_spline",))
+    walking = same_body_motions(swinging_body(seed=4), ("lerp_slerp", "dq_sclerp"))
+    assert walking == (("lerp_slerp",), ("dq_sclerp",))
+
+
+def test_a_clip_too_short_to_look_has_every_mode_on_its_own() -> None:
+    clip = swinging_body()
+    two = replace(clip, times=clip.times[:2], poses=clip.poses[:, :2])
+    assert same_body_motions(two, MODES) == tuple((mode,) for mode in MODES)
+
+
+def test_the_best_mode_has_the_fewest_keys_and_is_the_reference_where_all_have_as_many() -> None:
+    clip = swinging_body()
+    assert evenly(clip, "5", ("dq_sclerp", "lerp_slerp")).best_mode == "lerp_slerp"
+    made = reconstruct_body(clip, Tolerance("2cm"), MODES, RADII)
+    counts = {mode: sum(map(len, keys)) for mode, keys in made.keys.items()}
+    assert counts[made.best_mode] == min(counts.values())

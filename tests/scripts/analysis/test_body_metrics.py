@@ -1,0 +1,228 @@
+"""The numbers of whole bodies as rows and tables: what they are of, and that names of any kind survive."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import astuple, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.analysis import bodies
+from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct_body
+from rigid_motion_batch.analysis.body_metrics import (
+    COLUMNS,
+    MeasuredBody,
+    join_tables,
+    key_samples,
+    measure_modes,
+    numbers_of,
+    write_joint_metrics,
+    write_key_tables,
+)
+from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import body_table_names, write_metrics
+from rigid_motion_batch.comparison.body_storage import read_body_keys, write_body_keys
+from rigid_motion_batch.rows import meant
+from tests.scripts.comparison.bodies import JOINTS, swinging_body
+
+HEADER = (
+    "clip,joint,mode,rate_hz,keys,samples,rms_shell_m,p95_shell_m,max_shell_m,worst_s,"
+    "rms_position_m,rms_rotation_deg,rms_velocity_m_s,decimation,tolerance_m"
+)
+
+HOSTILE = (
+    'a,b;"c"',
+    "two\nlines",
+    "three\r\nlines\rof it",
+    "<script>alert(1)</script>",
+    "=cmd|' /C calc'!A0",
+    " ",
+    "",
+    "'=1+1\t\u2028\x85\x1c\u200b",
+)
+"""As many as the body has joints."""
+
+MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
+
+RADII = np.linspace(0.02, 0.12, len(JOINTS))
+
+CHOICES = [Uniform("5"), Tolerance("2cm")]
+
+
+def measured(
+    choice: Choice = CHOICES[0], modes: tuple[str, ...] = MODES, joints: tuple[str, ...] = JOINTS, **settings: bool
+) -> MeasuredBody:
+    clip = swinging_body(joints=joints)
+    return measure_modes(reconstruct_body(clip, choice, modes, RADII, **settings), RADII)
+
+
+def cells_of(path: Path) -> list[list[str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.reader(stream))
+    assert not any(
+        cell.startswith(("=", "+", "-", "@", "\t", "\r")) for row in rows for cell in row if not number(cell)
+    )
+    return [[meant(cell) for cell in row] for row in rows]
+
+
+def number(cell: str) -> bool:
+    return bool(re.fullmatch(r"-?[\d.]+(e[+-]\d+)?", cell))
+
+
+# -- rows -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("choice", CHOICES, ids=str)
+def test_the_rows_are_statistics_of_all_joints_and_of_each(choice: Choice) -> None:
+    found = measured(choice)
+    made = found.made
+    assert [row.mode for row in found.rows] == list(MODES)
+    assert [(row.mode, row.joint) for row in found.joints] == [(mode, joint) for mode in MODES for joint in JOINTS]
+    for row in found.rows:
+        errors = measure_body(made, row.mode, RADII, Ground.of(made))
+        own = [joint for joint in found.joints if joint.mode == row.mode]
+        assert row.rms_shell_m == pytest.approx(np.sqrt(np.mean([joint.rms_shell_m**2 for joint in own])))
+        assert row.max_shell_m == max(joint.max_shell_m for joint in own) == errors.shell.max()
+        assert row.worst_joint == max(own, key=lambda joint: joint.max_shell_m).joint
+        assert row.rms_position_m == pytest.approx(np.sqrt(np.mean([joint.rms_position_m**2 for joint in own])))
+        assert row.rms_rotation_deg == pytest.approx(np.sqrt(np.mean([joint.rms_rotation_deg**2 for joint in own])))
+        assert row.rms_velocity_m_s == pytest.approx(np.sqrt(np.mean([joint.rms_velocity_m_s**2 for joint in own])))
+        assert row.keys == sum(joint.keys for joint in own)
+        assert row.joints == len(JOINTS)
+        assert (row.rate_hz, row.decimation, row.tolerance_m) == (
+            ("5", "uniform", None) if choice is CHOICES[0] else ("", "adaptive", 0.02)
+        )
+        for number, joint in enumerate(own):
+            at = np.argmin(np.abs(made.times - made.times[0] - joint.worst_s))
+            assert errors.shell[number, at] == joint.max_shell_m
+            assert joint.rms_shell_m <= joint.max_shell_m
+            assert joint.p95_shell_m <= joint.max_shell_m
+
+
+def test_a_joint_that_stays_as_it_is_sends_nothing() -> None:
+    (row, *_) = measured().rows
+    moving = len(JOINTS) - 1
+    assert row.keys == 11 * moving + 1
+    assert row.keys_per_s == pytest.approx(5.0)
+    assert row.bytes_per_s == pytest.approx(5.0 * moving * 56)
+    assert row.key_frames == 11
+
+
+def test_blocks_of_samples_make_no_difference_to_any_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = measured()
+    monkeypatch.setattr(bodies, "BLOCK", 5)
+    pieces = measured()
+    assert pieces.groups == whole.groups
+    for one, other in zip((*whole.rows, *whole.joints), (*pieces.rows, *pieces.joints), strict=True):
+        for field in fields(one):
+            expected, found = getattr(one, field.name), getattr(other, field.name)
+            assert found == (pytest.approx(expected, abs=1e-12) if isinstance(expected, float) else expected)
+    for mode, shown in whole.modes.items():
+        np.testing.assert_allclose(pieces.modes[mode].by_joint, shown.by_joint, atol=1e-12)
+
+
+def test_modes_that_are_one_motion_are_shown_once_and_have_a_row_each() -> None:
+    found = measured()
+    assert ("dq_sclerp", "cga_slerp") in found.groups
+    assert set(found.modes) == {group[0] for group in found.groups}
+    rows = {row.mode: row for row in found.rows}
+    assert replace(rows["cga_slerp"], mode="dq_sclerp").rms_shell_m == pytest.approx(rows["dq_sclerp"].rms_shell_m)
+
+
+@pytest.mark.parametrize("seconds", [0.4, 2.0, 15.0])
+def test_what_is_shown_has_the_largest_errors_and_where_the_joints_are_then(seconds: float) -> None:
+    clip = swinging_body(seconds=seconds)
+    made = reconstruct_body(clip, Uniform("5"), ("lerp_slerp",), RADII)
+    shown = measure_modes(made, RADII).modes["lerp_slerp"]
+    errors = measure_body(made, "lerp_slerp", RADII, Ground.of(made)).shell
+    joint, sample, error = shown.worst
+    assert error == errors.max() == errors[joint, sample] == shown.over_time.max() == shown.by_joint.max()
+    np.testing.assert_array_equal(shown.over_time, errors.max(axis=0))
+    np.testing.assert_array_equal(shown.by_joint.max(axis=1), errors.max(axis=1))
+    assert shown.by_joint.shape == (len(JOINTS), min(COLUMNS, errors.shape[1]))
+    np.testing.assert_array_equal(shown.errors, errors[:, sample])
+    truth = clip.figure.skeleton.in_root_space(clip.poses[:, made.samples])[:, sample].positions * 0.01
+    np.testing.assert_allclose(shown.truth.positions, truth, atol=1e-12)
+    assert np.linalg.norm(shown.shown.positions - truth, axis=-1).max() <= error
+
+
+def test_how_many_numbers_keys_take_counts_times_turns_and_places_that_vary() -> None:
+    shared, own = (measured(CHOICES[1], ("lerp_slerp",), shared=shared).made for shared in (True, False))
+    poses = len(key_samples(shared.keys["lerp_slerp"]))
+    # The hips move and turn, the glove does neither, and the others turn.
+    assert numbers_of(shared, "lerp_slerp") == poses * (1 + 7 + 4 * (len(JOINTS) - 2))
+    counts = dict(zip(JOINTS, map(len, own.keys["lerp_slerp"]), strict=True))
+    hips, _ = counts.pop("Hips"), counts.pop("Glove")
+    assert numbers_of(own, "lerp_slerp") == 8 * hips + 5 * sum(counts.values())
+
+
+# -- tables -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_columns_are_those_promised_and_read_back_exactly(tmp_path: Path) -> None:
+    found = measured(CHOICES[1], joints=HOSTILE)
+    write_joint_metrics(tmp_path / "joints.csv", found.joints)
+    assert (tmp_path / "joints.csv").read_text().splitlines()[0] == HEADER
+    header, *rows = cells_of(tmp_path / "joints.csv")
+    assert {len(row) for row in rows} == {len(header)}
+    assert [row[1] for row in rows] == [*HOSTILE] * len(MODES)
+    for row, expected in zip(rows, found.joints, strict=True):
+        for cell, value in zip(row, astuple(expected), strict=True):
+            assert type(value)(cell) == value
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_the_worst_joint_may_be_called_anything(tmp_path: Path, name: str) -> None:
+    (row, *_) = measured().rows
+    write_metrics(tmp_path / "metrics.csv", [replace(row, worst_joint=name), row])
+    header, first, second = cells_of(tmp_path / "metrics.csv")
+    assert first[header.index("worst_joint")] == name
+    assert len(first) == len(second) == len(header)
+
+
+def test_tables_are_joined_under_one_header_whatever_joints_are_called(tmp_path: Path) -> None:
+    found = measured(joints=HOSTILE)
+    parts = [tmp_path / f"{number}.csv" for number in range(3)]
+    for part, rows in zip(parts, (found.joints, (), found.joints[:3]), strict=True):
+        write_joint_metrics(part, rows)
+    join_tables(tmp_path / "all.csv", parts)
+    write_joint_metrics(tmp_path / "expected.csv", [*found.joints, *found.joints[:3]])
+    assert (tmp_path / "all.csv").read_bytes() == (tmp_path / "expected.csv").read_bytes()
+
+
+@pytest.mark.parametrize("joints", [JOINTS, HOSTILE], ids=["plain", "hostile"])
+@pytest.mark.parametrize("choice", CHOICES, ids=str)
+def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(
+    tmp_path: Path, choice: Choice, joints: tuple[str, ...]
+) -> None:
+    made = measured(choice, joints=joints).made
+    write_key_tables(tmp_path, made)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(body_table_names(choice, MODES))
+    for name in body_table_names(choice, MODES):
+        keys = made.keys[MODES[0] if name == "keys.csv" else name.removesuffix(".keys.csv")]
+        header, *rows = cells_of(tmp_path / name)
+        assert header == ["joint", "t", "x", "y", "z", "qw", "qx", "qy", "qz"]
+        names = [joint for joint, own in zip(joints, keys, strict=True) for _ in own]
+        assert [row[0] for row in rows] == names
+        assert [[float(cell) for cell in row[1:]] for row in rows] == [
+            [made.clip.times[key], *made.clip.poses.positions[number, key], *made.clip.poses.quaternions[number, key]]
+            for number in range(len(joints))
+            for key in keys[number]
+        ]
+
+
+@pytest.mark.parametrize("shared", [False, True])
+@pytest.mark.parametrize("choice", CHOICES, ids=str)
+def test_keys_are_read_back_from_their_file_as_they_were(tmp_path: Path, choice: Choice, shared: bool) -> None:
+    made = measured(choice, tuple(KEYFRAME_MODES), shared=shared).made
+    write_body_keys(tmp_path / "keys.npz", made)
+    again = read_body_keys(tmp_path / "keys.npz", made.clip, choice, shared=shared)
+    assert again.shared == made.shared
+    assert list(again.keys) == list(made.keys)
+    for mode, keys in made.keys.items():
+        assert [own.tolist() for own in again.keys[mode]] == [own.tolist() for own in keys]
+    assert measure_modes(again, RADII).rows == measure_modes(made, RADII).rows

@@ -1,0 +1,98 @@
+"""Key poses needed by whole bodies: they reach what they have to, and no fewer do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.analysis.body_needed import NEAR, OfBody
+from rigid_motion_batch.analysis.metrics import NOTHING
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, evenly_spaced, from_json, keys_needed, to_json
+from tests.motion.bodies import body_errors
+from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
+
+MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
+
+RADII = np.linspace(0.02, 0.12, len(JOINTS))
+
+WAYS = OfBody(swinging_body(seconds=1.3, seed=6), RADII)
+
+
+def rms(ways: OfBody, keys: np.ndarray, mode: str) -> float:
+    """By matrices, in metres."""
+    clip = ways.clip
+    metres = Poses(clip.poses.positions * clip.metres_per_unit, clip.poses.quaternions)
+    return float(np.sqrt(np.mean(body_errors(clip.times, metres, PARENTS, (keys,) * len(JOINTS), mode, RADII) ** 2)))
+
+
+@pytest.fixture(scope="module")
+def found() -> KeysNeeded:
+    return keys_needed(WAYS, MODES)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_error_is_that_of_key_poses_in_the_roots_space(mode: str) -> None:
+    keys = np.array([0, 4, 9, 20, 39])
+    assert WAYS.error(keys, mode) == pytest.approx(rms(WAYS, keys, mode), rel=1e-6)
+
+
+def test_the_reference_is_evenly_spaced_and_modes_that_are_one_motion_are_one(found: KeysNeeded) -> None:
+    assert found.groups[:2] == (("lerp_slerp",), ("dq_sclerp", "cga_slerp"))
+    assert found.keys.shape == (3, 2, len(RATES))
+    assert found.targets[-1] == pytest.approx(WAYS.between(0, 36).error(np.arange(0, 37, 6), "lerp_slerp"))
+    assert found.reference_keys.tolist() == [40, 27, 20, 16, 11, 7]
+
+
+def test_with_every_sample_a_key_there_is_nothing_to_be_as_good_as(found: KeysNeeded) -> None:
+    assert found.targets[0] < NOTHING
+    assert np.isnan(found.keys[..., 0]).all()
+
+
+def test_the_keys_needed_are_as_good_and_those_of_the_motion_are_no_more(found: KeysNeeded) -> None:
+    for place in range(1, len(RATES)):
+        uniform, adaptive = found.keys[:, 0, place], found.keys[:, 1, place]
+        assert uniform[0] == found.reference_keys[place]
+        finite = np.isfinite(found.keys[..., place])
+        assert (found.reached[..., place][finite] <= found.targets[place] * (1.0 + 1e-9)).all()
+        assert (adaptive[np.isfinite(uniform)] <= uniform[np.isfinite(uniform)]).all()
+
+
+def test_evenly_one_key_fewer_is_not_as_good(found: KeysNeeded) -> None:
+    for row, (mode, *_) in list(enumerate(found.groups))[1:]:
+        for place in range(1, len(RATES)):
+            keys = found.keys[row, 0, place]
+            if np.isfinite(keys) and keys > 2:
+                last = round(found.durations[place] * 30.0)
+                stretch = WAYS.between(0, last)
+                fewer = evenly_spaced(stretch.clip, int(keys) - 2)
+                assert stretch.error(fewer, mode) > found.targets[place]
+
+
+def test_the_search_for_keys_of_the_motion_ends_near_the_fewest() -> None:
+    target = WAYS.error(evenly_spaced(WAYS.clip, 8), "lerp_slerp")
+    ((keys, error),) = WAYS.by_motion("lerp_slerp", target, 9)
+    assert error <= target
+    assert len(keys) <= 9
+    assert WAYS.error(keys, "lerp_slerp") == error
+    fewer, worse = WAYS._best_of(len(keys) - max(1, int(NEAR * len(keys))), "lerp_slerp")
+    assert len(fewer) < len(keys)
+    assert worse > target
+
+
+def test_where_nothing_less_will_do_every_sample_is_a_key() -> None:
+    ((keys, error),) = WAYS.by_motion("lerp_slerp", 0.0, 4)
+    assert len(keys) == len(WAYS.clip.times)
+    assert error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_body_of_which_nothing_moves_needs_nothing() -> None:
+    nothing = keys_needed(OfBody(still_body(), RADII), MODES)
+    assert np.isnan(nothing.keys).all()
+
+
+def test_what_was_found_is_read_back_as_it_was(found: KeysNeeded) -> None:
+    again = from_json(to_json(found))
+    assert again.groups == found.groups
+    for name in ("keys", "reached", "targets", "durations", "reference_keys", "uniform_errors"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(found, name))

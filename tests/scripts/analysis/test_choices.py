@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.reconstructions import reconstruct
+from rigid_motion_batch.recordings.clips import Clip
+from tests.balls import largest_displacements
+from tests.scripts.comparison.recordings import swinging_clip
+
+
+def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -> np.ndarray:
+    """By SciPy and singular values: how far any point within the radius is off, in metres."""
+    shown = interpolate(clip.times[keys], clip.poses[keys], clip.times, mode)
+    matrices = [Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix() for poses in (shown, clip.poses)]
+    offsets = (shown.positions - clip.poses.positions) * clip.metres_per_unit
+    return largest_displacements(offsets, radius * (matrices[0] - matrices[1]))
+
+
+@pytest.mark.parametrize("mode", KEYFRAME_MODES)
+@pytest.mark.parametrize("written", ["2mm", "0.5cm", "0.03m", "0.01"])
+def test_adaptive_keys_keep_to_the_tolerance(written: str, mode: str) -> None:
+    clip = swinging_clip(seconds=1.5)
+    keys = Tolerance(written).keys(clip, mode, 0.1)
+    metres = {"2mm": 0.002, "0.5cm": 0.005, "0.03m": 0.03, "0.01": 0.01}[written]
+    assert shell_errors(clip, keys, mode).max() <= metres * (1.0 + 1e-9)
+    assert (keys[0], keys[-1]) == (0, len(clip.times) - 1)
+    assert len(keys) < 0.6 * len(clip.times)
+
+
+def test_a_tolerance_with_a_unit_is_the_same_length_in_recordings_of_any_unit() -> None:
+    clip = swinging_clip()
+    poses = Poses(clip.poses.positions * 1e3, clip.poses.quaternions)
+    in_millimetres = replace(clip, poses=poses, metres_per_unit=1e-3)
+    keys = Tolerance("5mm").keys(in_millimetres, "motor_spline", 0.1)
+    assert np.array_equal(keys, Tolerance("0.5cm").keys(clip, "motor_spline", 0.1))
+    assert np.array_equal(keys, Tolerance("5").keys(in_millimetres, "motor_spline", 0.1))
+    assert np.array_equal(keys, Tolerance("0.005").keys(clip, "motor_spline", 0.1))
+    assert shell_errors(in_millimetres, keys, "motor_spline").max() <= 0.005 * (1.0 + 1e-9)
+    assert Tolerance("5").tolerance(in_millimetres) == pytest.approx(0.005)
+
+
+def test_a_larger_shell_takes_more_keys() -> None:
+    clip = swinging_clip()
+    assert len(Tolerance("5mm").keys(clip, "dq_sclerp", 0.5)) > len(Tolerance("5mm").keys(clip, "dq_sclerp", 0.05))
+
+
+@pytest.mark.parametrize(("seconds", "rate", "count"), [(3.0, "10", 31), (1.0, "7.5", 8), (3.0, "500", 271)])
+def test_a_budget_is_as_many_keys_as_a_sender_at_that_rate_has_and_better_ones(
+    seconds: float, rate: str, count: int
+) -> None:
+    clip = swinging_clip(seconds=seconds)
+    keys = Budget(rate).keys(clip, "lerp_slerp", 0.1)
+    evenly = Uniform(rate).keys(clip, "lerp_slerp", 0.1)
+    assert len(keys) == len(evenly) == count
+    adaptive, uniform = (
+        np.mean(shell_errors(clip, some, "lerp_slerp")[: evenly[-1] + 1] ** 2) for some in (keys, evenly)
+    )
+    assert adaptive <= uniform
+
+
+@pytest.mark.parametrize("choice", [Uniform("0.2"), Budget("0.2")])
+def test_a_clip_too_short_for_two_keys_is_not_reconstructed(choice: Choice) -> None:
+    assert reconstruct(swinging_clip(), choice, KEYFRAME_MODES, 0.1) is None
+
+
+def test_a_reconstruction_keeps_the_keys_of_each_mode_apart_but_those_of_one_motion_together() -> None:
+    clip = swinging_clip()
+    made = reconstruct(clip, Tolerance("5mm"), KEYFRAME_MODES, 0.1)
+    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == tuple(KEYFRAME_MODES)
+    assert np.array_equal(made.keys["dq_sclerp"], made.keys["cga_slerp"])
+    assert len(made.keys["motor_spline"]) < len(made.keys["dq_sclerp"])
+    for mode, keys in made.keys.items():
+        assert made.errors[mode].shell.max() == pytest.approx(shell_errors(clip, keys, mode).max(), rel=1e-9)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 4, 5, 7, 8, 12])
+def test_recordings_of_a_few_samples_have_adaptive_keys_too(samples: int) -> None:
+    clip = swinging_clip()
+    few = replace(clip, times=clip.times[::20][:samples], poses=clip.poses[::20][:samples])
+    made = reconstruct(few, Tolerance("1mm"), KEYFRAME_MODES, 0.1)
+    assert max(errors.shell.max() for errors in made.errors.values()) <= 1e-3
+
+
+@pytest.mark.parametrize(
+    ("choice", "name", "phrase"),
+    [
+        (Uniform("7.5"), "7.5", "at 7.5 keys/s"),
+        (Budget("10"), "budget-10", "at 10 keys/s on average"),
+        (Tolerance("5mm"), "tolerance-5mm", "within 5 mm"),
+        (Tolerance("0.25"), "tolerance-0.25", "within 0.25 units of the recording"),
+    ],
+)
+def test_a_choice_says_what_it_is(choice: Choice, name: str, phrase: str) -> None:
+    assert (choice.name, choice.phrase) == (name, phrase)
+
+
+@pytest.mark.parametrize("written", ["0mm", "-5mm", "5in", "5 m m", "1e-3", "nan", "", "mm", "5MM", "../x", "5mm\n"])
+def test_what_is_no_length_is_refused_with_the_way_out(written: str) -> None:
+    with pytest.raises(ValueError, match=r"is no tolerance; give a length such as 5mm, 0.5cm or 0.005m"):
+        Tolerance(written)
+
+
+@pytest.mark.parametrize("kind", [Uniform, Budget])
+@pytest.mark.parametrize("written", ["0", "-1", "5mm", "1e3", "../../x", ""])
+def test_what_is_no_rate_is_refused_with_the_way_out(kind: type[Choice], written: str) -> None:
+    with pytest.raises(ValueError, match=r"is no rate; give numbers such as 5,7\.5,10"):
+        kind(written)
+
+
+@pytest.mark.parametrize("choice", [Uniform("3"), Budget("3"), Tolerance("10mm"), Tolerance("0.4")], ids=str)
+def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_what_they_were_chosen_for(choice) -> None:
+    clip = replace(swinging_clip(seed=19), metres_per_unit=0.1)
+    modes = ("lerp_slerp", "dq_sclerp", "motor_spline")
+    made = reconstruct(clip, choice, (*modes, BEST_OF), 0.1)
+    errors = {mode: np.sqrt(np.mean(own.shell**2)) for mode, own in made.errors.items()}
+    best = min(modes, key=lambda mode: (len(made.keys[mode]), errors[mode]))
+    assert tuple(made.keys) == tuple(made.poses) == tuple(made.errors) == (*modes, BEST_OF)
+    assert np.array_equal(made.keys[BEST_OF], made.keys[best])
+    assert len(made.segment_modes) == len(made.keys[best]) - 1
+    assert errors[BEST_OF] <= errors[best] * (1.0 + 1e-6)
+    if choice.decimation == "uniform":
+        assert len(set(made.segment_modes)) > 1
+        assert errors[BEST_OF] < errors[best]
+    elif isinstance(choice, Tolerance):
+        assert made.errors[BEST_OF].shell.max() <= choice.tolerance(clip) * (1.0 + 1e-9)

@@ -1,0 +1,200 @@
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import KEYFRAME_MODES, Poses, decimate, reduce_keys
+from rigid_motion_batch.analysis.needed import (
+    RATES,
+    TABLE_RATES,
+    KeysNeeded,
+    OfRigidBody,
+    evenly_spaced,
+    keys_needed,
+    overall,
+    write_keys_needed,
+)
+from rigid_motion_batch.recordings.clips import Clip
+from tests.scripts.analysis.test_choices import shell_errors
+from tests.scripts.comparison.recordings import swinging_clip
+
+GROUPS = (("lerp_slerp",), ("dq_sclerp", "pga_slerp", "cga_slerp"), ("pga_lerp", "cga_lerp"), ("motor_spline",))
+
+
+def rms(errors: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def between(clip: Clip, first: int, last: int) -> Clip:
+    return replace(clip, times=clip.times[first : last + 1], poses=clip.poses[first : last + 1])
+
+
+@pytest.fixture(scope="module")
+def swing() -> Clip:
+    return swinging_clip(seconds=2.05)
+
+
+@pytest.fixture(scope="module")
+def found(swing: Clip) -> KeysNeeded:
+    return keys_needed(OfRigidBody(swing, 0.1), KEYFRAME_MODES)
+
+
+def test_the_rates_are_those_of_the_papers_table_and_some_below() -> None:
+    assert TABLE_RATES == ("30", "20", "15", "12")
+    assert RATES[:4] == TABLE_RATES
+
+
+def test_the_error_to_reach_is_that_of_the_reference_at_its_rate(swing: Clip, found: KeysNeeded) -> None:
+    assert found.groups == GROUPS
+    for place, rate in enumerate(RATES):
+        keys = decimate(swing.times, float(rate))
+        covered = between(swing, 0, keys[-1])
+        assert found.reference_keys[place] == len(keys)
+        assert found.durations[place] == covered.times[-1] - covered.times[0]
+        for row, (mode, *_) in enumerate(GROUPS):
+            error = rms(shell_errors(covered, keys, mode))
+            assert found.uniform_errors[row, place] == pytest.approx(error, rel=1e-9)
+        assert found.targets[place] == found.uniform_errors[0, place]
+
+
+def test_adaptive_keys_reach_it_over_the_same_samples(swing: Clip, found: KeysNeeded) -> None:
+    for place, rate in enumerate(RATES):
+        covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
+        for row, (mode, *_) in enumerate(GROUPS):
+            keys = reduce_keys(covered.times, covered.poses, mode, found.targets[place], 0.1, rms=True)
+            error = rms(shell_errors(covered, keys, mode))
+            assert error <= found.targets[place] * (1.0 + 1e-9)
+            assert found.keys[row, 1, place] == len(keys)
+            assert found.reached[row, 1, place] == pytest.approx(error, rel=1e-9)
+
+
+def test_evenly_spaced_keys_reach_it_and_one_segment_fewer_do_not(swing: Clip, found: KeysNeeded) -> None:
+    for place, rate in enumerate(RATES):
+        covered = between(swing, 0, decimate(swing.times, float(rate))[-1])
+        for row, (mode, *_) in list(enumerate(GROUPS))[1:]:
+            segments = int(found.keys[row, 0, place]) - 1
+            enough, fewer = (
+                rms(shell_errors(covered, evenly_spaced(covered, count), mode)) for count in (segments, segments - 1)
+            )
+            assert enough <= found.targets[place] * (1.0 + 1e-9) < fewer
+            assert found.reached[row, 0, place] == pytest.approx(enough, rel=1e-9)
+
+
+def test_the_reference_needs_its_own_keys_and_shares_are_counted_from_them(found: KeysNeeded) -> None:
+    assert (found.shares[0, 0] == 1.0).all()
+    assert np.array_equal(found.keys[0, 0], found.reference_keys)
+    assert np.allclose(found.shares * found.reference_keys, found.keys)
+    assert np.allclose(found.keys_per_s * found.durations, found.keys - 1.0)
+    assert (found.shares[3, 1] < found.shares[0, 1]).all()
+
+
+def test_without_the_reference_among_the_modes_it_is_still_what_is_reached(swing: Clip, found: KeysNeeded) -> None:
+    alone = keys_needed(OfRigidBody(swing, 0.1), ["dq_sclerp"])
+    assert np.array_equal(alone.targets, found.targets)
+    assert np.array_equal(alone.keys[0], found.keys[1])
+
+
+def test_fitted_keys_reach_it_and_are_fewer(swing: Clip, found: KeysNeeded) -> None:
+    shaken = np.random.default_rng(3).normal(size=swing.poses.positions.shape)
+    clip = replace(swing, poses=Poses(swing.poses.positions + 1e-3 * shaken, swing.poses.quaternions))
+    with_fitted = keys_needed(OfRigidBody(clip, 0.1, fit=True), ["motor_spline"])
+    assert with_fitted.keys.shape == (1, 3, len(RATES))
+    assert (with_fitted.reached[:, 2] <= with_fitted.targets * (1.0 + 1e-9)).all()
+    assert (with_fitted.keys[:, 2] <= with_fitted.keys[:, 1]).all()
+    assert with_fitted.keys[:, 2].sum() < 0.97 * with_fitted.keys[:, 1].sum()
+    assert overall([with_fitted, with_fitted]).shares == pytest.approx(with_fitted.shares)
+    assert found.keys.shape[1] == 2
+
+
+def test_the_unit_of_a_recording_makes_no_difference(swing: Clip, found: KeysNeeded) -> None:
+    poses = Poses(swing.poses.positions * 1e2, swing.poses.quaternions)
+    other = keys_needed(OfRigidBody(replace(swing, poses=poses, metres_per_unit=1e-2), 0.1), KEYFRAME_MODES)
+    np.testing.assert_allclose(other.targets, found.targets, rtol=1e-9)
+    assert np.array_equal(other.keys, found.keys)
+
+
+def test_where_the_reference_has_all_samples_or_no_two_there_is_nothing_to_reach() -> None:
+    slow = keys_needed(OfRigidBody(swinging_clip(seconds=2.0, rate=15.0), 0.1), ["lerp_slerp", "motor_spline"])
+    assert np.isnan(slow.keys[:, :, :3]).all()
+    assert np.isfinite(slow.keys[:, :, 3:]).all()
+    short = keys_needed(OfRigidBody(swinging_clip(seconds=0.1), 0.1), ["lerp_slerp"])
+    assert np.isnan(short.keys[:, :, RATES.index("8")]).all()
+    assert np.isfinite(short.keys[:, :, RATES.index("30")]).all()
+
+
+def test_what_takes_every_sample_is_not_reached() -> None:
+    random = np.random.default_rng(0)
+    clip = swinging_clip(seconds=2.0, rate=30.5)
+    shaken = replace(clip, poses=Poses(random.normal(size=(len(clip.times), 3)), clip.poses.quaternions))
+    found = keys_needed(OfRigidBody(shaken, 0.1), ["lerp_slerp", "motor_spline"])
+    at = RATES.index("30")
+    assert found.targets[at] > 0.1
+    assert np.isinf(found.keys[1, 0, at])
+    assert np.isnan(overall([found]).shares[1, 0, at])
+    assert (overall([found]).clips[1, 0, at], overall([found]).asked[at]) == (0, 1)
+
+
+def clip_of(
+    name: str, keys: object, reference: float = 100.0, groups: object = (("lerp_slerp",), ("dq_sclerp",))
+) -> KeysNeeded:
+    """A clip of 10 s in which so many keys, (groups, decimations), were needed at each of two rates."""
+    keys = np.repeat(np.array(keys, dtype=float)[..., None], 2, axis=-1)
+    return KeysNeeded(
+        clip=name,
+        groups=groups,
+        rates=RATES[:2],
+        durations=np.full(2, 10.0),
+        reference_keys=np.full(2, reference),
+        targets=np.full(2, 2e-3),
+        keys=keys,
+        reached=np.full(keys.shape, 1e-3),
+        uniform_errors=np.full((len(keys), 2), 4e-3),
+    )
+
+
+def test_over_all_clips_shares_and_rates_are_geometric_means() -> None:
+    together = overall([clip_of("a", [[101, 51], [101, 26]], 101), clip_of("b", [[201, 201], [201, 101]], 201)])
+    assert together.keys_per_s[1, 1, 0] == pytest.approx(np.sqrt(2.5 * 10.0))
+    assert together.shares[1, 1, 0] == pytest.approx(np.sqrt(26 / 101 * 101 / 201))
+    assert together.reference_keys_per_s[0] == pytest.approx(np.sqrt(200.0))
+    assert together.uniform_errors[0, 0] == pytest.approx(4e-3)
+
+
+def test_over_all_clips_those_count_that_reached_the_error_and_it_is_known_how_many() -> None:
+    together = overall(
+        [
+            clip_of("a", [[100, 50], [100, np.inf]]),
+            clip_of("b", [[100, 25], [100, 60]]),
+            clip_of("c", np.full((2, 2), np.nan)),
+        ]
+    )
+    assert together.asked.tolist() == [2, 2]
+    assert together.clips[:, 1, 0].tolist() == [2, 1]
+    assert together.shares[:, 1, 0] == pytest.approx([np.sqrt(0.5 * 0.25), 0.6])
+
+
+def test_modes_that_part_on_one_clip_are_apart_over_all() -> None:
+    same = clip_of("a", [[100, 50]], groups=(("lerp_slerp", "dq_sclerp"),))
+    together = overall([same, clip_of("b", [[100, 50], [80, 40]])])
+    assert together.groups == (("lerp_slerp",), ("dq_sclerp",))
+    assert together.shares[:, 1, 0] == pytest.approx([0.5, np.sqrt(0.5 * 0.4)])
+
+
+def test_the_table_as_a_file_has_a_row_for_every_mode_and_reads_back_exactly(tmp_path: Path, found: KeysNeeded) -> None:
+    never = clip_of("b", [[100, 50], [np.inf, np.nan]])
+    write_keys_needed(tmp_path / "keys_needed.csv", [found, never])
+    with (tmp_path / "keys_needed.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(KEYFRAME_MODES) * 2 * len(RATES) + 6
+    for row in rows[:-6]:
+        group = next(place for place, modes in enumerate(GROUPS) if row["mode"] in modes)
+        at = group, ("uniform", "adaptive").index(row["decimation"]), RATES.index(row["as_good_as_hz"])
+        assert float(row["wanted_rms_shell_m"]) == found.targets[at[-1]]
+        written = [float(row[name]) for name in ("keys", "keys_per_s", "share", "rms_shell_m")]
+        assert written == [found.keys[at], found.keys_per_s[at], found.shares[at], found.reached[at]]
+    assert [row["keys"] for row in rows[-6:]] == ["100", "100", "50", "50", "", ""]
+    assert {row["share"] for row in rows[-2:]} == {""}

@@ -1,0 +1,76 @@
+"""Reading sources: of several bodies the good ones stay, and the others are named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.recordings import Recording, Trajectory, TrajectoryError
+from rigid_motion_batch.recordings import clip_reading as study
+
+
+def body(name: str, sound: int, lost: int = 0) -> Trajectory:
+    """A body with so many good samples, and so many that were not tracked."""
+    positions = np.zeros((sound + lost, 3))
+    positions[sound:] = np.nan
+    quaternions = np.tile((1.0, 0.0, 0.0, 0.0), (sound + lost, 1))
+    return Trajectory(name, np.arange(sound + lost, dtype=float), Poses(positions, quaternions))
+
+
+@pytest.fixture
+def recorded(monkeypatch: pytest.MonkeyPatch):
+    """Lets a source hold these bodies."""
+
+    def hold(*bodies: Trajectory, named: str = "") -> None:
+        recording = Recording(Path("take.csv"), bodies, body=named)
+        monkeypatch.setattr(study, "read_trajectories", lambda source, options: recording)
+
+    return hold
+
+
+def test_a_body_without_two_poses_is_left_out_and_named(recorded):
+    recorded(body("left", 5), body("tracker", 1, lost=7), body("right", 4))
+    clips, note = study.read_source("take.csv:*", "blender")
+    assert [clip.name for clip in clips] == ["take-left", "take-right"]
+    assert note.startswith("'tracker' is left out: 1 usable poses are left")
+
+
+def test_what_is_hard_to_believe_comes_before_what_was_repaired(recorded):
+    recorded(replace(body("left", 5, lost=1), warnings=("as slow as a snail",)))
+    ((clip,), _) = study.read_source("take.csv", "blender")
+    assert clip.repairs[0] == "as slow as a snail"
+    assert clip.repairs[1].startswith("dropped rows with numbers that are missing")
+
+
+@pytest.mark.parametrize("bodies", [("left",), ("left", "right")])
+def test_a_source_without_any_good_body_is_refused(recorded, bodies):
+    recorded(*(body(name, 1, lost=3) for name in bodies))
+    with pytest.raises(TrajectoryError, match="1 usable poses are left"):
+        study.read_source("take.csv:*", "blender")
+
+
+def test_a_body_that_was_named_is_remembered_and_the_clip_has_the_name_of_its_file(recorded):
+    recorded(body("left", 5), named="left")
+    ((clip,), _) = study.read_source("take.csv:left", "blender")
+    assert (clip.name, clip.body) == ("take", "left")
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names"),
+    [
+        ([("log", "left")], ["log"]),
+        ([("log", "left"), ("other", "left")], ["log", "other"]),
+        ([("log", "left"), ("log", "right")], ["log-left", "log-right"]),
+        ([("log", ""), ("Log", "right")], ["log", "Log-right"]),
+        ([("log-left", ""), ("log-right", ""), ("log", "left")], ["log-left", "log-right", "log"]),
+        ([("log", "left"), ("log", "left")], ["log-left", "log-left-2"]),
+        ([("log", ""), ("log", "")], ["log", "log-2"]),
+        ([("shot", "Rig/Hand"), ("shot", "Rig/Foot")], ["shot-Rig_Hand", "shot-Rig_Foot"]),
+    ],
+)
+def test_the_body_is_part_of_the_name_only_where_files_have_the_same(wanted, names):
+    assert study.clip_names(wanted) == names

@@ -1,0 +1,142 @@
+"""Why a task would be done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.pipeline import steps as pipeline_steps
+from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.explain import explain
+from rigid_motion_batch.pipeline.running import run
+from rigid_motion_batch.pipeline.steps import OWN, Step, Task, digest_of
+from rigid_motion_batch.pipeline.store import Store
+from tests.scripts.pipeline import steps
+from tests.scripts.pipeline.plans import joining, run_in, task, writing
+from tests.scripts.pipeline.steps import Write
+
+
+def explained(output: Path, *tasks: Task) -> dict[str, str]:
+    store = Store(output)
+    return {task.name: reason for task, reason in explain(lambda: tasks, store)}
+
+
+@pytest.fixture
+def output(tmp_path: Path) -> Path:
+    return tmp_path / "out"
+
+
+def two(text: str = "1") -> tuple[Task, Task]:
+    first = writing("a", text, title="The first")
+    return first, joining("b", first)
+
+
+def test_what_was_never_done_is_said_to_be_and_nothing_is_written(output: Path) -> None:
+    assert explained(output, *two()) == {"a": "never done", "b": "never done"}
+    assert not output.exists()
+    run_in(output, *two())
+    assert explained(output, *two()) == {}
+
+
+def test_what_changed_is_named(output: Path) -> None:
+    run_in(output, *two())
+    assert explained(output, *two("2")) == {
+        "a": "parameters changed (text: 1 -> 2)",
+        "b": "an earlier step changed (The first)",
+    }
+
+
+def test_a_changed_file_is_named(output: Path, tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("1")
+
+    def copying(store: Store) -> Task:
+        return task("a", steps.copy, inputs=(store.input(source),))
+
+    with Store(output) as store:
+        run(lambda: [copying(store)], store, SerialExecutor())
+    source.write_text("2")
+    store = Store(output)
+    assert [reason for _, reason in explain(lambda: [copying(store)], store)] == [f"input file changed ({source})"]
+
+
+def test_files_that_are_missing_or_edited_are_named(output: Path) -> None:
+    run_in(output, *two())
+    (output / "a.txt").unlink()
+    (output / "b.txt").unlink()
+    (output / "b.txt").write_text("mine")
+    assert explained(output, *two()) == {"a": "a.txt missing", "b": "b.txt edited"}
+
+
+def test_a_damaged_result_is_named(output: Path) -> None:
+    hidden = task("a", steps.write, Write("1"), publish={})
+    run_in(output, hidden)
+    (path,) = (output / OWN).glob("results/*/out.txt")
+    path.unlink()
+    assert explained(output, hidden) == {"a": "its result is damaged or gone"}
+
+
+def test_temporary_tasks_are_named_where_they_would_be_done(output: Path) -> None:
+    piece = Task(steps.piece, Write("1"), "piece")
+    run_in(output, piece, joining("film", piece))
+    assert explained(output, piece, joining("film", piece)) == {}
+    other = Task(steps.piece, Write("2"), "piece")
+    assert [*explained(output, other, joining("film", other))] == ["piece", "film"]
+
+
+# -- versions ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A room of the program."""
+    monkeypatch.setattr(pipeline_steps, "place_of_room", lambda name: tmp_path / name)
+    digest_of.cache_clear()
+    (tmp_path / "measuring" / "deep").mkdir(parents=True)
+    (tmp_path / "drawing").mkdir()
+    return tmp_path
+
+
+def in_rooms(*rooms: str) -> Task:
+    digest_of.cache_clear()
+    return task("a", Step(steps.write.function, rooms=rooms), Write("1"), publish={})
+
+
+def test_a_change_in_a_room_redoes_the_steps_that_use_it_and_no_others(room: Path, output: Path) -> None:
+    inner = room / "measuring" / "deep" / "one.py"
+    inner.write_text("1")
+    before, other = in_rooms("measuring"), in_rooms("drawing")
+    run_in(output, before)
+    inner.write_text("2")
+    (room / "measuring" / "__pycache__").mkdir()
+    assert in_rooms("measuring").key != before.key
+    assert in_rooms("drawing").key == other.key
+    assert explained(output, in_rooms("measuring")) == {"a": "program changed (measuring)"}
+    (room / "measuring" / "__pycache__" / "one.pyc").write_text("")
+    inner.write_text("1")
+    assert in_rooms("measuring").key == before.key
+
+
+@pytest.mark.parametrize("change", ["added", "removed", "renamed"])
+def test_files_that_come_and_go_change_a_room(room: Path, change: str) -> None:
+    template = room / "measuring" / "page.html"
+    template.write_text("1")
+    before = in_rooms("measuring").key
+    if change == "added":
+        (room / "measuring" / "chart.json").write_text("")
+    elif change == "removed":
+        template.unlink()
+    else:
+        template.rename(template.with_name("other.html"))
+    assert in_rooms("measuring").key != before
+
+
+def test_a_room_that_does_not_exist_is_an_error() -> None:
+    with pytest.raises(KeyError):
+        pipeline_steps.place_of_room("kitchen")
+
+
+def test_rooms_are_folders_and_files_of_the_program() -> None:
+    places = [pipeline_steps.place_of_room(name) for name in ("pipeline", "files.py", "rigid_motion/motion")]
+    assert all(place.exists() for place in places)

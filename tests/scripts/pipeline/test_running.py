@@ -1,0 +1,471 @@
+"""What a run does, whoever does it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.pipeline import running
+from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
+from rigid_motion_batch.pipeline.running import Outcome, Share, State, run
+from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.store import Store
+from tests.scripts.pipeline import steps
+from tests.scripts.pipeline.plans import EXECUTORS, Listener, contents, joining, run_in, states, task, writing
+from tests.scripts.pipeline.steps import FILE, Count, Die, Fail, Nothing, Write
+
+
+@pytest.fixture
+def output(tmp_path: Path) -> Path:
+    return tmp_path / "out"
+
+
+class Log:
+    """Which tasks were begun, between two looks."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.seen = path, 0
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+    def new(self) -> list[str]:
+        lines = self.path.read_text().split() if self.path.exists() else []
+        lines, self.seen = lines[self.seen :], len(lines)
+        return sorted(lines)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Log:
+    return Log(tmp_path / "log")
+
+
+def three(log: object = "", text: str = "1") -> tuple[Task, Task, Task]:
+    """Two tasks, and one that reads them."""
+    first, second = writing("a", text, log), writing("b", "2", log)
+    return first, second, joining("c", first, second, log=log)
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_tasks_are_done_and_their_files_are_in_place(output: Path, executor: str) -> None:
+    outcome = run_in(output, *three(), executor=EXECUTORS[executor]())
+    assert states(outcome) == {"done": 3}
+    assert contents(output) == {"a.txt": "1", "b.txt": "2", "c.txt": "12"}
+    assert outcome.facts["characters"] == 2
+    assert str(outcome) == "3 done"
+
+
+def test_a_second_run_does_nothing(output: Path, log: Log) -> None:
+    run_in(output, *three(log))
+    assert log.new() == ["1", "2", "join"]
+    assert states(run_in(output, *three(log))) == {"up to date": 3}
+    assert log.new() == []
+
+
+def test_a_changed_parameter_redoes_its_task_and_those_that_read_it(output: Path, log: Log) -> None:
+    run_in(output, *three(log))
+    log.new()
+    assert states(run_in(output, *three(log, "3"))) == {"done": 2, "up to date": 1}
+    assert log.new() == ["3", "join"]
+    assert contents(output)["c.txt"] == "32"
+
+
+def test_going_back_to_earlier_parameters_does_nothing_but_publish(output: Path, log: Log) -> None:
+    run_in(output, *three(log))
+    run_in(output, *three(log, "3"))
+    log.new()
+    run_in(output, *three(log))
+    assert log.new() == []
+    assert contents(output) == {"a.txt": "1", "b.txt": "2", "c.txt": "12"}
+
+
+def test_a_changed_input_redoes_its_task_and_those_that_read_it(output: Path, log: Log, tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("1")
+
+    def redone() -> list[str]:
+        with Store(output) as store, SerialExecutor() as executor:
+            first = task("a", steps.copy, Nothing(str(log)), inputs=(store.input(source),))
+            tasks = first, joining("c", first, log=log), writing("b", "b", log)
+            run(lambda: tasks, store, executor)
+        return log.new()
+
+    assert redone() == ["b", "copy", "join"]
+    source.touch()
+    assert redone() == []
+    source.write_text("2")
+    assert redone() == ["copy", "join"]
+    assert contents(output)["c.txt"] == "2"
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_a_failure_is_said_and_the_others_go_on(output: Path, executor: str) -> None:
+    bad, good = task("bad", steps.fail, Fail()), writing("a")
+    needs_bad = joining("c", bad, good)
+    tasks = good, bad, joining("b", good), needs_bad, joining("d", needs_bad)
+    outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
+    assert states(outcome) == {"done": 2, "failed": 1, "skipped": 2}
+    assert outcome.failures == {"bad": "it cannot be made; make another"}
+    assert sorted(contents(output)) == ["a.txt", "b.txt"]
+    assert str(outcome) == "2 done, 1 failed, 2 skipped"
+
+
+def test_an_error_that_nobody_foresaw_names_its_task_and_a_file_says_where(output: Path) -> None:
+    outcome = run_in(output, writing("a"), task("bad", steps.fail, Fail(foreseen=False), title="The bad one"))
+    assert outcome.failures["bad"] == "The bad one: KeyError: 'unforeseen'"
+    failures = json.loads((output / OWN / "failures.json").read_text())
+    assert "in fail" in failures["bad"]["details"]
+    run_in(output, writing("a"))
+    run_in(output, writing("b"))
+    assert not (output / OWN / "failures.json").exists()
+
+
+@pytest.mark.parametrize("beside", ["", ".123."])
+def test_an_error_of_the_system_names_the_file_where_it_would_have_been(output: Path, beside: str) -> None:
+    names = {"x/keys.csv": "keys.csv", "x/best_of.keys.csv": "a/best_of.keys.csv"}
+    outcome = run_in(output, task("c", steps.stumble, Write(f"x/{beside}best_of.keys.csv"), publish=names))
+    assert outcome.failures["c"].startswith(f"c: {output}/a/best_of.keys.csv: ")
+
+
+def test_a_task_that_does_not_make_what_it_publishes_has_failed(output: Path) -> None:
+    outcome = run_in(output, task("a", steps.forget))
+    assert outcome.failures["a"] == f"{output / 'a.txt'}: this was to be made, and was not"
+
+
+def test_a_task_that_failed_is_tried_again_the_next_time(output: Path, tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+
+    def attempt() -> Outcome:
+        with Store(output) as store, SerialExecutor() as executor:
+            first = task("a", steps.copy, inputs=(store.input(source),))
+            return run(lambda: (first, joining("b", first), writing("c")), store, executor)
+
+    outcome = attempt()
+    assert states(outcome) == {"failed": 1, "skipped": 1, "done": 1}
+    assert outcome.failures["a"] == f"{source}: no such file"
+    source.write_text("back")
+    assert states(attempt()) == {"done": 2, "up to date": 1}
+
+
+def test_an_input_that_vanishes_while_it_is_read_is_said_and_nothing_comes_of_it(output: Path, tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("1")
+    with Store(output) as store:
+        outcome = run(lambda: [task("a", steps.vanish, inputs=(store.input(source),))], store, SerialExecutor())
+    assert "changed while it was read" in outcome.failures["a"]
+    assert contents(output) == {}
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no pipes and devices among its files")
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "NUL"])
+def test_an_input_that_is_no_file_is_refused_and_not_waited_for(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "in"
+    {
+        "pipe": lambda: os.mkfifo(path),
+        "device": lambda: path.symlink_to("/dev/zero"),
+        "folder": path.mkdir,
+        "NUL": lambda: None,
+    }[kind]()
+    source = f"{path}\0" if kind == "NUL" else path
+    with Store(tmp_path / "out") as store:
+        tasks = [task("a", steps.copy, inputs=(store.input(source),)), writing("b")]
+        outcome = run(lambda: tasks, store, SerialExecutor())
+    assert states(outcome) == {"failed": 1, "done": 1}
+
+
+def test_what_was_published_of_something_else_does_not_pass_for_the_result_of_a_failure(output: Path) -> None:
+    run_in(output, writing("a", "of yesterday", publish={FILE: "a/b.txt"}))
+    outcome = run_in(output, task("a", steps.fail, Fail(), publish={FILE: "a/b.txt"}))
+    assert states(outcome) == {"failed": 1}
+    assert os.listdir(output) == [OWN]
+
+
+def test_tasks_that_are_the_same_are_done_once(output: Path, log: Log) -> None:
+    first, second = writing("a", "1", log), writing("b", "1", log)
+    run_in(output, first, second, joining("c", first, second), executor=ProcessExecutor(2))
+    assert log.new() == ["1"]
+    assert contents(output) == {"a.txt": "1", "b.txt": "1", "c.txt": "11"}
+
+
+def test_tasks_that_are_the_same_fail_once(output: Path) -> None:
+    tasks = [task(name, steps.fail, Fail()) for name in "ab"]
+    assert states(run_in(output, *tasks)) == {"failed": 1, "skipped": 1}
+
+
+def test_a_plan_is_taken_task_by_task(output: Path) -> None:
+    """Of ten thousand clips only a few are in memory."""
+    ahead: list[int] = []
+
+    def plan() -> Iterator[Task]:
+        for number in range(40):
+            ahead.append(number - len(list(output.glob("*.txt"))))
+            yield writing(f"{number}")
+
+    with Store(output) as store:
+        run(plan, store, SerialExecutor())
+    assert max(ahead[40:]) <= 1
+
+
+# -- partial and temporary tasks --------------------------------------------------------------------------------------
+
+
+def test_a_partial_task_makes_the_best_of_what_there_is(output: Path, tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+
+    def attempt() -> dict[str, int]:
+        with Store(output) as store, SerialExecutor() as executor:
+            tasks = [writing("a", "1"), task("b", steps.copy, inputs=(store.input(source),))]
+            tasks.append(task("report", steps.report, None, *tasks))
+            tasks.append(task("overview", steps.report, None, tasks[-1]))
+            return states(run(lambda: tasks, store, executor))
+
+    assert attempt() == {"done": 3, "failed": 1}
+    assert contents(output)["overview.txt"] == "1"
+    assert attempt() == {"up to date": 3, "failed": 1}
+    source.write_text("2")
+    assert attempt() == {"done": 3, "up to date": 1}
+    assert contents(output)["overview.txt"] == "12"
+
+
+def test_a_partial_task_with_nothing_to_go_by_is_skipped(output: Path) -> None:
+    bad = task("bad", steps.fail, Fail())
+    assert states(run_in(output, bad, task("report", steps.report, None, bad))) == {"failed": 1, "skipped": 1}
+
+
+def film(log: object, piece: str = "1") -> list[Task]:
+    pieces = [Task(steps.piece, Write(text, str(log)), f"piece {text}") for text in (piece, "2")]
+    return [*pieces, joining("film", *pieces, log=log)]
+
+
+def kept(output: Path) -> int:
+    return len(os.listdir(output / OWN / "results"))
+
+
+def test_temporary_results_go_when_what_wanted_them_is_done(output: Path, log: Log) -> None:
+    run_in(output, *film(log))
+    assert contents(output) == {"film.txt": "12"}
+    assert kept(output) == 1
+    log.new()
+    assert states(run_in(output, *film(log))) == {"up to date": 1}
+    (output / "film.txt").unlink()
+    run_in(output, *film(log))
+    assert log.new() == []
+    run_in(output, *film(log, "3"))
+    assert log.new() == ["2", "3", "join"]
+    assert contents(output) == {"film.txt": "32"}
+
+
+def test_temporary_results_stay_for_a_task_that_failed(output: Path, log: Log) -> None:
+    pieces = film(log)[:2]
+    run_in(output, *pieces, task("film", steps.fail, Fail(), *pieces))
+    assert log.new() == ["1", "2"]
+    assert kept(output) == 2
+    run_in(output, *film(log))
+    assert log.new() == ["join"]
+    assert kept(output) == 1
+
+
+# -- shares -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("parts", [1, 2, 3])
+def test_the_shares_of_a_plan_make_the_whole(output: Path, log: Log, parts: int) -> None:
+    first = [writing(f"{n}", f"{n}", log) for n in range(5)]
+    tasks = [*first, *film(log, "x"), task("all", steps.report, Nothing(str(log)), *first)]
+    for stage in ("write", "join", "report"):
+        for number in range(1, parts + 1):
+            outcome = run_in(output, *tasks, alone=False, share=Share(frozenset({stage}), number, parts))
+            assert not outcome.failures
+    assert contents(output)["all.txt"] == "01234"
+    assert contents(output)["film.txt"] == "x2"
+    assert log.new() == sorted(["0", "1", "2", "3", "4", "2", "x", "join", "join"])
+    assert states(run_in(output, *tasks)) == {"up to date": 7}
+
+
+def test_shares_at_the_same_time_do_not_get_in_one_anothers_way(output: Path) -> None:
+    tasks = [writing(f"{n}") for n in range(60)]
+    tasks.append(joining("all", *tasks))
+
+    def work(number: int) -> None:
+        run_in(output, *tasks, alone=False, share=Share(frozenset({"write"}), number, 3))
+        run_in(output, *tasks, alone=False)
+
+    workers = [threading.Thread(target=work, args=(number,)) for number in (1, 2, 3)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert contents(output)["all.txt"] == "".join(f"{n}" for n in range(60))
+    assert len(contents(output)) == 61
+    assert os.listdir(output / OWN / "scratch") == [] if (output / OWN / "scratch").exists() else True
+
+
+# -- what goes wrong around it ----------------------------------------------------------------------------------------
+
+
+def test_a_full_disk_ends_the_run_with_what_is_done_in_place(output: Path) -> None:
+    outcome = run_in(output, writing("a", "1"), task("b", steps.fill_disk), writing("c"))
+    assert states(outcome) == {"done": 1, "failed": 1, "not begun or stopped": 1}
+    assert outcome.problem == f"b: {output / 'b.txt'}: {os.strerror(28)}"
+    assert contents(output) == {"a.txt": "1"}
+    assert states(run_in(output, writing("a", "1"), writing("b"), writing("c"))) == {"up to date": 1, "done": 2}
+
+
+def test_a_disk_that_fills_up_while_files_are_published_ends_the_run(
+    output: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace = os.replace
+
+    def full(source: str, target: str) -> None:
+        if os.path.basename(target) == "b.txt":
+            raise OSError(28, os.strerror(28), target)
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    outcome = run_in(output, writing("a"), writing("b"), writing("c"))
+    assert outcome.problem == f"{output / 'b.txt'}: {os.strerror(28)}"
+    assert sorted(contents(output)) == ["a.txt"]
+    monkeypatch.undo()
+    assert states(run_in(output, writing("a"), writing("b"), writing("c"))) == {"up to date": 1, "done": 2}
+
+
+def test_an_output_folder_that_cannot_be_made_is_an_error_of_the_system(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match="file"):
+        run_in(tmp_path / "file" / "out", writing("a"))
+
+
+def test_a_run_that_made_nothing_leaves_nothing(output: Path) -> None:
+    run_in(output / "deeper", task("bad", steps.fail, Fail()))
+    assert not output.exists()
+
+
+# -- Ctrl-C -----------------------------------------------------------------------------------------------------------
+
+
+def interrupt_when(condition: object) -> threading.Thread:
+    def watch() -> None:
+        while not condition():
+            time.sleep(0.02)
+        signal.raise_signal(signal.SIGINT) if os.name == "nt" else os.kill(os.getpid(), signal.SIGINT)
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    return watching
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_ctrl_c_leaves_what_is_done_and_a_report_of_it(output: Path, executor: str) -> None:
+    first, slow = writing("a", "1"), task("slow", steps.write, Write("2", seconds=60.0))
+    tasks = [first, slow, joining("b", slow), task("report", steps.report, None, first, slow)]
+    interrupt_when((output / "a.txt").exists)
+    started = time.monotonic()
+    outcome = run_in(output, *tasks, executor=EXECUTORS[executor]())
+    assert time.monotonic() - started < 5.0
+    assert outcome.interrupted
+    assert states(outcome) == {"done": 2, "not begun or stopped": 2}
+    assert contents(output) == {"a.txt": "1", "report.txt": "1"}
+    assert not (output / OWN / "scratch").exists()
+
+
+def test_ctrl_c_does_not_wait_for_a_report_that_takes_long(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(running, "AFTER_CTRL_C", -1.0)
+    first, slow = writing("a", "1"), task("slow", steps.write, Write("2", seconds=60.0))
+    interrupt_when((output / "a.txt").exists)
+    outcome = run_in(output, first, slow, task("report", steps.report, None, first, slow))
+    assert outcome.interrupted
+    assert contents(output) == {"a.txt": "1"}
+
+
+# -- progress ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_progress_is_told_in_weights_and_words(output: Path, executor: str) -> None:
+    listener = Listener()
+    tasks = [writing("a", weight=2.0, title="The first"), task("b", steps.chatter, weight=4.0, title="The second")]
+    run_in(output, *tasks, executor=EXECUTORS[executor](), progress=listener)
+    assert listener.total == 6.0
+    assert any(doing == "The second: half way" and done in (2.0, 4.0) for done, doing, _ in listener.reached)
+    assert listener.notes == ["it is nearly there"]
+    assert listener.states == {"a": "done", "b": "done"}
+
+
+@pytest.mark.parametrize("executor", EXECUTORS)
+def test_what_is_counted_is_counted_over_all_tasks_and_never_goes_back(output: Path, executor: str) -> None:
+    films = [task(f"{n}", steps.count, Count(n), amount=n, unit="frame") for n in (4, 2, 3)]
+    run_in(output, films[1])
+    listener = Listener()
+    run_in(output, *films, writing("a"), executor=EXECUTORS[executor](), progress=listener)
+    counts = [counts["frame"] for *_, counts in listener.reached if "frame" in counts]
+    assert {total for _, total in counts} == {7}  # Two are there already.
+    numbers = [number for number, _ in counts]
+    assert numbers == sorted(numbers)
+    if executor == "serial":
+        assert {*numbers} >= {1, 2, 3, 4, 5, 6, 7}
+
+
+def test_an_outcome_counts_in_words() -> None:
+    assert str(Outcome()) == "nothing to do"
+    outcome = Outcome()
+    outcome.counts.update({State.DONE: 1, State.STOPPED: 1})
+    assert str(outcome) == "1 done, 1 not begun or stopped"
+
+
+# -- processes --------------------------------------------------------------------------------------------------------
+
+needs_signals = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+
+
+def test_tasks_are_done_by_as_many_processes_as_there_are_jobs(output: Path) -> None:
+    tasks = [task(name, steps.process_id, Write(name, seconds=0.4)) for name in "abcd"]
+    run_in(output, *tasks, executor=ProcessExecutor(2))
+    workers = set(contents(output).values())
+    assert len(workers) == 2
+    assert str(os.getpid()) not in workers
+
+
+def test_a_worker_is_replaced_after_so_many_tasks(output: Path) -> None:
+    tasks = [task(name, steps.process_id, Write(name)) for name in "abcdef"]
+    run_in(output, *tasks, executor=ProcessExecutor(1, max_tasks=2))
+    assert len(set(contents(output).values())) == 3
+
+
+@needs_signals
+def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tmp_path: Path) -> None:
+    dying = task("b", steps.die, Die(str(tmp_path / "marker"), 2))
+    listener = Listener()
+    tasks = [writing("a"), dying, joining("c", dying)]
+    assert states(run_in(output, *tasks, executor=ProcessExecutor(2), progress=listener)) == {"done": 3}
+    assert contents(output)["c.txt"] == "whole"
+    said = "b: its process died (SIGKILL, perhaps for want of memory): last words; trying again"
+    assert listener.notes == [said, said]
+
+
+@needs_signals
+def test_a_task_that_kills_every_worker_is_given_up_and_the_others_go_on(output: Path, tmp_path: Path) -> None:
+    tasks = [task("b", steps.die, Die(str(tmp_path / "marker"), 99)), writing("a")]
+    outcome = run_in(output, *tasks, executor=ProcessExecutor(1), retries=1)
+    assert states(outcome) == {"failed": 1, "done": 1}
+    assert outcome.failures["b"].startswith("b: its process died (SIGKILL, perhaps for want of memory)")
+    assert outcome.failures["b"].endswith("; given up after 2 attempts")
+    assert contents(output) == {"a.txt": "a"}
+
+
+def test_what_is_printed_in_a_worker_does_not_get_in_the_way(output: Path, capfd: pytest.CaptureFixture) -> None:
+    run_in(output, task("a", steps.chatter), executor=ProcessExecutor(1))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_executor_can_be_used_again_after_it_was_stopped(output: Path) -> None:
+    with Store(output) as store, ProcessExecutor(1) as executor:
+        run(lambda: [writing("a")], store, executor)
+        executor.stop()
+        assert states(run(lambda: [writing("b")], store, executor)) == {"done": 1}

@@ -1,0 +1,458 @@
+"""The output folder: nothing of others is replaced, damage is noticed, two runs do not share it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.pipeline import steps as pipeline_steps
+from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.running import run
+from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store, inputs_known
+from tests.scripts.pipeline import steps
+from tests.scripts.pipeline.plans import Listener, contents, joining, run_in, states, task, writing
+from tests.scripts.pipeline.steps import FILE, Nothing, Write
+from tests.thoroughness import THOROUGH
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def output(tmp_path: Path) -> Path:
+    return tmp_path / "out"
+
+
+def whole() -> tuple[Task, Task, Task]:
+    first, second = writing("a", "1"), writing("b", "2")
+    return first, second, joining("c", first, second)
+
+
+def copying(output: Path, source: Path, name: str = "a", **options: object) -> dict[str, int]:
+    """Run a task that reads a file."""
+    with Store(output, **options) as store, SerialExecutor() as executor:
+        return states(run(lambda: [task(name, steps.copy, inputs=(store.input(source),))], store, executor))
+
+
+# -- whose a file is --------------------------------------------------------------------------------------------------
+
+
+def test_a_file_of_another_program_is_named_and_replaced_when_told_only(output: Path) -> None:
+    output.mkdir()
+    (output / "c.txt").write_text("mine")
+    with pytest.raises(OutputError, match=r"c\.txt was not written by this program.*--output.*--overwrite"):
+        run_in(output, *whole())
+    assert contents(output) == {"c.txt": "mine"}  # Nothing was begun.
+    assert os.listdir(output) == ["c.txt"]
+    assert states(run_in(output, *whole(), overwrite=True)) == {"done": 3}
+    assert states(run_in(output, *whole())) == {"up to date": 3}
+
+
+@pytest.mark.parametrize("in_place", [True, False])
+def test_a_file_that_was_edited_is_not_replaced(output: Path, in_place: bool) -> None:
+    run_in(output, *whole())
+    if not in_place:
+        (output / "c.txt").unlink()
+    (output / "c.txt").write_text("my notes")
+    with pytest.raises(OutputError, match=r"c\.txt was not written by this program, or edited since"):
+        run_in(output, *whole())
+    assert contents(output)["c.txt"] == "my notes"
+    run_in(output, *whole(), overwrite=True)
+    assert contents(output)["c.txt"] == "12"
+
+
+def test_a_file_that_was_touched_or_copied_is_still_ours(output: Path) -> None:
+    run_in(output, *whole())
+    (output / "c.txt").unlink()
+    (output / "c.txt").write_text("12")
+    first, second = writing("a", "1"), writing("b", "3")
+    assert states(run_in(output, first, second, joining("c", first, second)))["done"] == 2
+    assert contents(output)["c.txt"] == "13"
+
+
+def test_a_file_that_is_missing_is_put_back(output: Path) -> None:
+    run_in(output, *whole())
+    (output / "c.txt").unlink()
+    assert states(run_in(output, *whole())) == {"up to date": 2, "done": 1}
+    assert contents(output)["c.txt"] == "12"
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_folders_where_files_go_and_files_where_folders_go_stay(output: Path, overwrite: bool) -> None:
+    (output / "c.txt").mkdir(parents=True)
+    with pytest.raises(OutputError, match="a folder where a file goes"):
+        run_in(output, *whole(), overwrite=overwrite)
+    (output / "c.txt").rmdir()
+    (output / "d").write_text("mine")
+    with pytest.raises(OutputError, match="a file where a folder goes"):
+        run_in(output, writing("d", publish={FILE: "d/e.txt"}), overwrite=overwrite)
+    assert contents(output) == {"d": "mine"}
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+@pytest.mark.parametrize("link", ["none", "hard", "symbolic"])
+def test_an_input_is_never_replaced(output: Path, link: str, overwrite: bool) -> None:
+    output.mkdir()
+    source = output / "a.txt"
+    source.write_text("recorded")
+    given = source if link == "none" else output / "given.txt"
+    if link != "none":
+        os.link(source, given) if link == "hard" else given.symlink_to(source)
+    with pytest.raises(OutputError, match="this input lies where"):
+        copying(output, given, overwrite=overwrite)
+    assert source.read_text() == "recorded"
+
+
+def test_what_this_program_wrote_is_no_input_of_the_next_run(output: Path, tmp_path: Path) -> None:
+    run_in(output, *whole())
+    with pytest.raises(OutputError, match="this input was written by a run into this folder"):
+        copying(output, output / "c.txt", "d")
+    (tmp_path / "linked").symlink_to(output / "c.txt")
+    with pytest.raises(OutputError, match="this input was written by a run into this folder"):
+        copying(output, tmp_path / "linked", "d")
+    with pytest.raises(OutputError, match="where the program works"):
+        copying(output, output / OWN / "latest.jsonl", "d")
+    assert copying(tmp_path / "other", output / "c.txt", "d") == {"done": 1}
+
+
+def test_the_folder_of_a_comparison_tells_what_it_is_of(output: Path, tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("1")
+    assert inputs_known(output) == {}
+    copying(output, source)
+    assert [*inputs_known(output)] == [str(source)]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "../a",
+        "/a",
+        "a/../../b",
+        "C:/a",
+        "a\\b",
+        "a//b",
+        "",
+        ".",
+        "a\0b",
+        ".rigid-motion/lock",
+        ".Rigid-Motion/x",
+        "a:b",
+    ],
+)
+def test_no_path_leads_out_of_the_folder(path: str) -> None:
+    with pytest.raises(ValueError, match="is no path below the output folder|keeps its own files"):
+        writing("a", publish={FILE: path})
+
+
+def test_a_link_that_leads_out_of_the_folder_is_not_followed(output: Path, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    output.mkdir()
+    (output / "clip").symlink_to(tmp_path / "elsewhere")
+    outcome = run_in(output, writing("a", publish={FILE: "clip/a.txt"}))
+    assert "leads out of the output folder" in outcome.failures["a"]
+    assert os.listdir(tmp_path / "elsewhere") == []
+
+
+def test_a_link_where_a_file_goes_is_a_strangers_and_its_target_stays(output: Path, tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("mine")
+    output.mkdir()
+    (output / "a.txt").symlink_to(tmp_path / "precious")
+    with pytest.raises(OutputError, match="was not written by this program"):
+        run_in(output, *whole())
+    run_in(output, *whole(), overwrite=True)
+    assert (tmp_path / "precious").read_text() == "mine"
+    assert not (output / "a.txt").is_symlink()
+
+
+def test_two_results_for_one_file_are_refused_also_where_only_case_differs(output: Path) -> None:
+    with pytest.raises(OutputError, match="two results would go here"):
+        run_in(output, writing("a", publish={FILE: "clip/Keys.csv"}), writing("b", publish={FILE: "Clip/keys.csv"}))
+
+
+def test_without_links_files_are_copied(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> None:
+        raise OSError(1, "no links here")
+
+    monkeypatch.setattr(os, "link", none)
+    run_in(output, *whole())
+    assert states(run_in(output, *whole())) == {"up to date": 3}
+    (output / "c.txt").write_text("edited")
+    with pytest.raises(OutputError):
+        run_in(output, *whole())
+
+
+# -- damage -----------------------------------------------------------------------------------------------------------
+
+
+def replaced_by_pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def replaced_by_device(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
+def replaced_by_folder(path: Path) -> None:
+    path.unlink()
+    (path / "inner").mkdir(parents=True)
+
+
+def removed(path: Path) -> None:
+    path.unlink()
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def cut(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+
+
+def brackets(path: Path) -> None:
+    path.write_text("[" * 100_000)
+
+
+def nonsense(path: Path) -> None:
+    path.write_text('{"files": {"a\\u0000": [1, 2, 3]}, "name": 7, "path": [], "key": {}}\n"x"\n{"name": "a"}\n')
+
+
+DAMAGES = (removed, emptied, cut, brackets, nonsense, replaced_by_folder, replaced_by_pipe, replaced_by_device)
+
+needs_pipes = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no pipes and devices among its files")
+
+
+@needs_pipes
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("part", ["results/*/out.txt", "results/*/.index.json"])
+def test_a_damaged_result_is_made_again(output: Path, damage: Callable[[Path], None], part: str) -> None:
+    hidden = task("hidden", steps.write, Write("1"), publish={})
+    run_in(output, hidden)
+    (path,) = (output / OWN).glob(part)
+    damage(path)
+    assert states(run_in(output, hidden, joining("c", hidden))) == {"done": 2}
+    assert contents(output) == {"c.txt": "1"}
+    assert states(run_in(output, hidden, joining("c", hidden))) == {"up to date": 2}
+
+
+@needs_pipes
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("part", ["latest.jsonl", "inputs.json", "published/*.jsonl"])
+def test_whatever_becomes_of_its_records_the_work_goes_on(
+    output: Path, tmp_path: Path, damage: Callable[[Path], None], part: str
+) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("1")
+    copying(output, source)
+    (path,) = (output / OWN).glob(part)
+    damage(path)
+    if not path.is_file():
+        path.rmdir() if path.is_dir() and not any(path.iterdir()) else None
+    assert copying(output, source) == {"up to date": 1}
+
+
+@pytest.mark.parametrize("place", ["", "results", "scratch", "published"])
+def test_a_file_where_the_program_keeps_a_folder_is_cleared_away(output: Path, place: str) -> None:
+    (output / OWN / place).parent.mkdir(parents=True, exist_ok=True)
+    (output / OWN / place).write_text("no folder")
+    assert states(run_in(output, *whole())) == {"done": 3}
+
+
+def rewritten(path: Path, content: str) -> None:
+    """Change a file so that its size and time do not show it."""
+    status = path.stat()
+    assert len(content) == status.st_size
+    path.write_text(content)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+def parsing(log: object = "") -> list[Task]:
+    part = task("part", steps.write, Write('{"a": 1}', str(log)), publish={})
+    return [part, task("whole", steps.parse, None, part)]
+
+
+def test_a_task_that_fails_for_what_it_reads_is_done_again_with_that(output: Path) -> None:
+    part, reader = parsing()
+    run_in(output, part)
+    (path,) = (output / OWN).glob("results/*/out.txt")
+    rewritten(path, '{"a": 1[')
+    listener = Listener()
+    assert states(run_in(output, part, reader, progress=listener)) == {"done": 2}
+    assert listener.notes == ["whole: what it reads is damaged; it is made again"]
+    assert contents(output) == {"whole.txt": "1"}
+
+
+def test_a_task_that_fails_for_its_own_reasons_is_tried_once(output: Path) -> None:
+    part = writing("part", "no JSON")
+    outcome = run_in(output, part, task("whole", steps.parse, None, part))
+    assert states(outcome) == {"done": 1, "failed": 1}
+    assert "JSONDecodeError" in outcome.failures["whole"]
+
+
+def test_old_results_that_nobody_asks_for_go(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run_in(output, *whole())
+    run_in(output, writing("a", "other"))
+    assert len(os.listdir(output / OWN / "results")) == 4
+    week = time.time() + 8 * 86400
+    monkeypatch.setattr(time, "time", lambda: week)
+    run_in(output, writing("a", "third"), *whole()[1:2])
+    assert len(os.listdir(output / OWN / "results")) == 2
+
+
+# -- runs at the same time --------------------------------------------------------------------------------------------
+
+
+def test_two_runs_in_one_folder_are_refused_and_told_who_is_there(output: Path) -> None:
+    with Store(output), pytest.raises(FolderInUse, match=f"another run is at work .*process {os.getpid()} on"):
+        run_in(output, writing("a"))
+    assert states(run_in(output, writing("a"))) == {"done": 1}
+
+
+def test_workers_with_a_part_are_not_refused(output: Path) -> None:
+    with Store(output):
+        assert states(run_in(output, writing("a"), alone=False)) == {"done": 1}
+
+
+KILLED = """
+import os, sys, time
+from pathlib import Path
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
+from tests.scripts.pipeline.plans import joining, run_in, writing
+from tests.scripts.pipeline import steps
+from tests.scripts.pipeline.plans import task
+from tests.scripts.pipeline.steps import Write
+
+if __name__ == "__main__":
+    tasks = [task(str(n), steps.write, Write(str(n), seconds=float(sys.argv[2]))) for n in range(20)]
+    run_in(Path(sys.argv[1]), *tasks, joining("all", *tasks), executor=ProcessExecutor(2))
+"""
+
+MOMENTS = int(os.environ.get("RIGID_MOTION_KILLS", "20" if THOROUGH else "5"))
+
+
+@contextmanager
+def started(folder: Path, output: Path, seconds: float) -> Iterator[subprocess.Popen]:
+    (folder / "killed.py").write_text(KILLED)
+    process = subprocess.Popen([sys.executable, folder / "killed.py", output, str(seconds)])
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def children(process: int) -> list[int]:
+    found = [path.read_text().split() for path in Path(f"/proc/{process}/task").glob("*/children")]
+    return [int(child) for some in found for child in some]
+
+
+def alive(process: int) -> bool:
+    try:
+        return "State:\tZ" not in Path(f"/proc/{process}/status").read_text()
+    except (ProcessLookupError, FileNotFoundError):
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
+def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(output: Path, tmp_path: Path) -> None:
+    wanted = {f"{n}.txt": f"{n}" for n in range(20)} | {"all.txt": "".join(f"{n}" for n in range(20))}
+    results = 0
+    for number in range(MOMENTS):
+        with started(tmp_path, output, 0.05) as process:
+            ends = time.monotonic() + 30.0
+            while (
+                len(list(output.glob("*.txt"))) <= min(results, 20)
+                and time.monotonic() < ends
+                and process.poll() is None
+            ):
+                time.sleep(0.01)
+            time.sleep(0.01 * (number % 5))
+            workers = children(process.pid)
+            process.kill()
+            process.wait()
+        found = contents(output)
+        results = len(found)
+        assert found.items() <= wanted.items()
+        ends = time.monotonic() + 5.0
+        while any(map(alive, workers)) and time.monotonic() < ends:
+            time.sleep(0.01)
+        assert not any(map(alive, workers))
+    with started(tmp_path, output, 0.05) as process:
+        assert process.wait(60) == 0
+    assert contents(output) == wanted
+    assert not (output / OWN / "scratch").exists()
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
+def test_whichever_worker_is_killed_the_files_are_the_same(output: Path, tmp_path: Path) -> None:
+    with started(tmp_path, output, 0.3) as process:
+        killed = 0
+        while process.poll() is None:
+            time.sleep(0.5)
+            workers = [child for child in children(process.pid) if b"spawn_main" in command_of(child)]
+            if workers and killed < 4:
+                os.kill(workers[killed % len(workers)], 9)
+                killed += 1
+        assert process.returncode == 0
+    assert killed
+    assert contents(output)["all.txt"] == "".join(f"{n}" for n in range(20))
+
+
+def command_of(process: int) -> bytes:
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+# -- many clips -------------------------------------------------------------------------------------------------------
+
+
+def test_the_digest_of_an_input_is_kept_until_it_changes(
+    output: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("1")
+    os.utime(source, (1e9, 1e9))
+    now = time.time()
+    monkeypatch.setattr(time, "time", lambda: now + 10.0)
+    copying(output, source)
+    hashed: list[str] = []
+    monkeypatch.setattr(
+        "rigid_motion_batch.pipeline.store.sha256_of",
+        lambda path: hashed.append(str(path)) or pipeline_steps.sha256_of(path),
+    )
+    assert copying(output, source) == {"up to date": 1}
+    assert hashed == []
+    rewritten(source, "2")
+    assert copying(output, source) == {"done": 1}
+    assert str(source) in hashed
+
+
+def test_a_file_without_a_task_that_publishes_it_any_more_can_be_withdrawn(output: Path) -> None:
+    run_in(output, *whole())
+    (output / "b.txt").write_text("edited")
+    with Store(output) as store:
+        store.withdraw(["a.txt", "b.txt", "none.txt"])
+    assert sorted(contents(output)) == ["b.txt", "c.txt"]
+
+
+def test_what_is_kept_of_a_result_says_what_it_was_made_of(output: Path) -> None:
+    run_in(output, writing("a", "1"))
+    (index,) = (output / OWN).glob("results/*/.index.json")
+    made_of = json.loads(index.read_text())["made_of"]
+    assert made_of["parameters"] == {"$": "Write", "text": "1", "log": "", "seconds": 0.0, "files": []}
+    assert made_of["step"] == "tests.scripts.pipeline.steps:write"
+    assert states(run_in(output, task("a", steps.write, Nothing()), executor=SerialExecutor())) == {"failed": 1}

@@ -1,0 +1,54 @@
+"""Scenes to be saved and read again: objects and rigs, with keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings import Trajectory
+
+bpy = pytest.importorskip("bpy")
+
+FPS = 50
+
+
+def empty(name: str, **settings: object) -> bpy.types.Object:
+    """An empty of the open scene."""
+    obj = bpy.data.objects.new(name, None)
+    bpy.context.scene.collection.objects.link(obj)
+    for setting, value in settings.items():
+        setattr(obj, setting, value)
+    return obj
+
+
+def rig(name: str, bones: Mapping[str, tuple[Sequence[float], Sequence[float], str | None]]) -> bpy.types.Object:
+    """An armature object of the open scene, its bones given by head, tail and the name of the parent or None."""
+    obj = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone_name, (head, tail, parent) in bones.items():
+        bone = obj.data.edit_bones.new(bone_name)
+        bone.head, bone.tail = head, tail
+        bone.parent = obj.data.edit_bones[parent] if parent else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for pose_bone in obj.pose.bones:
+        pose_bone.rotation_mode = "XYZ"
+    return obj
+
+
+def key(animated: bpy.types.Object | bpy.types.PoseBone, frame: float, **channels: object) -> None:
+    """Set channels and key them."""
+    for channel, value in channels.items():
+        setattr(animated, channel, value)
+        animated.keyframe_insert(channel, frame=frame)
+
+
+def on_frames(trajectory: Trajectory) -> Trajectory:
+    """A trajectory without what was sampled between even frames."""
+    frames = trajectory.times * trajectory.rate
+    rows = np.abs(frames - np.rint(frames)) < 1e-6
+    return replace(trajectory, times=trajectory.times[rows], poses=trajectory.poses[..., rows])

@@ -1,0 +1,68 @@
+"""Small recordings and scenes made on the spot, and the check that an error is the one line that was promised."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[[str, str | bytes], str]:
+    """Write a file of this name and content, and return its path."""
+
+    def _write(name: str, content: str | bytes) -> str:
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return str(path)
+
+    return _write
+
+
+@pytest.fixture
+def refusal() -> Callable[..., tuple[int | None, str]]:
+    """Read what cannot be read, by these options, and return the line and the rest of the error."""
+
+    def _refusal(source: str, **options: object) -> tuple[int | None, str]:
+        with pytest.raises(TrajectoryError) as caught:
+            read_trajectories(source, ReadingOptions(**options))
+        message = str(caught.value)
+        parts = re.fullmatch(r"(?P<path>.+?\.\w+)(:(?P<line>\d+))?: (?P<problem>.+?); (?P<way_out>.+)", message)
+        assert parts, f"not of the form FILE:LINE: problem; way out: {message!r}"
+        assert source.startswith(parts["path"])
+        return (int(parts["line"]) if parts["line"] else None), message[parts.start("problem") :]
+
+    return _refusal
+
+
+@pytest.fixture
+def scene() -> Iterator[object]:
+    """An empty scene to fill, and nothing of it left afterwards."""
+    bpy = pytest.importorskip("bpy")
+    from tests.blank import blank
+    from tests.scripts.recordings.blends import FPS
+
+    blank()
+    bpy.context.scene.render.fps = FPS
+    bpy.context.scene.frame_end = 30
+    yield bpy.context.scene
+    blank()
+
+
+@pytest.fixture
+def saved(scene: object, tmp_path: Path) -> Callable[..., str]:
+    """Save the scene, leave it, and return the path."""
+    bpy = pytest.importorskip("bpy")
+    from tests.blank import blank
+
+    def _saved(name: str = "scene.blend") -> str:
+        path = str(tmp_path / name)
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        blank()
+        return path
+
+    return _saved

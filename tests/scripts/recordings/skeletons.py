@@ -1,0 +1,101 @@
+"""A small body that moves, with a skin, made in the open scene and exported as FBX and glTF."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.hushing import hushed
+from tests.blank import blank
+from tests.scripts.recordings.blends import key, rig
+
+bpy = pytest.importorskip("bpy")
+
+BONES = {
+    "Root": ((0, 0, 0), (0, 0, 0.3), None),
+    "Upper": ((0, 0, 0.3), (0, 0, 1), "Root"),
+    "Lower": ((0, 0, 1), (0.3, 0, 1.7), "Upper"),
+    "Hand": ((0.3, 0, 1.7), (0.6, 0.2, 1.8), "Lower"),
+    "Lever": ((0, 1, 0), (0, 1.2, 0), "Root"),
+}
+"""Heads, tails and parents. The lever deforms nothing."""
+
+CARRYING = ("Root", "Upper", "Lower", "Hand")
+
+FRAMES = range(1, 21)
+
+TRIANGLES = [(0, 1, 2), (1, 2, 3)]
+
+
+UNEVEN = (1.2, 1.0, 0.8)
+"""A size that shears what turns in it."""
+
+
+def body(name: str = "Body", fps: int = 24, size: tuple[float, float, float] = UNEVEN) -> bpy.types.Object:
+    """An armature that is moved and turned and not of its own size, with keys on every one of `FRAMES`."""
+    scene = bpy.context.scene
+    scene.render.fps, scene.frame_start, scene.frame_end = fps, FRAMES[0], FRAMES[-1]
+    obj = rig(name, BONES)
+    obj.data.bones["Lever"].use_deform = False
+    obj.rotation_mode, obj.scale = "QUATERNION", size
+    for frame in FRAMES:
+        half = 0.02 * frame
+        key(obj, frame, location=(0.01 * frame, 0.1, 0.2), rotation_quaternion=(np.cos(half), 0, 0, np.sin(half)))
+        for number, bone in enumerate(obj.pose.bones):
+            key(bone, frame, rotation_euler=(0.3 * np.sin(0.1 * frame + number), 0.005 * number * frame, 0.2))
+    scene.frame_set(FRAMES[0])
+    return obj
+
+
+def skinned(obj: bpy.types.Object) -> bpy.types.Object:
+    """A mesh of four vertices that an armature deforms, three quarters of each carried by one bone."""
+    mesh = bpy.data.meshes.new("Skin")
+    mesh.from_pydata([(0, 0, 0), (0.1, 0, 1), (0, 0.1, 1.5), (0.6, 0.2, 1.8)], [], TRIANGLES)
+    skin = bpy.data.objects.new("Skin", mesh)
+    bpy.context.scene.collection.objects.link(skin)
+    skin.parent = obj
+    skin.modifiers.new("Armature", "ARMATURE").object = obj
+    for number, name in enumerate(CARRYING):
+        group = skin.vertex_groups.new(name=name)
+        group.add([number], 0.75, "REPLACE")
+        group.add([(number + 1) % len(CARRYING)], 0.25, "REPLACE")
+    return skin
+
+
+def places_in_blender(obj: bpy.types.Object, bones: tuple[str, ...]) -> np.ndarray:
+    """Where the heads of bones are in the open scene on `FRAMES`, shape (bones, frames, 3)."""
+    seen = []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        seen.append([(shown.matrix_world @ shown.pose.bones[name].matrix).translation for name in bones])
+    return np.array(seen).swapaxes(0, 1)
+
+
+def surface_in_blender(skin: bpy.types.Object) -> np.ndarray:
+    """Where the vertices of a mesh are in the open scene on `FRAMES`, shape (vertices, frames, 3)."""
+    seen = []
+    for frame in FRAMES:
+        bpy.context.scene.frame_set(frame)
+        shown = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        seen.append([shown.matrix_world @ vertex.co for vertex in shown.data.vertices])
+    return np.array(seen).swapaxes(0, 1)
+
+
+def export(path: Path, **settings: object) -> Path:
+    """Export the open scene by the ending of a path, and leave it."""
+    with hushed(), contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if path.suffix == ".fbx":
+            settings = {"add_leaf_bones": False, "bake_anim_simplify_factor": 0.0} | settings
+            bpy.ops.export_scene.fbx(filepath=str(path), **settings)
+        else:
+            kind = "GLB" if path.suffix == ".glb" else "GLTF_SEPARATE"
+            bpy.ops.export_scene.gltf(filepath=str(path), export_format=kind, **settings)
+    blank()
+    return path

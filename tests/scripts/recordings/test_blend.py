@@ -1,0 +1,190 @@
+"""Animated objects of .blend files, which bpy makes here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings import read_trajectories
+from tests.scripts.recordings.blends import FPS, empty, key, on_frames
+
+bpy = pytest.importorskip("bpy")
+anim_utils = pytest.importorskip("bpy_extras.anim_utils")
+
+
+def test_an_object_is_sampled_on_every_frame_of_its_action(saved) -> None:
+    drill = empty("Drill", rotation_mode="QUATERNION")
+    key(drill, 11, location=(0, 0, 0), rotation_quaternion=(1, 0, 0, 0))
+    key(drill, 21, location=(0, 10, 0), rotation_quaternion=(0, 0, 0, 1))
+    expected = []
+    for frame in range(11, 22):
+        bpy.context.scene.frame_set(frame)
+        expected.append(drill.location[1])
+    (trajectory,) = map(on_frames, read_trajectories(saved()).trajectories)
+    assert trajectory.name == "Drill"
+    np.testing.assert_allclose(trajectory.times, np.arange(11, 22) / FPS, rtol=1e-15)
+    np.testing.assert_allclose(trajectory.poses.positions[:, 1], expected, atol=1e-6)
+    np.testing.assert_allclose(np.abs(trajectory.poses.quaternions[[0, -1]]), [[1, 0, 0, 0], [0, 0, 0, 1]], atol=1e-6)
+    assert trajectory.poses.scales is None
+    assert 0.0 < trajectory.poses.positions[1, 1] < 0.9, "eased, as Blender's curves are"
+
+
+def test_parents_constraints_and_hidden_objects_are_evaluated(saved) -> None:
+    parent = empty("Parent")
+    key(parent, 1, rotation_euler=(0, 0, 0), hide_viewport=True)
+    key(parent, 30, rotation_euler=(0, 0, np.pi / 2), hide_viewport=True)
+    child = empty("Child", parent=parent, location=(2, 0, 0))
+    empty("Follower").constraints.new("COPY_TRANSFORMS").target = child
+    path = saved()
+    for name in ("Child", "Follower"):
+        (trajectory,) = map(on_frames, read_trajectories(f"{path}:{name}").trajectories)
+        assert len(trajectory.times) == 30, "the scene's frames, for want of an Action of its own"
+        np.testing.assert_allclose(trajectory.poses.positions[[0, -1]], [[2, 0, 0], [0, 2, 0]], atol=1e-6)
+    (trajectory,) = read_trajectories(f"{path}:Parent").trajectories
+    np.testing.assert_allclose(trajectory.poses.quaternions[-1], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-6)
+
+
+def test_the_animated_objects_are_told_and_still_ones_are_not(saved) -> None:
+    for name in ("Lamp", "Ball", "Camera"):
+        obj = empty(name)
+        if name != "Lamp":
+            key(obj, 1, location=(0, 0, 0))
+            key(obj, 9, location=(1, 0, 0))
+    painted = empty("Painted")
+    key(painted, 1, color=(1, 0, 0, 1))
+    path = saved()
+    recording = read_trajectories(path)
+    assert [trajectory.name for trajectory in recording.trajectories] == ["Ball"]
+    assert recording.others == ("Camera",)
+    assert [trajectory.name for trajectory in read_trajectories(path + ":*").trajectories] == ["Ball", "Camera"]
+    (lamp,) = read_trajectories(path + ":Lamp").trajectories
+    np.testing.assert_array_equal(lamp.poses.positions, np.zeros((30, 3)))
+
+
+def test_nla_strips_move_an_object_too(saved) -> None:
+    obj = empty("Strip")
+    key(obj, 1, location=(0, 0, 0))
+    key(obj, 11, location=(5, 0, 0))
+    data = obj.animation_data
+    strip = data.nla_tracks.new().strips.new("Push", 21, data.action)
+    if strip.action_slot is None:
+        strip.action_slot = data.action.slots[0]
+    data.action = None
+    (trajectory,) = read_trajectories(saved()).trajectories
+    np.testing.assert_allclose(trajectory.times[[0, -1]] * FPS, [21, 31])
+    np.testing.assert_allclose(trajectory.poses.positions[[0, -1], 0], [0, 5], atol=1e-6)
+
+
+def test_scale_and_unit_are_told(saved, scene: bpy.types.Scene) -> None:
+    scene.unit_settings.scale_length = 0.01
+    obj = empty("Balloon")
+    key(obj, 1, scale=(1, 1, 1))
+    key(obj, 5, scale=(3, 3, 3))
+    (trajectory,) = read_trajectories(saved()).trajectories
+    np.testing.assert_allclose(trajectory.poses.scales[[0, -1]], [1, 3], atol=1e-6)
+    assert trajectory.metres_per_unit == pytest.approx(0.01)
+
+
+def test_what_is_open_stays_as_it_is(saved) -> None:
+    key(empty("Ball"), 1, location=(0, 0, 0))
+    path = saved()
+    bpy.context.scene.frame_set(7)
+    empty("Ball")
+
+    def state() -> list:
+        data = ("scenes", "objects", "actions", "libraries", "collections", "worlds")
+        return [[item.name_full for item in getattr(bpy.data, kind)] for kind in data] + [
+            bpy.data.filepath,
+            bpy.context.scene.name,
+            bpy.context.scene.frame_current,
+        ]
+
+    before = state()
+    read_trajectories(path + ":*")
+    assert state() == before
+
+
+def test_the_file_that_is_open_can_be_read(saved, tmp_path: Path) -> None:
+    ball = empty("Ball")
+    key(ball, 1, location=(0, 0, 0))
+    key(ball, 4, location=(3, 0, 0))
+    path = saved()
+    bpy.ops.wm.open_mainfile(filepath=path)
+    (trajectory,) = read_trajectories(path).trajectories
+    np.testing.assert_allclose(trajectory.poses.positions[[0, -1], 0], [0, 3], atol=1e-6)
+    assert [obj.name for obj in bpy.data.objects] == ["Ball"]
+    assert len(bpy.data.scenes) == 1
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_no_script_of_the_file_is_run(saved, tmp_path: Path, allowed: bool) -> None:
+    trace = tmp_path / "trace"
+    driver = empty("Driven").driver_add("location", 0).driver
+    driver.expression = f"len(__import__('pathlib').Path({str(trace)!r}).write_text('run') * [0]) + 1"
+    text = bpy.data.texts.new("startup.py")
+    text.write(f"open({str(trace)!r}, 'w')")
+    text.use_module = True
+    path = saved()
+    trace.unlink(missing_ok=True)
+    preferences = bpy.context.preferences.filepaths
+    before = preferences.use_scripts_auto_execute
+    preferences.use_scripts_auto_execute = allowed
+    try:
+        read_trajectories(path + ":Driven")
+        assert preferences.use_scripts_auto_execute == allowed
+    finally:
+        preferences.use_scripts_auto_execute = before
+    assert not trace.exists()
+
+
+def test_a_file_without_animation_is_answered_with_its_objects(saved, refusal) -> None:
+    empty("Lamp")
+    _, message = refusal(saved())
+    assert message.startswith("no moving body in this file; name one with ")
+    assert message.endswith(":NAME: Lamp")
+
+
+def test_a_missing_object_is_answered_with_those_there_are(saved, refusal) -> None:
+    empty("Lamp")
+    _, message = refusal(saved() + ":Drill")
+    assert message == "no body named 'Drill'; it holds Lamp"
+
+
+@pytest.mark.parametrize("content", [b"", b"junk", b"BLENDER-v405" + bytes(500), b"\x28\xb5\x2f\xfd" + bytes(50)])
+def test_a_file_that_blender_cannot_open_is_told_in_one_line(write, refusal, content: bytes) -> None:
+    _, message = refusal(write("scene.blend", content))
+    assert message.startswith("Blender cannot open this file")
+
+
+def test_a_file_that_is_cut_short_is_told_in_one_line(saved, refusal) -> None:
+    empty("Lamp")
+    path = Path(saved())
+    path.write_bytes(path.read_bytes()[:3000])
+    _, message = refusal(str(path))
+    assert message.startswith("Blender cannot open this file")
+
+
+@pytest.mark.parametrize("frame", [1.9e35, -2e6, float("inf")])
+def test_a_key_where_no_frame_is_costs_no_hours(saved, refusal, frame: float) -> None:
+    drill = empty("Drill")
+    key(drill, 1, location=(0, 0, 0))
+    key(drill, 9, location=(1, 0, 0))
+    slot = anim_utils.action_get_channelbag_for_slot(drill.animation_data.action, drill.animation_data.action_slot)
+    slot.fcurves[0].keyframe_points[0 if frame < 0.0 else 1].co.x = frame
+    _, message = refusal(saved())
+    assert message.startswith("'Drill' moves from frame ")
+    assert message.endswith("where Blender does not go; delete the keys that are far off")
+
+
+def test_a_name_that_is_no_text_is_told(saved, refusal) -> None:
+    drill = empty("Drill")
+    key(drill, 1, location=(0, 0, 0))
+    key(drill, 9, location=(1, 0, 0))
+    bpy.context.preferences.filepaths.use_file_compression = False
+    path = Path(saved())
+    content = path.read_bytes()
+    assert b"OBDrill\0" in content
+    path.write_bytes(content.replace(b"OBDrill\0", b"OB\xff\xfell\xff\0"))
+    assert refusal(str(path))[1] == "a name in this file is no text; save it again from Blender"

@@ -1,0 +1,378 @@
+"""Pose bones of .blend files, against matrices that are worked out here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigid_motion_batch.recordings import Trajectory, read_trajectories
+from tests.scripts.recordings.blends import FPS, empty, key, on_frames, rig
+
+bpy = pytest.importorskip("bpy")
+anim_utils = pytest.importorskip("bpy_extras.anim_utils")
+
+ARM = {"Upper": ((0, 0, 0), (0, 1, 0), None), "Lower": ((0, 1, 0), (0, 2, 0), "Upper")}
+"""Along y, which makes their axes those of the armature."""
+
+HAND = {"Hand": ((0, 2, 0), (1, 2, 0), "Lower")}
+"""Along x: a quarter turn backwards about z."""
+
+
+def matrix(position: object = (0, 0, 0), axis: str = "z", degrees: float = 0.0, scale: float = 1.0) -> np.ndarray:
+    made = np.eye(4)
+    made[:3, :3] = scale * Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+    made[:3, 3] = position
+    return made
+
+
+def linear(obj: bpy.types.Object) -> None:
+    """Let the keys of an Action be joined by straight lines."""
+    for fcurve in fcurves(obj):
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
+
+
+def fcurves(obj: bpy.types.Object) -> bpy.types.ActionChannelbagFCurves:
+    data = obj.animation_data
+    return anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+
+
+def read(source: str) -> Trajectory:
+    (trajectory,) = read_trajectories(source).trajectories
+    return on_frames(trajectory)
+
+
+def assert_are(trajectory: Trajectory, expected: list[np.ndarray]) -> None:
+    """Positions and rotations are those of the matrices, shape (4, 4) each, and scales the lengths of their axes."""
+    expected = np.stack(expected)
+    lengths = np.linalg.norm(expected[:, :3, 0], axis=1)
+    rotations = Rotation.from_matrix(expected[:, :3, :3] / lengths[:, None, None])
+    found = Rotation.from_quat(trajectory.poses.quaternions, scalar_first=True)
+    np.testing.assert_allclose(trajectory.poses.positions, expected[:, :3, 3], atol=3e-6)
+    np.testing.assert_allclose((found * rotations.inv()).magnitude(), 0.0, atol=3e-6)
+    scales = trajectory.poses.scales
+    np.testing.assert_allclose(lengths if scales is None else scales, lengths if scales is not None else 1.0, atol=3e-6)
+
+
+def waving(name: str = "Rig") -> bpy.types.Object:
+    """A rig of which two bones have keys."""
+    arm = rig(name, ARM | HAND)
+    for frame in (1, 9):
+        key(arm.pose.bones["Lower"], frame, rotation_euler=(0, 0, frame / 9))
+        key(arm.pose.bones["Hand"], frame, location=(0, frame, 0))
+    linear(arm)
+    return arm
+
+
+def test_a_bone_moves_in_the_world_as_its_chain_and_its_object_do(saved) -> None:
+    arm = rig("Rig", ARM | HAND)
+    upper, lower, hand = arm.pose.bones
+    for frame in (1, 21):
+        key(upper, frame, rotation_euler=(0, 0, np.radians(3.0 * frame)))
+    for frame in (5, 11):
+        key(lower, frame, rotation_euler=(np.radians(10.0 * frame), 0, 0), location=(0.1 * frame, 0, 0))
+        key(hand, frame, location=(0, 0, 0.2 * frame), scale=(0.1 * frame,) * 3)
+    for frame in (3, 13):
+        key(arm, frame, location=(frame, -1, 0), scale=(2, 2, 2))
+    linear(arm)
+    expected = []
+    for frame in range(1, 22):
+        held, moved = np.clip(frame, 5, 11), np.clip(frame, 3, 13)
+        upper_pose = matrix((moved, -1, 0), scale=2.0) @ matrix(axis="z", degrees=3.0 * frame)
+        lower_pose = upper_pose @ matrix((0, 1, 0)) @ matrix((0.1 * held, 0, 0), "x", 10.0 * held)
+        hand_rest = matrix((0, 1, 0), "z", -90.0)
+        expected.append(lower_pose @ hand_rest @ matrix((0, 0, 0.2 * held), scale=0.1 * held))
+    trajectory = read(saved() + ":Rig/Hand")
+    assert trajectory.name == "Rig/Hand"
+    np.testing.assert_allclose(trajectory.times * FPS, np.arange(1, 22), rtol=1e-15)
+    assert_are(trajectory, expected)
+
+
+def test_constraints_drivers_and_parents_of_a_hidden_rig_are_evaluated(saved, scene) -> None:
+    base, goal = empty("Base", location=(5, 0, 0)), empty("Goal", parent=None)
+    for frame in (1, 30):
+        key(goal, frame, location=(0, frame, 1), rotation_euler=(0, np.radians(frame), 0))
+    linear(goal)
+    arm = rig("Rig", ARM)
+    arm.parent, arm.hide_viewport = base, True
+    follow = arm.pose.bones["Upper"].constraints.new("COPY_TRANSFORMS")
+    follow.target = goal
+    driver = arm.pose.bones["Lower"].driver_add("location", 0).driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.type = "TRANSFORMS"
+    variable.targets[0].id, variable.targets[0].transform_type = goal, "LOC_Y"
+    scene.frame_set(1)
+    trajectory = read(saved() + ":Rig/Lower")
+    assert len(trajectory.times) == 30, "the scene's frames, for want of keys of its own"
+    assert_are(
+        trajectory,
+        [matrix((0, frame, 1), "y", frame) @ matrix((0, 1, 0)) @ matrix((frame, 0, 0)) for frame in range(1, 31)],
+    )
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.0, ""), (0.01, "Rig/Hand is 0.01 times its own size all along, ")])
+def test_a_bone_of_a_rig_in_another_unit_says_so(saved, scale: float, said: str) -> None:
+    waving().scale = (scale,) * 3
+    note = read_trajectories(saved() + ":Rig/Hand").note
+    assert note.startswith(said)
+    assert ("its own size" in note) == bool(said)
+
+
+def test_a_bone_that_grows_is_not_taken_for_one_in_another_unit(saved) -> None:
+    arm = waving()
+    for frame in (1, 9):
+        key(arm.pose.bones["Hand"], frame, scale=(frame,) * 3)
+    linear(arm)
+    recording = read_trajectories(saved() + ":Rig/Hand")
+    np.testing.assert_allclose(recording.trajectories[0].poses.scales[[0, -1]], [1, 9], rtol=1e-6)
+    assert "its own size" not in recording.note
+
+
+def test_nla_strips_move_bones_too(saved) -> None:
+    arm = rig("Rig", ARM)
+    for frame in (1, 11):
+        key(arm.pose.bones["Upper"], frame, location=(frame, 0, 0))
+    linear(arm)
+    data = arm.animation_data
+    strip = data.nla_tracks.new().strips.new("Wave", 21, data.action)
+    if strip.action_slot is None:
+        strip.action_slot = data.action.slots[0]
+    data.action = None
+    trajectory = read(saved() + ":Rig/Lower")
+    np.testing.assert_allclose(trajectory.times * FPS, np.arange(21, 32))
+    assert_are(trajectory, [matrix((frame, 1, 0)) for frame in range(1, 12)])
+
+
+def test_a_curve_without_keys_does_not_lengthen_the_motion(saved) -> None:
+    arm = waving()
+    for fcurve in fcurves(arm):
+        for point in fcurve.keyframe_points:
+            point.co.x += 100
+    fcurves(arm).new('pose.bones["Upper"].location', index=0).modifiers.new("GENERATOR")
+    np.testing.assert_allclose(read(saved() + ":Rig/Hand").times[[0, -1]] * FPS, [101, 109])
+
+
+@pytest.mark.parametrize("how", ["linked", "overridden", "overridden and animated anew"])
+def test_rigs_of_libraries_can_be_read(saved, how: str) -> None:
+    arm = waving()
+    linear(arm)
+    library = saved("rig.blend")
+    with bpy.data.libraries.load(library, link=True, relative=True) as (there, here):
+        here.objects = there.objects
+    (arm,) = here.objects
+    bpy.context.scene.collection.objects.link(arm)
+    place, turned, faster = np.eye(4), np.eye(4), 1
+    if how != "linked":
+        arm = arm.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+        arm.location, arm.pose.bones["Upper"].rotation_euler = (0, 0, 7), (0, 0, np.radians(30))
+        place, turned = matrix((0, 0, 7)), matrix(axis="z", degrees=30)
+    if how == "overridden and animated anew":
+        arm.animation_data_clear()
+        for frame in (1, 9):
+            key(arm.pose.bones["Lower"], frame, rotation_euler=(0, 0, frame / 9))
+            key(arm.pose.bones["Hand"], frame, location=(0, 2 * frame, 0))
+        linear(arm)
+        faster = 2
+    expected = [
+        place
+        @ turned
+        @ matrix((0, 1, 0), "z", np.degrees(frame / 9))
+        @ matrix((0, 1, 0), "z", -90.0)
+        @ matrix((0, faster * frame, 0))
+        for frame in range(1, 10)
+    ]
+    assert_are(read(saved("shot.blend") + ":Rig/Hand"), expected)
+
+
+ODD = [
+    *("Arm/Hand", "/", "Hand/", "//Hand", "..", "../../../escaped", "/etc/passwd", "C:\\Hand", "a:b", "Hand.001"),
+    *('say "hand"', "it's", '"]["', "back\\slash\\", "*", " ", "\u00fcbung \u624b", "a\nb", "\x1b[2J", "$(touch x)"),
+]
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_bones_and_rigs_may_be_called_anything(saved, name: str) -> None:
+    arm = rig(name, {"Hand": ((0, 0, 0), (0, 1, 0), None), name: ((0, 1, 0), (0, 2, 0), None)})
+    assert (arm.name, arm.data.bones[1].name) == (name, name)
+    for frame in (3, 8):
+        key(arm.pose.bones[name], frame, location=(frame, 0, 0))
+    linear(arm)
+    path = saved()
+    trajectory = read(f"{path}:{name}/{name}")
+    assert trajectory.name == f"{name}/{name}"
+    assert_are(trajectory, [matrix((frame, 1, 0)) for frame in range(3, 9)])
+    assert read(path).figure.joints == ("Hand", name)
+
+
+def test_an_objects_name_goes_before_a_bones_and_a_longer_one_before_a_shorter(saved) -> None:
+    bone = ((0, 0, 0), (0, 1, 0), None)
+    rig("A", {"B": bone, "B/C": bone, "D/E": bone})
+    rig("A/B", {"C": bone}).location = (1, 0, 0)
+    empty("A/D", location=(2, 0, 0))
+    path = saved()
+    for name, x in (("A/B", 1), ("A/B/C", 1), ("A/D", 2), ("A/D/E", 0)):
+        np.testing.assert_allclose(read(f"{path}:{name}").poses.positions[:, 0], x, err_msg=name)
+
+
+def test_a_missing_bone_is_answered_with_those_nearest_to_it(saved, refusal) -> None:
+    names = ("Root", "Hand.L", "Hand.R", "Foot.L", "Foot.R", "Head")
+    rig("Rig", dict.fromkeys(names, ((0, 0, 0), (0, 1, 0), None)))
+    path = saved()
+    assert refusal(f"{path}:Rig/hand.l")[1] == (
+        "'Rig' has no bone 'hand.l'; of its 6 bones the nearest by name: Hand.L, Hand.R, Head, Foot.L, Foot.R"
+    )
+    assert refusal(f"{path}:Rig/")[1].endswith("the nearest by name: Root, Hand.L, Hand.R, Foot.L, Foot.R")
+
+
+def test_a_bone_of_what_has_none_is_refused(saved, refusal) -> None:
+    empty("Lamp")
+    rig("Bare", {})
+    path = saved()
+    assert refusal(f"{path}:Lamp/Hand")[1] == (
+        f"'Lamp' has no bones, for it is no armature (its type is Empty); name the object alone with {path}:Lamp"
+    )
+    assert refusal(f"{path}:Bare/Hand")[1] == "'Bare' has no bone 'Hand'; it has none at all"
+    assert refusal(f"{path}:Gone/Hand")[1] == "no body named 'Gone/Hand'; it holds Bare, Lamp"
+
+
+def test_a_bone_without_its_rig_is_answered_with_both(saved, refusal) -> None:
+    waving()
+    path = saved()
+    assert refusal(f"{path}:Hand")[1] == f"no body named 'Hand', only a bone of Rig; name it with {path}:Rig/Hand"
+
+
+def test_a_rig_of_a_library_that_is_gone_is_told(saved, refusal) -> None:
+    waving()
+    library = saved("rig.blend")
+    with bpy.data.libraries.load(library, link=True) as (there, here):
+        here.objects = there.objects
+    bpy.context.scene.collection.objects.link(here.objects[0])
+    path = saved("shot.blend")
+    Path(library).unlink()
+    assert refusal(f"{path}:Rig/Hand")[1].startswith("'Rig' is missing from ")
+
+
+def places(trajectory: Trajectory) -> np.ndarray:
+    """Where the joints of a whole body are in the world, shape (joints, n, 3)."""
+    return trajectory.figure.skeleton.in_root_space(trajectory.poses).positions
+
+
+def shown_by_blender(arm: bpy.types.Object, frames: range) -> np.ndarray:
+    """Where the bones of a rig of the open scene are on these frames, shape (bones, n, 3)."""
+    seen = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        shown = arm.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        seen.append([(shown.matrix_world @ bone.matrix).translation for bone in shown.pose.bones])
+    return np.array(seen).swapaxes(0, 1)
+
+
+def test_an_armature_whose_bones_move_is_a_whole_body(saved) -> None:
+    arm = waving()
+    arm.location, arm.scale = (3, 0, 0), (2, 2, 2)
+    expected = shown_by_blender(arm, range(1, 10))
+    path = saved()
+    for source in (path, f"{path}:Rig"):
+        recording = read_trajectories(source)
+        (body,) = recording.trajectories
+        assert (body.name, recording.note) == ("Rig", "")
+        assert body.figure.joints == ("Upper", "Lower", "Hand")
+        assert body.figure.parents.tolist() == [-1, 0, 1]
+        assert body.poses.scales is None
+        np.testing.assert_allclose(body.times * FPS, range(1, 10))
+        np.testing.assert_allclose(places(body), expected, atol=2e-6)
+        np.testing.assert_allclose(body.figure.rest.positions, [[3, 0, 0], [3, 2, 0], [3, 4, 0]], atol=1e-6)
+        np.testing.assert_allclose(body.figure.tails, [[0, 2, 0]] * 3, atol=1e-6)
+
+
+def test_of_a_rig_the_bones_count_that_deform(saved) -> None:
+    arm = rig("Rig", ARM | HAND | {"Lever": ((0, 0, 1), (0, 0, 2), "Upper")})
+    for frame in (1, 9):
+        key(arm.pose.bones["Lower"], frame, rotation_euler=(0, 0, frame / 9))
+    for name in ("Lower", "Lever"):
+        arm.data.bones[name].use_deform = False
+    linear(arm)
+    expected = shown_by_blender(arm, range(1, 10))[[0, 2]]
+    recording = read_trajectories(saved())
+    (body,) = map(on_frames, recording.trajectories)
+    assert recording.note.startswith("took the 2 bones that deform of 4")
+    assert body.figure.joints == ("Upper", "Hand")
+    assert body.figure.parents.tolist() == [-1, 0], "the nearest that counts"
+    np.testing.assert_allclose(places(body), expected, atol=2e-6)
+
+
+def test_bones_that_are_mirrored_flattened_or_scaled_to_nothing_still_have_poses(saved) -> None:
+    arm = rig("Rig", ARM | HAND)
+    for frame in range(1, 10):
+        key(arm.pose.bones["Upper"], frame, rotation_euler=(0, 0, frame / 9), scale=(1, 2, 0.5))
+        key(arm.pose.bones["Hand"], frame, scale=(0.0 if frame > 5 else 1.0,) * 3)
+    arm.scale = (-1, 1, 1)
+    expected = shown_by_blender(arm, range(1, 10))
+    body = read(saved())
+    np.testing.assert_allclose(places(body), expected, atol=2e-6)
+    np.testing.assert_allclose(np.linalg.norm(body.poses.quaternions, axis=-1), 1.0, atol=1e-12)
+
+
+def test_what_hidden_rigs_follow_moves_them(saved, scene) -> None:
+    goal = empty("Goal")
+    for frame in (1, 30):
+        key(goal, frame, location=(0, frame, 1))
+    arm = rig("Rig", ARM | HAND)
+    arm.hide_viewport = True
+    arm.pose.bones["Upper"].constraints.new("COPY_LOCATION").target = goal
+    linear(goal)
+    body = read(saved() + ":Rig")
+    assert len(body.times) == 30, "the scene's frames, for want of keys of its own"
+    np.testing.assert_allclose(places(body)[0], [[0, frame, 1] for frame in range(1, 31)], atol=1e-5)
+
+
+def test_a_rig_whose_bones_are_still_is_an_object(saved) -> None:
+    arm = rig("Rig", ARM)
+    key(arm, 1, location=(0, 0, 0))
+    key(arm, 5, location=(0, 1, 0))
+    path = saved()
+    for source in (path, f"{path}:Rig", f"{path}:*"):
+        assert read(source).figure is None
+
+
+def test_an_armature_that_moves_has_nothing_to_say_nor_has_a_bone(saved) -> None:
+    arm = waving()
+    key(arm, 1, location=(0, 0, 0))
+    key(arm, 5, location=(0, 1, 0))
+    linear(arm)
+    path = saved()
+    for source in (path, f"{path}:Rig", f"{path}:Rig/Upper"):
+        assert read_trajectories(source).note == ""
+
+
+def test_of_all_objects_none_may_move_where_only_bones_do(saved, refusal) -> None:
+    waving()
+    empty("Lamp")
+    path = saved()
+    assert refusal(f"{path}:*")[1] == (
+        f"no moving body in this file; name one with {path}:NAME: Rig/Lower, Rig/Hand, Lamp, Rig"
+    )
+
+
+def test_of_many_bones_a_few_are_named_and_the_others_counted(saved, refusal) -> None:
+    arm = rig("Rig", dict.fromkeys([f"Tail {number}" for number in range(9)], ((0, 0, 0), (0, 1, 0), None)))
+    for pose_bone in arm.pose.bones:
+        key(pose_bone, 1, location=(0, 0, 0))
+    path = saved()
+    few = "Rig/Tail 0, Rig/Tail 1, Rig/Tail 2, Rig/Tail 3, Rig/Tail 4"
+    assert refusal(f"{path}:*")[1] == f"no moving body in this file; name one with {path}:NAME: {few}, Rig and 4 more"
+    assert refusal(f"{path}:Gone")[1] == f"no body named 'Gone'; it holds Rig, {few} and 4 more"
+
+
+def test_what_is_open_stays_as_it_is_and_can_be_read_itself(saved) -> None:
+    waving()
+    path = saved()
+    bpy.ops.wm.open_mainfile(filepath=path)
+    before = [(obj.name, len(obj.constraints)) for obj in bpy.data.objects], bpy.context.scene.frame_current
+    assert len(read(f"{path}:Rig/Hand").times) == 9
+    after = [(obj.name, len(obj.constraints)) for obj in bpy.data.objects], bpy.context.scene.frame_current
+    assert after == before

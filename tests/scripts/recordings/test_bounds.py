@@ -1,0 +1,158 @@
+"""Files that want too much: what they take is bounded by what they hold, whatever they say of themselves.
+
+Memory is Python's own and NumPy's, as `tracemalloc` has it.
+"""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.recordings import TrajectoryError, bvh, read_trajectories, tables
+from tests.scripts.recordings.seeds import COUNT, SEEDS, repeated
+
+SIZE = 200_000
+"""Bytes of each file: enough to see how memory grows with it."""
+
+BASE = 4_000_000
+OF_THE_FILE = {".json": 30.0}
+OF_ANY_OTHER = 16.0
+OF_A_LINE = 250.0
+"""Memory that reading may take: bytes, bytes for each byte of the file, and bytes for each of its lines."""
+
+PATIENCE = 30.0
+"""Seconds, with `tracemalloc` looking on, on a busy machine."""
+
+CSV = "t,x,y,z,qx,qy,qz,qw\n"
+COLUMNS = CSV.strip().split(",")[1:]
+EUROC = "#timestamp [ns],p_RS_R_x,p_RS_R_y,p_RS_R_z,q_RS_w,q_RS_x,q_RS_y,q_RS_z\n"
+MOTIVE = "Format Version,1.23,Rotation Type,Quaternion,Length Units,Meters\n"
+ROOT = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n"
+
+
+def of(piece: str) -> str:
+    """As much of a piece as a file has room for."""
+    return piece * (SIZE // len(piece))
+
+
+def motion(frames: object, rows: str) -> str:
+    return f"MOTION\nFrames: {frames}\nFrame Time: 0.01\n{rows}"
+
+
+BOMBS: dict[str, str] = {
+    "nothing but line ends.csv": "\n" * SIZE,
+    "one long number.csv": "1" * SIZE,
+    "a column for every byte.csv": "," * SIZE,
+    "comments.csv": of("#\n"),
+    "wide comments.csv": of("#" + "x," * 5_000 + "\n"),
+    "short rows.csv": CSV + of("1\n"),
+    "rows.csv": CSV + of("0,0,0,0,0,0,0,1\n"),
+    "empty cells.csv": CSV + of(",,,,,,,\n"),
+    "devices.csv": "device," + CSV + "".join(f"{row // 9},0,0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
+    "names.csv": "name," + CSV + "".join(f"{row},0,0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
+    "bodies.csv": "t," + ",".join(f"b{body}_{column}" for body in range(300) for column in COLUMNS) + "\n" + of("0,"),
+    "quotes.csv": CSV + of('"0","0","0","0","0","0","0","1"\n'),
+    "1e308.csv": CSV + of("1e308,1e308,1e308,1e308,1e308,1e308,1e308,1e308\n"),
+    "long numbers.csv": CSV + of("9" * 50_000 + ",0,0,0,0,0,0,1\n"),
+    "wide characters.csv": CSV + of("0,0,0,0,0,0,0,1\n") + "#\U0001f600\n",
+    "backwards.csv": CSV + "".join(f"{-row},0,0,0,0,0,0,1\n" for row in range(SIZE // 20)),
+    "zeros.txt": "\0" * SIZE,
+    "blanks.tum": " " * SIZE,
+    "rows.tum": of("0 0 0 0 0 0 0 1\n"),
+    "rows.euroc.csv": EUROC + of("1,0,0,0,1,0,0,0\n"),
+    "endless header.csv": MOTIVE + of("a\n"),
+    "wide header.csv": MOTIVE + of("rigid body," * 5_000 + "\n"),
+    "deep lists.json": "[" * SIZE,
+    "deep objects.json": of('{"a":'),
+    "lists.json": f"[{of('[],')}0]",
+    "objects.json": f"[{of('{},')}0]",
+    "one long number.json": f"[{'9' * SIZE}]",
+    "one long string.json": f'"{"x" * SIZE}"',
+    "devices.json": "{" + ",".join(f'"{device}":{{"poses":[]}}' for device in range(SIZE // 22)) + "}",
+    "deep.bvh": "HIERARCHY\nROOT a {\n" + of("JOINT b {\n"),
+    "wide.bvh": ROOT + "JOINT b { }\n" * 3_000 + "}\n" + motion(2, "0\n0\n"),
+    "an endless name.bvh": "HIERARCHY\nROOT " + of("a ") + "{",
+    "a billion frames.bvh": ROOT + "}\n" + motion("1000000000", "0\n0\n"),
+    "1e9 frames.bvh": ROOT + "}\n" + motion("1e9", "0\n0\n"),
+    "a billion channels.bvh": ROOT.replace("CHANNELS 1", "CHANNELS 1000000000"),
+    "small frames.bvh": ROOT + "}\n" + motion(SIZE // 2, "0\n" * (SIZE // 2)),
+    "small joints in small frames.bvh": ROOT
+    + "JOINT b { }\n" * 10_000
+    + "}\n"
+    + motion(SIZE // 4, "0\n" * (SIZE // 4)),
+    "one long row.bvh": ROOT + "}\n" + motion(1, of("0 ")),
+}
+
+
+def assert_is_read_within_bounds(source: str, path: Path) -> bool:
+    """Whether there is a recording, rather than a refusal in one line."""
+    content = path.read_bytes()
+    factor = OF_THE_FILE.get(path.suffix, OF_ANY_OTHER)
+    allowed = BASE + factor * len(content) + OF_A_LINE * content.count(b"\n")
+    del content
+    started = time.perf_counter()
+    tracemalloc.start()
+    try:
+        read_trajectories(source)
+        readable = True
+    except TrajectoryError:
+        readable = False
+    finally:
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+    assert time.perf_counter() - started < PATIENCE
+    assert peak <= allowed, f"{peak / allowed:.2f} of what is allowed"
+    return readable
+
+
+@pytest.mark.parametrize(
+    ("name", "body"), [(name, "") for name in BOMBS] + [(name, ":*") for name in BOMBS if name.endswith(".bvh")]
+)
+def test_what_a_file_takes_is_bounded_by_what_it_holds(tmp_path: Path, name: str, body: str) -> None:
+    path = tmp_path / name
+    path.write_text(BOMBS[name], encoding="utf-8", newline="")
+    assert_is_read_within_bounds(f"{path}{body}", path)
+
+
+@pytest.mark.parametrize("ending", SEEDS)
+def test_so_is_what_a_sound_recording_takes(tmp_path: Path, ending: str) -> None:
+    for seed in SEEDS[ending]:
+        path = tmp_path / f"take{ending}"
+        path.write_text(repeated(seed, 1_000), encoding="utf-8", newline="")
+        assert assert_is_read_within_bounds(f"{path}:*", path) or assert_is_read_within_bounds(str(path), path)
+        assert len(read_trajectories(str(path)).trajectories[0].times) == 1_000 * COUNT
+
+
+@pytest.mark.parametrize(
+    ("module", "limit", "lowered", "name", "content", "line", "told"),
+    [
+        (tables, "LARGEST_FILE", 10, "take.csv", CSV, None, "the file has 0 MiB, and 0 can be read; split"),
+        (tables, "MOST_ROWS", 5, "take.tum", SEEDS[".tum"][1], 8, "more than 5 rows; split the recording"),
+        (tables, "LONGEST_LINE", 50, "take.csv", CSV + "1" * 60, 2, "this line is longer than 50 characters; name a"),
+        (tables, "MOST_COLUMNS", 5, "take.csv", CSV, 1, "more than 5 columns; export fewer bodies"),
+        (bvh, "MOST_JOINTS", 1, "take.bvh", SEEDS[".bvh"][0], 8, "more than 1 joints; export fewer, such as one"),
+        (bvh, "LONGEST_NAME", 0, "take.bvh", SEEDS[".bvh"][0], 2, "a { is missing behind a name; export the BVH"),
+        (bvh, "MOST_POSES", 15, "take.bvh", SEEDS[".bvh"][0], None, "2 joints in 8 frames are more than 15 poses;"),
+    ],
+)
+def test_what_is_beyond_a_limit_is_refused_with_a_way_out(
+    write: Callable[[str, str], str],
+    refusal: Callable[[str], tuple[int | None, str]],
+    monkeypatch: pytest.MonkeyPatch,
+    module: object,
+    limit: str,
+    lowered: int,
+    name: str,
+    content: str,
+    line: int | None,
+    told: str,
+) -> None:
+    path = write(name, content)
+    monkeypatch.setattr(module, limit, lowered)
+    told_line, message = refusal(path) if limit != "MOST_POSES" else refusal(f"{path}:*")
+    assert message.startswith(told)
+    assert told_line == line

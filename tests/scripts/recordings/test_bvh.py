@@ -1,0 +1,270 @@
+"""BVH joints: by hand, against the matrices of Blender's importer, and wrong files."""
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from tests.scripts.recordings import seeds
+
+ARM = f"""{seeds.ARM}Frames: 2
+Frame Time: 0.04
+0 0 0  0 0 0  0 0 0
+1 5 0  90 0 0  -90 0 0
+"""
+
+
+def test_a_joint_is_carried_by_its_parents(write) -> None:
+    shoulder, elbow = read_trajectories(write("arm.bvh", ARM) + ":*").trajectories
+    assert (shoulder.name, elbow.name) == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(elbow.times, [0.0, 0.04])
+    np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
+    np.testing.assert_allclose(elbow.poses.quaternions, [[1, 0, 0, 0]] * 2, atol=1e-15)
+    np.testing.assert_allclose(shoulder.poses.quaternions[1], [np.sqrt(0.5), 0, 0, np.sqrt(0.5)], atol=1e-15)
+
+
+def test_without_a_name_it_is_the_whole_body_each_joint_in_its_parents_space(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM.replace("1 5 0  90", "1 2 0  90")))
+    (body,) = recording.trajectories
+    assert (body.name, recording.others, recording.note, recording.axes) == ("arm", (), "", "opengl")
+    assert body.figure.joints == ("Shoulder", "Elbow")
+    np.testing.assert_array_equal(body.figure.parents, [-1, 0])
+    np.testing.assert_allclose(body.poses.positions, [[[0, 0, 0], [1, 2, 0]], [[2, 0, 0]] * 2], atol=1e-15)
+    there = body.figure.skeleton.in_root_space(body.poses)
+    for joint, alone in enumerate(read_trajectories(str(recording.path) + ":*").trajectories):
+        np.testing.assert_allclose(there[joint].positions, alone.poses.positions, atol=1e-15)
+        assert angle_between(there[joint].quaternions, alone.poses.quaternions).max() < 1e-15
+
+
+def test_a_body_rests_where_no_joint_is_turned_and_its_bones_end_at_their_children(write) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM)).trajectories
+    np.testing.assert_array_equal(body.figure.rest.positions, [[0, 0, 0], [2, 0, 0]])
+    np.testing.assert_array_equal(body.figure.rest.quaternions, [[1, 0, 0, 0]] * 2)
+    np.testing.assert_array_equal(body.figure.tails[0], [2, 0, 0])
+    assert np.linalg.norm(body.figure.tails[1]) > 0.0  # Its end site.
+
+
+def test_a_single_joint_is_no_body(write) -> None:
+    text = "HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n}\nMOTION\nFrames: 2\n"
+    (single,) = read_trajectories(write("one.bvh", f"{text}Frame Time: 0.1\n0 0 0\n1 0 0\n")).trajectories
+    assert (single.name, single.figure, single.poses.shape) == ("A", None, (2,))
+
+
+@pytest.mark.parametrize("order", ["".join(order) for order in permutations("XYZ")])
+def test_angles_are_applied_in_the_order_of_the_channels(write, order: str) -> None:
+    channels = " ".join(f"{axis}rotation" for axis in order)
+    text = ARM.replace("Zrotation Xrotation Yrotation", channels).replace("90 0 0  -90 0 0", "10 20 30  40 50 60")
+    shoulder, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    first = Rotation.from_euler(order, [10, 20, 30], degrees=True)
+    both = first * Rotation.from_euler(order, [40, 50, 60], degrees=True)
+    expected = np.array([first.as_quat(), both.as_quat()])[:, [3, 0, 1, 2]]
+    found = np.array([shoulder.poses.quaternions[1], elbow.poses.quaternions[1]])
+    assert angle_between(found, expected).max() < 1e-14
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        ARM.replace("\n", "\r\n"),
+        ARM.replace("    ", "\t"),
+        ARM.replace("\n{", " {").replace("ROOT", "root").replace("position", "POSITION"),
+        ARM.replace("End Site", "End Site Hand_end"),
+        ARM.replace("Frame Time: 0.04", "Frame Time:\t4e-2").replace("Frames: 2", "Frames:\t2 "),
+        ARM + "\n\n",
+    ],
+)
+def test_spelling_and_spacing_do_not_matter(write, text: str) -> None:
+    _, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    np.testing.assert_allclose(elbow.poses.positions, [[2, 0, 0], [1, 7, 0]], atol=1e-15)
+
+
+def test_joints_of_one_name_are_numbered_as_blender_does(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Shoulder")))
+    assert recording.trajectories[0].figure.joints == ("Shoulder", "Shoulder.001")
+
+
+def test_a_name_of_several_words_is_joined_as_blender_does(write) -> None:
+    recording = read_trajectories(write("arm.bvh", ARM.replace("Elbow", "Left Elbow : upper")))
+    assert recording.trajectories[0].figure.joints == ("Shoulder", "Left_Elbow_:_upper")
+
+
+def test_position_channels_take_the_place_of_the_offset(write) -> None:
+    text = ARM.replace("CHANNELS 3", "CHANNELS 6 Zposition Yposition Xposition").replace("-90 0 0", "3 2 1 -90 0 0")
+    text = text.replace("0 0 0  0 0 0  0 0 0", "0 0 0  0 0 0  3 2 1  0 0 0")
+    _, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    np.testing.assert_allclose(elbow.poses.positions, [[1, 2, 3], [1 - 2, 5 + 1, 3]], atol=1e-15)
+
+
+@pytest.mark.parametrize("count", [1, 3, 60])
+def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, count: int) -> None:
+    path = write("arm.bvh", ARM.replace("Frames: 2", f"Frames: {count}"))
+    (body,) = read_trajectories(path).trajectories
+    (warning,) = body.warnings
+    assert warning.startswith(f"arm.bvh:17: Frames: says {count} and 2 whole rows follow")
+    np.testing.assert_array_equal(body.times, [0.0, 0.04])
+    assert read_trajectories(write("arm.bvh", ARM)).trajectories[0].warnings == ()
+    shoulder, elbow = read_trajectories(write("arm.bvh", ARM.replace("Frames: 2", "Frames: 3")) + ":*").trajectories
+    assert (len(shoulder.warnings), len(elbow.warnings)) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "metres", "told"),
+    [
+        (1.7, "", 1.7, ""),
+        (4.0, "", 4.0, ""),
+        (170.0, "centimetres", 1.7, "the only usual unit that makes a grown-up of it"),
+        (7.0, "feet", 2.13, "the only usual unit that makes a grown-up of it"),
+        (17.0, "units of CMU's motion capture", 0.96, "may as well be decimetres (1.7 m)"),
+        (5.5, "feet", 1.68, "the only usual"),
+        (0.1, "", 0.1, ""),
+        (60.0, "inches", 1.52, ""),
+    ],
+)
+def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: str, metres: float, told: str) -> None:
+    text = ARM.replace("2.0 0.0 0.0", f"{size} 0.0 0.0")
+    (body,) = read_trajectories(path := write("arm.bvh", text)).trajectories
+    found = size * body.metres_per_unit
+    assert unit in body.remark
+    assert told in body.remark
+    doubted = "; if not, say how long it is: --scale METRES" in " ".join(body.warnings)
+    assert doubted == (not 0.5 <= found <= 2.5)
+    if doubted:
+        assert f"it is {found:.3g} m large" in body.warnings[-1]
+    if size > 1.0:
+        assert found == pytest.approx(metres, abs=5e-3)
+    (scaled,) = read_trajectories(path, ReadingOptions(scale=0.5)).trajectories
+    assert (scaled.metres_per_unit, scaled.remark, scaled.warnings) == (0.5, "", ())
+
+
+ROW = "2 5 0  90 0 0  -91 0 12.5"
+
+
+@pytest.mark.parametrize("kept", [1, 6, 9, 10, 17, 21, 22, 24, 25])
+def test_a_file_that_is_cut_off_in_a_row_loses_that_row_with_a_warning(write, kept: int) -> None:
+    path = write("arm.bvh", ARM.replace("Frames: 2", "Frames: 60") + ROW[:kept])
+    (body,) = read_trajectories(path).trajectories
+    assert len(body.times) == 2
+    cut, short = body.warnings
+    assert cut == "arm.bvh:21: the file is cut off in this row, which is left out"
+    assert short.startswith("arm.bvh:17: Frames: says 60 and 2 whole rows follow")
+
+
+def test_the_last_row_needs_no_end_of_line(write) -> None:
+    (body,) = read_trajectories(write("arm.bvh", ARM.rstrip())).trajectories
+    assert (len(body.times), body.warnings) == (2, ())
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "1e308"])
+def test_numbers_that_are_broken_are_kept_for_the_repair(write, number: str) -> None:
+    text = ARM.replace("1 5 0  90 0 0", f"{number} -{number} 0  90 {number} 0")
+    shoulder, elbow = read_trajectories(write("arm.bvh", text) + ":*").trajectories
+    for trajectory in (shoulder, elbow):
+        assert np.isfinite(trajectory.poses.positions[0]).all()
+        assert not (np.abs(trajectory.poses.positions[1]) < 1e300).all()
+
+
+def test_a_frame_time_beyond_all_measure_is_kept_for_the_repair_too(write) -> None:
+    text = ARM.replace("Time: 0.04", "Time: 1e308").replace("Frames: 2", "Frames: 3") + "0 0 0  0 0 0  0 0 0\n"
+    (shoulder,) = read_trajectories(write("arm.bvh", text)).trajectories
+    np.testing.assert_array_equal(shoulder.times, [0.0, 1e308, np.inf])
+
+
+def skeleton(random: np.random.Generator, frames: int) -> str:
+    """A chain with a branch, every joint with its own order of channels, some with positions."""
+    orders = ["".join(order) for order in permutations("XYZ")]
+    count = 0
+
+    def joint(depth: int, children: list) -> str:
+        nonlocal count
+        positions = depth == 0 or random.random() < 0.3
+        channels = [f"{axis}position" for axis in random.permutation(list("XYZ"))] if positions else []
+        channels += [f"{axis}rotation" for axis in orders[count % len(orders)]]
+        name, count = f"Joint{count}", count + 1
+        widths.append(len(channels))
+        offset = " ".join(f"{number:.6f}" for number in random.uniform(-1, 1, 3))
+        inner = "".join(joint(depth + 1, child) for child in children) or "End Site\n{\nOFFSET 0 0.5 0\n}\n"
+        kind = "JOINT" if depth else "ROOT"
+        return f"{kind} {name}\n{{\nOFFSET {offset}\nCHANNELS {len(channels)} {' '.join(channels)}\n{inner}}}\n"
+
+    widths: list[int] = []
+    hierarchy = joint(0, [[[[]], []], [[[]]]])
+    rows = random.uniform(-180, 180, (frames, sum(widths)))
+    motion = "\n".join(" ".join(f"{number:.6f}" for number in row) for row in rows)
+    return f"HIERARCHY\n{hierarchy}MOTION\nFrames: {frames}\nFrame Time: 0.0333333\n{motion}\n"
+
+
+# The importer leaves its file to the garbage collector.
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.parametrize("seed", range(4))
+def test_the_poses_are_those_of_blenders_importer(write, seed: int) -> None:
+    bpy = pytest.importorskip("bpy")
+    frames = 6
+    path = write("skeleton.bvh", skeleton(np.random.default_rng(seed), frames))
+    trajectories = read_trajectories(path + ":*").trajectories
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.preferences.addon_enable(module="io_anim_bvh")
+    try:
+        bpy.ops.import_anim.bvh(filepath=path, axis_forward="Y", axis_up="Z", frame_start=1)
+        armature = bpy.context.object
+        assert len(trajectories) == len(armature.pose.bones) == 8
+        for frame in range(frames):
+            bpy.context.scene.frame_set(1 + frame)
+            for trajectory in trajectories:
+                bone = armature.pose.bones[trajectory.name]
+                turned = bone.matrix @ bone.bone.matrix_local.inverted()
+                # Blender works in single precision, and positions here go to several hundred units.
+                np.testing.assert_allclose(trajectory.poses.positions[frame], bone.matrix.translation, atol=1e-3)
+                quaternion = np.array(turned.to_quaternion())
+                assert angle_between(trajectory.poses.quaternions[frame], quaternion) < 5e-5
+    finally:
+        bpy.ops.preferences.addon_disable(module="io_anim_bvh")
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        ("", 1, "the file ends where HIERARCHY is expected"),
+        ("t,x,y,z\n0,1,2,3\n", 1, "a BVH file begins with HIERARCHY, not with 't,x,y,z'"),
+        ("HIERARCHY\nMOTION\nFrames: 1\n", 2, "no ROOT before MOTION"),
+        (ARM.split("MOTION")[0], 16, "the file ends where MOTION is expected"),
+        (ARM.split("    CHANNELS 3")[0], 9, "the file ends where MOTION is expected"),
+        (ARM.replace("}\nMOTION", "MOTION"), 15, "a } is missing before MOTION"),
+        (ARM.replace("}\nMOTION", "}\n}\nMOTION"), 16, "'}' is out of place"),
+        (ARM.replace("JOINT Elbow", "ROOT Elbow"), 6, "'ROOT' is out of place"),
+        (ARM.replace("ROOT", "JOINT"), 2, "'JOINT' is out of place"),
+        (ARM.replace("2.0 0.0 0.0", "2.0 0.0"), 9, "'CHANNELS' where a number of the OFFSET is expected"),
+        (ARM.replace("2.0 0.0 0.0", "2.0 nan 0.0"), 8, "'nan' where a number of the OFFSET is expected"),
+        (ARM.replace("CHANNELS 3", "CHANNELS 4"), 10, "'End' is no channel"),
+        (ARM.replace("CHANNELS 3", "CHANNELS 2"), 9, "'Yrotation' is out of place"),
+        (ARM.replace("CHANNELS 3", "CHANNELS 1e9"), 9, "1e+09 CHANNELS for a joint"),
+        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 Q"), 9, "'Qrotation' is no channel"),
+        (ARM.replace("CHANNELS 3 Z", "CHANNELS 3 X"), 9, "a channel occurs twice in a joint"),
+        (ARM.split("Frames")[0], 16, "'' where Frames: and a positive number are expected"),
+        (ARM.split("Frame Time")[0], 16, "'' where Frame Time: and a positive number are expected"),
+        (ARM.replace("Frames: 2", "Frames: two"), 17, "'Frames: two' where Frames: and a positive number are expected"),
+        (ARM.replace("Time: 0.04", "Time: 0"), 18, "'Frame Time: 0' where Frame Time: and a positive number"),
+        (ARM.replace("1 5 0 ", "1 5 "), 20, "8 columns where 9 are needed"),
+        (ARM.replace("1 5 0 ", "1 5 0 0 "), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0 ", "1 5 0 0 ").rstrip(), 20, "10 columns where 9 have a name"),
+        (ARM.replace("1 5 0  90", "1 5 0  9O").rstrip(), 20, "Shoulder Zrotation is '9O', not a number"),
+        (ARM.replace("1 5 0  90", "1 5 0  9O"), 20, "Shoulder Zrotation is '9O', not a number"),
+        (ARM.replace("Frames: 2", "Frames: 1").replace("1 5 0  90 0 0  -90 0 0\n", ""), None, "'arm' has 1 samples"),
+        ("HIERARCHY\nROOT A\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n0\n", 6, "no joint has CHANNELS"),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 50_000, 2, "more than 500 joints hang on one another; export a"),
+        (
+            "HIERARCHY\n" + "ROOT A {" + "JOINT B {}" * 50_000,
+            2,
+            "more than 3000 joints; export fewer, such as one body",
+        ),
+        ("HIERARCHY\n" + "ROOT A {" + "JOINT B {" * 400, 2, "the file ends where MOTION is expected"),
+        (b"\x00\x01HIERARCHY", 1, "this is not text but binary data"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, line: int | None, problem: str) -> None:
+    told_line, message = refusal(write("arm.bvh", text))
+    assert message.startswith(problem)
+    assert told_line == line

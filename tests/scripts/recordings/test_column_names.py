@@ -1,0 +1,130 @@
+"""What the names of columns say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.recordings import ReadingOptions
+from rigid_motion_batch.recordings.column_names import ColumnName, column_name, unit_in
+from rigid_motion_batch.recordings.columns import layout_of
+from tests.scripts.recordings import logs
+
+
+@pytest.mark.parametrize("unit", logs.TIMES)
+def test_times_are_known_with_their_unit(unit: str) -> None:
+    for name in logs.spellings(logs.TIMES[unit]):
+        found = column_name(name)
+        assert found is not None, name
+        assert found.kind == "time"
+        assert found.unit == unit or (unit == "s" and not found.unit), name
+
+
+@pytest.mark.parametrize(
+    ("templates", "kinds", "axes"),
+    [
+        (logs.POSITIONS, {"position"}, "xyz"),
+        (logs.QUATERNIONS, {"quaternion", "rotation"}, "xyzw"),
+        (logs.EULERS, {"euler", "rotation"}, "xyz"),
+    ],
+    ids=["positions", "quaternions", "Euler angles"],
+)
+@pytest.mark.parametrize("prefix", ["", "left_", "Left Hand.", "tracker 1 ", "L_"])
+def test_positions_and_rotations_are_known_with_their_body(
+    templates: str, kinds: set[str], axes: str, prefix: str
+) -> None:
+    for template in logs.spellings(templates):
+        for axis in axes:
+            name = f"{prefix}{logs.spelled(template, axis)}"
+            found = column_name(name)
+            assert found is not None, name
+            assert found.kind in kinds, name
+            assert (found.axis, found.body) == (axis, prefix.strip(" _.")), name
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        *((f"pos_x{suffix}", unit) for unit, suffixes in logs.LENGTHS.items() for suffix in suffixes.split(";")[1:]),
+        *((f"rot_x{suffix}", unit) for unit, suffixes in logs.ANGLES.items() for suffix in suffixes.split(";")),
+        ("PosXCm", "cm"),
+        ("pos_cm_x", "cm"),
+        ("X (ft)", "ft"),
+        ("x [furlongs]", "furlongs"),
+        ("qw []", ""),
+        ("yaw (\u00b0)", "deg"),
+        ("left_foot_x", ""),
+    ],
+)
+def test_units_are_known_behind_names_and_in_brackets(name: str, unit: str) -> None:
+    assert column_name(name).unit == unit
+
+
+def test_feet_and_hands_are_bodies() -> None:
+    assert column_name("left_foot_pos_x") == ColumnName("position", "x", "", "left_foot")
+    assert column_name("r_hand_qw") == ColumnName("quaternion", "w", "", "r_hand")
+
+
+@pytest.mark.parametrize("name", logs.spellings(logs.DEVICES))
+def test_devices_are_known(name: str) -> None:
+    assert column_name(name).kind == "device"
+
+
+@pytest.mark.parametrize(("name", "body"), [("s", ""), ("Scale", ""), ("left_scale", "left")])
+def test_scales_are_known(name: str, body: str) -> None:
+    assert column_name(name) == ColumnName("scale", body=body)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("", "()", "[", "\u00b5", "x" * 101, "m", "deg", "w", "pos_w", "q0", "max", "index", "hp", "button"),
+        *("frame", "frameTime", "delta_time", "dt", "date", "position", "session_id"),
+    ],
+)
+def test_what_says_nothing_is_not_guessed_at(name: str) -> None:
+    assert column_name(name) is None
+
+
+@pytest.mark.parametrize(("name", "unit"), [("when_ms", "ms"), ("a [cm]", "cm"), ("ms", ""), ("height", "")])
+def test_a_unit_is_found_in_a_name_that_says_nothing_else(name: str, unit: str) -> None:
+    assert unit_in(name) == unit
+
+
+# -- the page on logs -------------------------------------------------------------------------------------------------
+
+PAGE = (Path(__file__).parents[3] / "docs" / "csv.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("row", "kinds"),
+    [
+        ("time", {"time"}),
+        ("position", {"position"}),
+        ("quaternion", {"quaternion", "rotation"}),
+        ("Euler angles", {"euler", "rotation"}),
+        ("scale", {"scale"}),
+        ("whose row it is", {"device"}),
+    ],
+)
+def test_the_names_on_the_page_are_known(row: str, kinds: set[str]) -> None:
+    (line,) = (line for line in PAGE.splitlines() if line.startswith(f"| {row} |"))
+    names = [name for name in re.findall("`(.+?)`", line) if name not in ("w", "--euler")]
+    assert len(names) > 1
+    for name in names:
+        assert column_name(name).kind in kinds, name
+
+
+def test_the_logger_on_the_page_writes_what_is_read_without_options() -> None:
+    (header,) = re.findall(r'log\.WriteLine\("(.+)"\)', PAGE)
+    assert list(layout_of(header.split(","), ReadingOptions()).bodies) == [""]
+    assert len(re.findall(r"\{\d:R\}", PAGE)) == len(header.split(","))
+
+
+def test_the_orders_on_the_page_are_orders() -> None:
+    orders = re.findall(r"`--euler (\w+)", PAGE)
+    assert len(orders) >= 4
+    for order in orders:
+        assert ReadingOptions(euler=order).intrinsic_order.isupper()

@@ -1,0 +1,130 @@
+"""Damaged FBX and glTF files: each is refused in one line or read, in a process that may be lost, and only that."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.analysis.choices import Uniform
+from tests.blank import blank
+from tests.scripts.recordings.mutations import NUMBERS, WORDS, in_place, mutated
+from tests.scripts.recordings.skeletons import body, export, skinned
+from tests.scripts.recordings.test_damaged_bvh_bodies import assert_can_be_shown
+from tests.scripts.recordings.test_fuzz import Reader, clips_or_refusal
+from tests.thoroughness import THOROUGH
+
+bpy = pytest.importorskip("bpy")
+
+CASES = int(os.environ.get("RIGID_MOTION_FUZZ", "1000" if THOROUGH else "40"))
+FIRST = int(os.environ.get("RIGID_MOTION_FUZZ_FROM", "0"))
+
+VALUES = (
+    *(None, True, False, 0, -1, 1, 2, 5121, 5126, 7, 65535, 2**31, 2**32, 2**53, 1e9, 1e40, -1e308, 0.5, 1e-320),
+    *("", "VEC3", "SCALAR", "MAT4", "STEP", "CUBICSPLINE", "rotation", "weights", "pointer", "KHR_draco", "a" * 300),
+    *([], {}, [0], [[]], [None], [1e38, 0, 0], {"node": 0}, [0, 1, 2, 3] * 4, "data:;base64,AAAA", "../x.bin"),
+)
+"""In the place of anything in a document."""
+
+
+def zero_run(content: bytes, chance: Random) -> bytes:
+    first, length = chance.randrange(len(content)), chance.choice((1, 4, 64, 4096))
+    return content[:first] + bytes(min(length, len(content) - first)) + content[first + length :]
+
+
+def change_a_length(content: bytes, chance: Random) -> bytes:
+    """Four bytes that may be a length, an offset or a number of something are another."""
+    place = chance.choice((8, 12, 27, 31, chance.randrange(len(content))))
+    if place + 4 > len(content):
+        return content
+    (old,) = struct.unpack_from("<I", content, place)
+    new = chance.choice((0, 1, old + 1, old - 1, 2 * old, 2**31, 2**32 - 1, chance.randrange(2**32))) % 2**32
+    return content[:place] + struct.pack("<I", new) + content[place + 4 :]
+
+
+def edit_document(content: bytes, chance: Random) -> bytes:
+    """A GLB file whose document says something else, and is as long as the file says."""
+    (length,) = struct.unpack_from("<I", content, 12)
+    document, rest = json.loads(content[20 : 20 + length]), content[20 + length :]
+    for _ in range(chance.choice((1, 1, 2, 5))):
+        edit(document, chance)
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + rest
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def edit(document: object, chance: Random) -> None:
+    """Change, leave out or repeat something, at any depth."""
+    while True:
+        names = list(document) if isinstance(document, dict) else list(range(len(document)))
+        if not names:
+            return
+        name = chance.choice(names)
+        inner = document[name]
+        if isinstance(inner, (dict, list)) and inner and chance.random() < 0.85:
+            document = inner
+            continue
+        match chance.choice(("change", "change", "change", "leave out", "repeat", "swap")):
+            case "change":
+                document[name] = chance.choice((*VALUES, chance.choice(NUMBERS), chance.choice(WORDS)))
+            case "leave out":
+                del document[name]
+            case "repeat" if isinstance(document, list):
+                document.extend([inner] * chance.choice((1, 300)))
+            case _:
+                document[name] = document[chance.choice(names)]
+        return
+
+
+Damage = Callable[[bytes, Random], bytes]
+
+FBX: tuple[Damage, ...] = (in_place, in_place, in_place, zero_run, change_a_length, mutated)
+GLB: tuple[Damage, ...] = (in_place, zero_run, change_a_length, mutated, edit_document, edit_document, edit_document)
+
+
+@pytest.fixture
+def reader() -> Iterator[Reader]:
+    one = Reader("test_damaged_bodies", "read_and_place")
+    yield one
+    one.close()
+
+
+def read_and_place(source: str, _: int) -> bool:
+    """Whether there is a recording, all of whose joints are somewhere; else there has to be a refusal in one line."""
+    clips = clips_or_refusal(source)
+    if clips is None:
+        return False
+    assert not [block for block in bpy.data.user_map() if block.name.startswith(("Body", "Skin", "Importing"))]
+    for clip in clips:
+        poses = clip.poses if clip.figure is None else clip.figure.skeleton.in_root_space(clip.poses)
+        assert np.isfinite(poses.positions).all()
+        assert np.allclose(np.linalg.norm(poses.quaternions, axis=-1), 1.0)
+        if clip.figure is not None:
+            assert_can_be_shown(clip, Uniform("5"), "lerp_slerp")
+    return True
+
+
+@pytest.mark.parametrize(("ending", "kinds"), [(".fbx", FBX), (".glb", GLB)])
+def test_a_damaged_file_is_refused_or_read_or_the_end_of_a_process_but_never_an_error_of_ours(
+    tmp_path: Path, reader: Reader, ending: str, kinds: tuple[Damage, ...]
+) -> None:
+    blank()
+    skinned(body())
+    sound, path = export(tmp_path / f"sound{ending}"), tmp_path / f"damaged{ending}"
+    content, answers = sound.read_bytes(), []
+    for number in range(FIRST, FIRST + CASES):
+        chance = Random(f"{ending} {number}")
+        path.write_bytes(chance.choice(kinds)(content, chance))
+        answer = reader.read(f"{path}{':*' if number % 3 == 0 else ''}", number)
+        assert answer in (True, False, "crash"), f"case {number} of {ending}: {answer}"
+        answers.append(answer)
+    assert {True, False} <= set(answers)
+    assert answers.count("crash") <= len(answers) // 10, "how many there are is Blender's affair, but they are rare"
+    assert reader.read(str(sound), 0) is True

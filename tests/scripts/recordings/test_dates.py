@@ -1,0 +1,166 @@
+"""Dates and clock times in the column of time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta, timezone
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+
+POSE = "1,2,3,0,0,0,1"
+
+
+def log(times: Sequence[str], name: str = "time") -> str:
+    return f"{name},x,y,z,qx,qy,qz,qw\n" + "".join(f"{time},{POSE}\n" for time in times)
+
+
+def times_of(source: str) -> np.ndarray:
+    (trajectory,) = read_trajectories(source).trajectories
+    return trajectory.times
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ["2026-11-22T10:00:00.123456789Z", "2026-11-22T10:00:00.373456789Z"],
+        ["2026-11-22T10:00:00", "2026-11-22T10:00:00.25"],
+        ["2026-11-22T10:00", "2026-11-22T10:00:00.25"],
+        ["2026-11-22 23:59:59.9", "2026-11-23 00:00:00.15"],
+        ["2026-02-28 23:59:59.9", "2026-03-01 00:00:00.15"],
+        ['"2026-11-22 10:00:00.000001"', "2026-11-22 10:00:00.250001"],
+        ["0001-01-01T00:00:00", "0001-01-01T00:00:00.25"],
+        ["2026-10-25T02:59:59.9+02:00", "2026-10-25T02:00:00.15+01:00"],
+        ["2026-10-25T02:59:59.9+0200", "2026-10-25T01:00:00.15Z"],
+        ["2026-11-22 06:30:00 -0330", "2026-11-22 10:00:00.25Z"],
+        ["2016-12-31T23:59:60Z", "2017-01-01T00:00:00.25Z"],
+        ["10:00:00.123", "10:00:00.373"],
+        ["9:59:59.9", "10:00:00.15"],
+        ["23:59:59.9", "00:00:00.15"],
+        ["00:30:00+01:00", "23:30:00.25Z"],
+    ],
+)
+def test_dates_and_clock_times_are_seconds_from_the_first(write, times: list[str]) -> None:
+    np.testing.assert_array_equal(times_of(write("log.csv", log(times))), [0.0, 0.25])
+
+
+@pytest.mark.parametrize(
+    "name", ["timestamp_ms", "t [hh:mm:ss]", "Date/Time (UTC)", "datetime", "timestamp (ISO 8601)"]
+)
+def test_a_unit_in_the_name_of_dates_is_no_matter(write, name: str) -> None:
+    np.testing.assert_array_equal(times_of(write("log.csv", log(["10:00:00", "10:00:00.25"], name))), [0.0, 0.25])
+
+
+def test_a_fraction_may_have_a_decimal_comma_where_commas_do_not_separate(write) -> None:
+    text = log(["2026-11-22 10:00:00,5", "2026-11-22 10:00:00,75"]).replace(f",{POSE}", f";{POSE.replace(',', ';')}")
+    head, _, rows = text.partition("\n")
+    np.testing.assert_array_equal(times_of(write("log.csv", f"{head.replace(',', ';')}\n{rows}")), [0.0, 0.25])
+
+
+def test_numbers_go_before_dates_that_say_the_same_again(write) -> None:
+    rows = "".join(f"2026-11-22T10:00:0{time},{time},{POSE}\n" for time in (5, 6))
+    np.testing.assert_array_equal(times_of(write("log.csv", f"datetime,t,x,y,z,qx,qy,qz,qw\n{rows}")), [5.0, 6.0])
+
+
+@given(
+    st.datetimes(datetime(1990, 1, 1), datetime(2090, 1, 1)),
+    st.lists(st.tuples(st.integers(0, 86_400_000_000), st.integers(0, 999), st.integers(-840, 840)), min_size=1),
+)
+def test_nanoseconds_and_offsets_are_exact(tmp_path_factory, start: datetime, later: list) -> None:
+    start = start.replace(tzinfo=UTC)
+    cells, expected = [start.isoformat()], [0]
+    for microseconds, nanoseconds, minutes in later:
+        moment = start + timedelta(microseconds=microseconds)
+        local = moment.astimezone(timezone(timedelta(minutes=minutes))).isoformat(timespec="microseconds")
+        cells.append(f"{local[:26]}{nanoseconds:03}{local[26:]}")
+        expected.append(1000 * microseconds + nanoseconds)
+    path = tmp_path_factory.getbasetemp() / "dates.csv"
+    path.write_text(log(cells))
+    times, nanoseconds = times_of(str(path)), np.array(expected)
+    earliest = nanoseconds[np.flatnonzero(times == 0.0)[0]]  # Without those that are wild beside the others.
+    np.testing.assert_array_equal(times, (nanoseconds - earliest) / 1e9)
+
+
+def test_a_clock_that_comes_back_from_the_next_day_is_of_the_day_before(write) -> None:
+    times = ["23:59:59.5", "00:00:00", "23:59:59.75", "00:00:00.25"]
+    np.testing.assert_array_equal(times_of(write("log.csv", log(times))), [0.0, 0.5, 0.25, 0.75])
+
+
+def test_a_pause_of_more_than_half_a_day_is_one(write) -> None:
+    np.testing.assert_array_equal(times_of(write("log.csv", log(["01:00:00", "14:00:00"]))), [0.0, 13 * 3600.0])
+
+
+def test_a_row_without_a_time_is_kept_for_the_repair(write) -> None:
+    times = times_of(write("log.csv", log(["10:00:00", "", "NaN", "10:00:00.25"])))
+    np.testing.assert_array_equal(times, [0.0, np.nan, np.nan, 0.25])
+
+
+@pytest.mark.parametrize("wild", ["9999-12-31T23:59:59", "0001-01-01T00:00:00"])
+def test_one_wild_date_costs_its_row_and_no_more(write, wild: str) -> None:
+    dates = [f"2026-11-22T10:00:00.{hundredth:02}" for hundredth in range(20)]
+    times = times_of(write("log.csv", log([wild, *dates])))
+    np.testing.assert_array_equal(times[1:], np.arange(20) * 10**7 / 1e9)
+    assert abs(times[0]) > 1e9
+
+
+def test_dates_without_fractions_are_said_to_be_slow_and_no_unit_is_asked_for(write) -> None:
+    (trajectory,) = read_trajectories(write("log.csv", log(["10:00:00", "10:00:01", "10:00:02"]))).trajectories
+    assert trajectory.warnings == ("only 1 samples a second, fewer than any motion needs",)
+
+
+@pytest.mark.parametrize(
+    ("second", "problem"),
+    [
+        ("2026-13-22T10:00:00", "t is '2026-13-22T10:00:00', not a date; correct or delete the line"),
+        ("2026-11-22T24:00:00", "t is '2026-11-22T24:00:00', not a date"),
+        ("2026-11-22T10:60:00", "t is '2026-11-22T10:60:00', not a date"),
+        ("2026-11-22T10:00:61", "t is '2026-11-22T10:00:61', not a date"),
+        ("2026-11-22T10:00:00.1234567891", "t is '2026-11-22T10:00:00.1234567891', not a date"),
+        ("2026-11-22T10:00:00\u0661", "t is '2026-11-22T10:00:00\u0661', not a date"),
+        ("2026-11-22T10:00:00+25:00", "t is '2026-11-22T10:00:00+25:00', not a date"),
+        ("5", "t is '5', not a date"),
+        ("2026-11-22T10:00:00Z", "t is '2026-11-22T10:00:00Z', not a date without an offset from UTC as before"),
+        ("10:00:00", "t is '10:00:00', not a date without an offset from UTC as before"),
+    ],
+)
+def test_a_damaged_date_is_told_with_its_line(write, refusal, second: str, problem: str) -> None:
+    line, message = refusal(write("log.csv", log(["2026-11-22T10:00:00", second])))
+    assert line == 3
+    assert message.startswith(problem)
+
+
+@pytest.mark.parametrize("time", ["11/22/2026 10:00:00", "22.11.2026 10:00", "2026-11-22", "20261122T100000"])
+def test_a_date_in_another_standard_is_answered_with_the_one_that_is_read(write, refusal, time: str) -> None:
+    line, message = refusal(write("log.csv", log([time, time])))
+    assert line == 2
+    assert message == (
+        f"t is '{time}', neither a number nor a date that can be read; "
+        "write 2026-11-22T10:00:00.123, 10:00:00.123 or seconds"
+    )
+
+
+def test_a_unit_of_time_is_nothing_to_dates(write, refusal) -> None:
+    _, message = refusal(write("log.csv", log(["10:00:00Z", "10:00:01Z"])), time_unit="ms")
+    assert message == (
+        "--time-unit ms is for times that are numbers, and these have a clock time with an offset from UTC; "
+        "leave it out"
+    )
+
+
+def test_a_row_that_ends_before_its_date_is_refused(write, refusal) -> None:
+    row = POSE + ",10:00:00\n"
+    line, message = refusal(write("log.csv", f"x,y,z,qx,qy,qz,qw,t\n{row}{row}{POSE}\n"))
+    assert (line, message) == (4, "7 columns where 8 are needed; correct or delete the line")
+
+
+def test_devices_by_turns_keep_their_dates(write) -> None:
+    rows = "".join(f"{side},23:59:59.{digit},{POSE}\n" for digit in (5, 6, 7) for side in ("left", "right"))
+    recording = read_trajectories(
+        f"{write('log.csv', f'device,t,x,y,z,qx,qy,qz,qw{chr(10)}{rows}')}:*", ReadingOptions()
+    )
+    for trajectory in recording.trajectories:
+        np.testing.assert_allclose(trajectory.times, [0.0, 0.1, 0.2], atol=1e-15)

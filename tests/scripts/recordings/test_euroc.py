@@ -1,0 +1,51 @@
+"""EuRoC ground truth."""
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings import read_trajectories
+
+HEADER = (
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "
+    "v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1]"
+)
+ROWS = (
+    "1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152,-0.027876,0.033207,0.8\n"
+    "1403636580843555649,4.688177,-1.786770,0.787350,0.534640,-0.152990,-0.826976,-0.082863,-0.029272,0.033992,0.8\n"
+    "1403636580848555652,4.688028,-1.786598,0.791382,0.535178,-0.152945,-0.826562,-0.083605,-0.030043,0.034999,0.8\n"
+)
+
+
+@pytest.mark.parametrize("header", [HEADER, HEADER.replace("#timestamp", "#timestamp [ns]"), HEADER.replace(", ", ",")])
+def test_not_a_nanosecond_is_lost(write, header: str) -> None:
+    (trajectory,) = read_trajectories(write("data.csv", f"{header}\n{ROWS}")).trajectories
+    np.testing.assert_array_equal(trajectory.times, np.array([0, 5_000_001, 10_000_004]) * 1e-9)
+    np.testing.assert_array_equal(trajectory.poses.positions[0], [4.688319, -1.786938, 0.783338])
+    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.534108, -0.153029, -0.827383, -0.082152])
+
+
+def test_backward_times_are_kept_for_the_repair(write) -> None:
+    rows = "".join(reversed(ROWS.splitlines(keepends=True)))
+    (trajectory,) = read_trajectories(write("data.csv", f"{HEADER}\n{rows}")).trajectories
+    np.testing.assert_array_equal(trajectory.times, np.array([0, -5_000_003, -10_000_004]) * 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        (f"{HEADER}\n", None, "'data' has 0 samples"),
+        ("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]\n1,2,3,4\n", 1, "no column named q_rs_w, q_rs_x"),
+        (
+            f"{HEADER}\n{ROWS}1.403636580853555e+18,0,0,0,1,0,0,0,0,0,0\n",
+            5,
+            "t is '1.403636580853555e+18', not a whole",
+        ),
+        (f"{HEADER}\n{ROWS}99999999999999999999,0,0,0,1,0,0,0,0,0,0\n", 5, "t is '99999999999999999999', not a whole"),
+        (f"{HEADER}\n{ROWS},0,0,0,1,0,0,0,0,0,0\n", 5, "t is 'nan', not a whole number"),
+        (f"{HEADER}\n{ROWS}1,0,0,0,up,0,0,0,0,0,0\n", 5, "qw is 'up', not a number"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str, line: int | None, problem: str) -> None:
+    told_line, message = refusal(write("data.csv", text))
+    assert message.startswith(problem)
+    assert told_line == line

@@ -1,0 +1,93 @@
+"""Tracks of glTF animations made straight: what is kept in other ways than floats, and what is damaged."""
+
+from __future__ import annotations
+
+import copy
+import json
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings.gltf_tracks import WIDEST, straightened
+from tests.scripts.recordings.glbs import curved, turning
+from tests.thoroughness import tried
+
+WAYS = {5126: np.float32, 5122: np.int16, 5120: np.int8, 5123: np.uint16}
+
+
+def turn(component: int, stride: int) -> tuple[dict, bytes]:
+    """A track of a quarter turn within a second, its quaternions kept in one of the ways that there are."""
+    kind = np.dtype(WAYS[component])
+    quaternions = turning(np.arange(2.0), np.array([0.0, np.pi / 2]))
+    numbers = quaternions if kind.kind == "f" else np.rint(quaternions * np.iinfo(kind).max)
+    rows = np.zeros((2, stride), dtype=np.uint8)
+    rows[:, : 4 * kind.itemsize] = numbers.astype(kind).view(np.uint8).reshape(2, -1)
+    data = np.array([0.0, 1.0], dtype=np.float32).tobytes() + rows.tobytes()
+    document = {
+        "animations": [
+            {
+                "samplers": [{"input": 0, "output": 1}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
+            }
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR"},
+            {"bufferView": 1, "componentType": component, "count": 2, "type": "VEC4", "normalized": True},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 8},
+            {"buffer": 0, "byteOffset": 8, "byteLength": 2 * stride, "byteStride": stride},
+        ],
+        "buffers": [{"byteLength": len(data)}],
+    }
+    return document, data
+
+
+@pytest.mark.parametrize("component", WAYS)
+@pytest.mark.parametrize("more", [0, 8])
+def test_a_wide_turn_is_even_however_its_numbers_are_kept(component: int, more: int) -> None:
+    document, data = turn(component, 4 * np.dtype(WAYS[component]).itemsize + more)
+    made, times = straightened(document, lambda _: data)
+    count = int(np.ceil(np.pi / 2 / WIDEST))
+    np.testing.assert_allclose(times, np.arange(1, count) / count, rtol=1e-6)
+    sampler = document["animations"][0]["samplers"][0]
+    views = [
+        document["bufferViews"][document["accessors"][sampler[part]]["bufferView"]] for part in ("input", "output")
+    ]
+    found = [np.frombuffer(made, "<f4", view["byteLength"] // 4, view["byteOffset"]).astype(float) for view in views]
+    np.testing.assert_allclose(found[0], np.arange(count + 1) / count, rtol=1e-6)
+    expected = turning(found[0], found[0] * np.pi / 2)
+    np.testing.assert_allclose(found[1].reshape(-1, 4), expected, atol=0.01 if component == 5120 else 1e-4)
+    assert document["buffers"][-1]["byteLength"] == len(made)
+
+
+def parts(document: object) -> Iterator[tuple]:
+    pairs = (
+        document.items() if isinstance(document, dict) else enumerate(document) if isinstance(document, list) else ()
+    )
+    for name, part in pairs:
+        yield document, name
+        yield from parts(part)
+
+
+WRONG = [None, -1, 0, 1, 2**31, 1e308, "a", [], {}, True, 3.5, float("nan"), [1, 2, 3]]
+
+
+def test_what_is_damaged_is_left_to_blender(tmp_path: Path) -> None:
+    content = curved().write(tmp_path / "curved.glb").read_bytes()
+    (length,) = struct.unpack_from("<I", content, 12)
+    document, data = json.loads(content[20 : 20 + length]), content[28 + length :]
+    random, changed = Random(1), 0
+    for _ in range(tried(2000)):
+        damaged, numbers = copy.deepcopy(document), bytearray(data)
+        for _ in range(random.randint(1, 3)):
+            part, name = random.choice([*parts(damaged)])
+            part[name] = copy.deepcopy(random.choice(WRONG))
+        for _ in range(random.choice((0, 20))):
+            numbers[random.randrange(len(numbers))] = random.randrange(256)
+        changed += bool(straightened(damaged, lambda _, numbers=bytes(numbers): numbers)[0])
+    assert changed

@@ -1,0 +1,528 @@
+"""Whole bodies of FBX and glTF files: made and exported here, and other people's, against matrices of Blender's."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import struct
+import time
+import warnings
+import zlib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion.motion.poses import inverse, placed
+from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.hushing import hushed
+from rigid_motion_batch.recordings import Trajectory, TrajectoryError, gltf, importing, read_trajectories, rigs
+from rigid_motion_batch.recordings.fbx_records import FIRST
+from rigid_motion_batch.recordings.sampling import CLOSEST
+from rigid_motion_batch.scenes.armature import Rest
+from rigid_motion_batch.scenes.physique import figure_size
+from tests.blank import blank
+from tests.recordings import RECORDINGS
+from tests.scripts.recordings.blends import empty, key, on_frames, rig
+from tests.scripts.recordings.glbs import soldier
+from tests.scripts.recordings.skeletons import (
+    BONES,
+    CARRYING,
+    FRAMES,
+    TRIANGLES,
+    body,
+    export,
+    places_in_blender,
+    skinned,
+    surface_in_blender,
+)
+
+bpy = pytest.importorskip("bpy")
+anim_utils = pytest.importorskip("bpy_extras.anim_utils")
+
+ENDINGS = [".fbx", ".glb", ".gltf"]
+
+SINGLE = 2e-6
+"""Metres, of a body of 2 m: what files and Blender keep is in single precision, through a chain of four bones."""
+
+
+def whole(source: object) -> Trajectory:
+    (trajectory,) = read_trajectories(str(source)).trajectories
+    assert trajectory.figure is not None
+    return trajectory
+
+
+def in_world(trajectory: Trajectory) -> Poses:
+    """Where the joints are, shape (joints, n)."""
+    return trajectory.figure.skeleton.in_root_space(trajectory.poses)
+
+
+def places(trajectory: Trajectory, joints: tuple[str, ...] = CARRYING) -> np.ndarray:
+    return in_world(trajectory).positions[[trajectory.figure.joints.index(name) for name in joints]]
+
+
+@pytest.fixture
+def exported(scene: object, tmp_path: Path):
+    """Export a body, and return the file and where its joints were in Blender."""
+
+    def _exported(ending: str, **settings: object) -> tuple[Path, np.ndarray]:
+        obj = body(**settings)
+        skinned(obj)
+        seen = places_in_blender(obj, CARRYING)
+        return export(tmp_path / f"walk{ending}"), seen
+
+    return _exported
+
+
+# -- what is read -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fps", [24, 30, 60])
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_joints_are_where_blender_showed_them_before_the_export(exported, ending: str, fps: int) -> None:
+    path, seen = exported(ending, fps=fps)
+    walk = whole(path)
+    assert walk.name == "walk"
+    assert walk.poses.shape == (len(BONES), len(FRAMES))
+    assert walk.poses.scales is None
+    np.testing.assert_allclose(walk.times, np.arange(len(FRAMES)) / fps, rtol=1e-12)
+    np.testing.assert_allclose(places(walk), seen, atol=SINGLE)
+    parents = {name: walk.figure.parents[number] for number, name in enumerate(walk.figure.joints)}
+    for name, (_, _, parent) in BONES.items():
+        assert parents[name] == (walk.figure.joints.index(parent) if parent else -1)
+    assert (np.einsum("jni,jni->jn", walk.poses.quaternions[:, 1:], walk.poses.quaternions[:, :-1]) > 0.0).all()
+
+
+@pytest.mark.parametrize("ending", [".fbx", ".glb", ".blend"])
+def test_the_skin_moves_with_its_joints_as_in_blender(scene, tmp_path: Path, ending: str) -> None:
+    obj = body(size=(0.5, 0.5, 0.5))
+    surface = surface_in_blender(skinned(obj))
+    path = tmp_path / f"walk{ending}"
+    if ending == ".blend":
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        blank()
+    else:
+        export(path)
+    walk = on_frames(whole(path))
+    skin, rest = walk.figure.skin, walk.figure.rest
+    moved = placed(in_world(walk), inverse(rest[:, None]))
+    carried = moved.positions[skin.joints] + np.stack(
+        [rotate(moved.quaternions[joints], skin.vertices[:, None]) for joints in skin.joints.T], axis=1
+    )
+    shown = np.einsum("vc,vcni->vni", skin.weights, carried)
+    # An exporter may have split vertices: each is one of Blender's.
+    nearest = np.argmin(np.linalg.norm(shown[:, None, 0] - surface[None, :, 0], axis=-1), axis=1)
+    np.testing.assert_allclose(shown, surface[nearest], atol=SINGLE)
+    assert set(nearest[skin.triangles].ravel()) == {corner for triangle in TRIANGLES for corner in triangle}
+    np.testing.assert_allclose(skin.weights.sum(axis=1), 1.0)
+    np.testing.assert_allclose(np.sort(skin.weights, axis=1), [[0.0, 0.0, 0.25, 0.75]] * len(skin.weights), atol=1e-6)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_single_joints_are_where_they_are_in_the_whole(exported, ending: str) -> None:
+    path, seen = exported(ending)
+    world = in_world(walk := whole(path))
+    for source in ("Hand", "Body/Hand"):
+        (hand,) = map(on_frames, read_trajectories(f"{path}:{source}").trajectories)
+        assert (hand.name, hand.figure) == (source, None)
+        np.testing.assert_allclose(hand.poses.positions, seen[-1], atol=SINGLE)
+    everything = [*map(on_frames, read_trajectories(f"{path}:*").trajectories)]
+    assert tuple(one.name for one in everything) == walk.figure.joints
+    for joint, one in enumerate(everything):
+        np.testing.assert_allclose(one.poses.positions, world.positions[joint], atol=1e-12)
+        alike = np.abs(np.einsum("ni,ni->n", one.poses.quaternions, world.quaternions[joint]))
+        np.testing.assert_allclose(alike, 1.0, atol=1e-12)
+
+
+def test_too_many_vertices_are_no_skin(exported, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, _ = exported(".fbx")
+    monkeypatch.setattr("rigid_motion_batch.recordings.skins.MOST_VERTICES", 3)
+    assert whole(path).figure.skin is None
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_body_in_centimetres_is_taken_for_one(scene, tmp_path: Path, ending: str) -> None:
+    body(size=(100, 100, 100))
+    recording = read_trajectories(str(export(tmp_path / f"walk{ending}")))
+    assert recording.trajectories[0].metres_per_unit == 0.01
+    assert "taken for centimetres" in recording.note
+    assert recording.trajectories[0].warnings == ()
+
+
+@pytest.mark.parametrize("ending", [".glb", ".blend"])
+def test_a_body_is_as_large_as_its_joints_wherever_an_importer_has_its_bones_end(scene, tmp_path: Path, ending) -> None:
+    path = soldier().write(tmp_path / "soldier.glb")
+    if ending == ".blend":
+        with hushed():
+            bpy.ops.import_scene.gltf(filepath=str(path))
+        path = path.with_suffix(".blend")
+        (obj,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+        assert max(obj.dimensions) > 20.0, "Blender has the bones of joints without children end far away"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        blank()
+    recording = read_trajectories(str(path))
+    (found,) = recording.trajectories
+    assert (found.metres_per_unit, recording.note, found.warnings) == (1.0, "", ())
+    assert np.linalg.norm(found.figure.tails, axis=-1).max() < 1.0
+    rest = Rest.of(found.figure, 1.0, "blender")
+    assert figure_size(rest) == pytest.approx(1.73, abs=0.01)
+    assert rest.joints.positions[:, 2].min() < 0.3, "the ground is below its feet, and not below the ends of bones"
+    far = replace(rest, tails=rest.joints.positions + np.array([0.0, 0.0, 40.0]))
+    assert figure_size(far) == figure_size(rest)
+
+
+def test_keys_that_come_closer_than_the_frames_of_an_fbx_count(exported, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, seen = exported(".fbx", fps=60)
+    monkeypatch.setattr(importing, "_rate_of_keys", lambda *_: None)
+    assert len(whole(path).times) == len(FRAMES)
+    monkeypatch.undo()
+    content = path.read_bytes()
+    # The enumeration of rates: 3 is 60, 6 is 30.
+    place = content.index(b"TimeMode")
+    place = content.index(b"I", place + len(b"TimeModeS\4\0\0\0enum")) + 1
+    assert struct.unpack_from("<i", content, place) == (3,)
+    path.write_bytes(content[:place] + struct.pack("<i", 6) + content[place + 4 :])
+    walk = whole(path)
+    np.testing.assert_allclose(walk.times, np.arange(len(FRAMES)) / 60.0)
+    np.testing.assert_allclose(places(walk), seen, atol=SINGLE)
+
+
+@pytest.mark.parametrize(("between", "rate"), [(1, 24.0), (10, 60.0)])
+def test_a_gltf_without_a_rate_is_sampled_60_times_a_second(scene, tmp_path: Path, between: int, rate: float) -> None:
+    obj = rig("Body", BONES)
+    for frame in range(0, 41, between):
+        key(obj.pose.bones["Upper"], frame, rotation_euler=(0.1 * frame, 0, 0))
+    bpy.context.scene.render.fps, bpy.context.scene.frame_start, bpy.context.scene.frame_end = 24, 0, 40
+    path = export(tmp_path / "walk.glb", export_force_sampling=False)
+    assert 1.0 / np.diff(on_frames(whole(path)).times).mean() == pytest.approx(rate)
+
+
+def test_the_larger_armature_is_taken_and_the_other_told(scene, tmp_path: Path) -> None:
+    body()
+    small = rig("Bird", {"Wing": ((0, 0, 0), (0, 1, 0), None)})
+    for frame in FRAMES:
+        key(small.pose.bones["Wing"], frame, location=(0, frame, 0))
+    path = export(tmp_path / "walk.fbx")
+    recording = read_trajectories(str(path))
+    assert recording.trajectories[0].figure.joints == tuple(BONES)
+    assert recording.note == "took Body of 2 armatures; others: Bird"
+    assert whole(f"{path}:Bird").figure.joints == ("Wing",)
+    assert read_trajectories(f"{path}:Bird/Wing").trajectories[0].poses.shape == (len(FRAMES),)
+
+
+@pytest.mark.parametrize("ending", [".fbx", ".glb"])
+def test_one_of_several_takes_is_taken_and_the_others_told(scene, tmp_path: Path, ending: str) -> None:
+    obj = body()
+    seen = {}
+    walk = obj.animation_data.action
+    walk.name = "Walk"
+    seen["Walk"] = places_in_blender(obj, CARRYING)
+    run = walk.copy()
+    run.name = "Run"
+    channels = anim_utils.action_get_channelbag_for_slot(run, run.slots[0])
+    for fcurve in channels.fcurves:
+        if "rotation_euler" in fcurve.data_path:
+            for point in fcurve.keyframe_points:
+                point.co.y *= 0.5
+            fcurve.update()
+    obj.animation_data.action = run
+    obj.animation_data.action_slot = run.slots[0]
+    seen["Run"] = places_in_blender(obj, CARRYING)
+    for action in (walk, run):
+        track = obj.animation_data.nla_tracks.new()
+        track.name = action.name
+        track.strips.new(action.name, 1, action).action_slot = action.slots[0]
+    obj.animation_data.action = None
+    settings = {"bake_anim_use_all_actions": False} if ending == ".fbx" else {}
+    recording = read_trajectories(str(export(tmp_path / f"walk{ending}", **settings)))
+    (found,) = recording.trajectories
+    taken = next(name for name in seen if f"took its take {name}" in recording.note.replace("Body|", ""))
+    other = ({*seen} - {taken}).pop()
+    assert other in recording.note.partition("others: ")[2]
+    np.testing.assert_allclose(places(found), seen[taken], atol=SINGLE)
+
+
+# -- other people's ---------------------------------------------------------------------------------------------------
+
+
+def matrices_of_curves(obj: bpy.types.Object, frame: float) -> dict[str, np.ndarray]:
+    """Where the bones of an armature are by its F-curves and rests alone, as 4x4 matrices in double precision."""
+    data = obj.animation_data
+    curves = {
+        (fcurve.data_path, fcurve.array_index): fcurve.evaluate(frame)
+        for fcurve in anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+    }
+
+    def basis(owner: object, prefix: str) -> np.ndarray:
+        def channel(name: str) -> np.ndarray:
+            return np.array([curves.get((prefix + name, i), value) for i, value in enumerate(getattr(owner, name))])
+
+        if owner.rotation_mode == "QUATERNION":
+            w, x, y, z = (turn := channel("rotation_quaternion")) / np.linalg.norm(turn)
+        else:
+            assert owner.rotation_mode == "XYZ"
+            halves = channel("rotation_euler") / 2.0
+            (a, b, c), (d, e, f) = np.cos(halves), np.sin(halves)
+            w, x = a * b * c + d * e * f, d * b * c - a * e * f
+            y, z = a * e * c + d * b * f, a * b * f - d * e * c
+        made = np.eye(4)
+        made[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        made[:3, :3] *= channel("scale")
+        made[:3, 3] = channel("location")
+        return made
+
+    there = basis(obj, "")
+    found: dict[str, np.ndarray] = {}
+    for bone in obj.data.bones:
+        own = basis(obj.pose.bones[bone.name], f'pose.bones["{bone.name}"].')
+        rest = np.array(bone.matrix_local)
+        if bone.parent:
+            rest = found[bone.parent.name] @ np.linalg.inv(np.array(bone.parent.matrix_local)) @ rest
+        found[bone.name] = rest @ own
+    return {name: there @ matrix for name, matrix in found.items()}
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(("name", "count"), [("pab_run", 21), ("pab_walk", 41)])
+def test_other_peoples_bodies_are_where_their_curves_put_them(scene, name: str, count: int) -> None:
+    path = RECORDINGS.parent / "rigs" / f"{name}.fbx"
+    walk = on_frames(whole(path))
+    assert walk.poses.shape == (66, count)
+    np.testing.assert_allclose(walk.times, np.arange(count) / 30.0)
+    with hushed(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    (obj,) = (one for one in bpy.data.objects if one.type == "ARMATURE")
+    frames = [matrices_of_curves(obj, 1.0 + frame) for frame in range(count)]
+    expected = np.array([[matrices[joint][:3, 3] for matrices in frames] for joint in walk.figure.joints])
+    size = np.ptp(expected[:, 0], axis=0).max()
+    # Blender evaluates in single precision through chains of 20 bones: 1e-7 of the size each.
+    assert np.abs(places(walk, walk.figure.joints) - expected).max() < 1e-5 * size
+    assert 1.0 < size < 2.0
+
+
+@pytest.mark.recordings
+def test_keys_between_the_frames_of_other_peoples_bodies_are_read_too(scene) -> None:
+    path = RECORDINGS.parent / "rigs" / "pab_run.fbx"
+    run = whole(path)
+    assert run.rate == 30.0
+    with hushed(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    (obj,) = (one for one in bpy.data.objects if one.type == "ARMATURE")
+    data = obj.animation_data
+    curves = anim_utils.action_get_channelbag_for_slot(data.action, data.action_slot).fcurves
+    keys = np.unique([point.co.x for fcurve in curves for point in fcurve.keyframe_points])
+    assert np.abs(run.times * 30.0 + 1.0 - keys[:, None]).min(axis=1).max() < CLOSEST
+    between = (keys[:-1, None] + np.diff(keys)[:, None] * np.arange(8) / 8).ravel()
+    expected = [matrices_of_curves(obj, frame) for frame in between.tolist()]
+    seen = np.array([[matrices[joint][:3, 3] for matrices in expected] for joint in run.figure.joints])
+    local = [interpolate(run.times, own, (between - 1.0) / 30.0, "lerp_slerp") for own in run.poses]
+    poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
+    found = run.figure.skeleton.in_root_space(poses).positions
+    assert np.linalg.norm(found - seen, axis=-1).max() < 1e-3
+
+
+# -- what is open stays -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_is_open_stays_as_it_is(exported, ending: str) -> None:
+    path, seen = exported(ending)
+    opened = body()
+    opened.location = (7, 7, 7)
+    bpy.context.view_layer.objects.active = opened
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.context.scene.frame_set(7)
+
+    def state() -> list:
+        blocks = sorted((type(block).__name__, block.name_full) for block in bpy.data.user_map())
+        return [blocks, bpy.context.scene.name, bpy.context.scene.frame_current, bpy.context.mode]
+
+    before = state()
+    np.testing.assert_allclose(places(whole(path)), seen, atol=SINGLE)
+    assert whole(f"{path}:Body").name == "Body", "though what is open has one of that name"
+    assert state() == before
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(TrajectoryError):
+        read_trajectories(str(path))
+    assert state() == before
+
+
+def test_images_of_an_fbx_are_not_looked_for(scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    obj = skinned(body())
+    picture = tmp_path / "secret.png"
+    image = bpy.data.images.new("Picture", 4, 4)
+    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.save()
+    material = bpy.data.materials.new("Painted")
+    if material.node_tree is None:
+        material.use_nodes = True
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    shader = next(one for one in material.node_tree.nodes if one.type == "BSDF_PRINCIPLED")
+    material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+    obj.data.materials.append(material)
+    path = export(tmp_path / "walk.fbx", path_mode="ABSOLUTE")
+    assert b"secret.png" in path.read_bytes()
+    from bpy_extras import image_utils
+
+    asked = []
+    monkeypatch.setattr(image_utils, "load_image", lambda *arguments, **_: asked.append(arguments))
+    whole(path)
+    assert asked == []
+
+
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
+def test_a_file_without_a_moving_skeleton_is_told(scene, tmp_path: Path, refusal) -> None:
+    empty("Lamp")
+    for ending in ENDINGS:
+        path = export(tmp_path / f"lamp{ending}")
+        assert refusal(str(path))[1].startswith("no skeleton in this file; export the armature together with its ")
+    for ending in (".glb", ".gltf"):
+        skinned(rig("Body", BONES))
+        path = export(tmp_path / f"still{ending}")
+        assert refusal(str(path))[1].startswith("no skeleton that moves in this file; export the armature together ")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_missing_joint_is_answered_with_those_there_are(exported, refusal, ending: str) -> None:
+    path, _ = exported(ending)
+    message = refusal(f"{path}:Foot")[1]
+    assert message.startswith("no body named 'Foot'; it holds Root, ")
+    assert all(name in message for name in BONES)
+
+
+@pytest.mark.parametrize("content", [b"", b"junk", b"; FBX 7.3.0 project file\n", b"glTF", b"{}", b"[" * 9999, b"\xff"])
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_what_is_no_such_file_is_told_in_one_line(write, refusal, ending: str, content: bytes) -> None:
+    assert refusal(write(f"walk{ending}", content))[1]
+
+
+def test_too_much_is_refused(exported, refusal, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, _ = exported(".glb")
+    monkeypatch.setattr(importing, "LARGEST_FILE", 100)
+    assert "bytes are more than the 100 that are read; " in refusal(str(path))[1]
+    monkeypatch.undo()
+    monkeypatch.setattr(rigs, "MOST_POSES", 99)
+    assert refusal(str(path))[1].startswith("5 joints in 20 frames are more than 99 poses; name one joint with ")
+    assert len(read_trajectories(f"{path}:Hand").trajectories) == 1
+    monkeypatch.setattr(gltf, "MOST_POSES", 99)
+    assert "numbers, vectors and matrices are more than 99; " in refusal(str(path))[1]
+
+
+def test_an_fbx_that_claims_more_than_it_holds_is_refused_before_room_is_made_for_it(exported, refusal) -> None:
+    path, _ = exported(".fbx")
+    content = path.read_bytes()
+    end, _, length, name = struct.unpack_from("<IIIB", content, FIRST)
+    path.write_bytes(content[:FIRST] + struct.pack("<IIIB", end, 2**32 - 1, length, name) + content[FIRST + 13 :])
+    assert refusal(str(path))[1].startswith("this FBX is damaged (a part of it is longer than the whole); ")
+
+    def record(packed: bytes, wanted: int) -> bytes:
+        numbers = b"d" + struct.pack("<III", wanted, 1, len(packed)) + packed
+        end = FIRST + 13 + 1 + len(numbers)
+        return content[:FIRST] + struct.pack("<IIIB", end, 1, len(numbers), 1) + b"N" + numbers + bytes(13)
+
+    for packed, wanted in ((zlib.compress(bytes(1 << 26)), 8), (b"x" * 20, 1 << 20), (zlib.compress(b""), 2**32 - 1)):
+        path.write_bytes(record(packed, wanted))
+        assert " is not as long as it says" in (said := refusal(str(path))[1]) or "more than" in said
+    path.write_bytes(record(zlib.compress(bytes(1 << 26)), 1 << 23))
+    assert refusal(str(path))[1].startswith("Blender cannot import this file ("), "which is sound, and no skeleton"
+
+
+def with_more(path: Path, **more: list) -> str:
+    """The same glTF with more parts at the end of its lists."""
+    document = json.loads(path.read_text())
+    for name, parts in more.items():
+        document[name] = document.get(name, []) + parts
+    path.write_text(json.dumps(document))
+    return str(path)
+
+
+def test_more_nodes_joints_and_channels_than_blender_takes_in_seconds_are_refused_at_once(exported, refusal) -> None:
+    path, _ = exported(".gltf")
+    whole(path)
+    count = len(json.loads(path.read_text())["nodes"])
+    started = time.perf_counter()
+    chain = [{"children": [count + number + 1]} for number in range(5000)]
+    assert refusal(with_more(path, nodes=[*chain, {}]))[1].startswith("more than 500 nodes hang on one another; export")
+    assert refusal(with_more(path, nodes=[{}] * 200_000))[1].startswith(
+        f"{count + 205_001} nodes are more than the 10000"
+    )
+    document = json.loads(path.read_text())
+    path.write_text(json.dumps(document | {"nodes": document["nodes"][:count]}))
+    whole(path)
+    skin = {"joints": list(range(4000))}
+    assert refusal(with_more(path, skins=[skin]))[1].startswith("4000 joints of a skin are more than the 3000 that")
+    document["skins"], document["nodes"] = document["skins"][:1], document["nodes"][:count]
+    path.write_text(json.dumps(document))
+    take = {"channels": [{}] * 200_000}
+    assert (
+        "animated channels are more than the 100000 that are read; export fewer"
+        in refusal(with_more(path, animations=[take]))[1]
+    )
+    assert time.perf_counter() - started < 20.0
+
+
+OUTSIDE = [
+    *("../walk.bin", "a/../../walk.bin", "%2e%2e/walk.bin", "..%2Fwalk.bin", "..\\walk.bin", "%2Fetc%2Fpasswd"),
+    *(
+        "/etc/passwd",
+        "\\\\host\\share\\walk.bin",
+        "//host/walk.bin",
+        "C:\\walk.bin",
+        "C:walk.bin",
+        "file:///etc/passwd",
+    ),
+    *("http://localhost:1/walk.bin", "https://localhost:1/walk.bin", "HTTP://localhost:1/", "ftp://a/b", 7, [], {}),
+]
+
+
+@pytest.mark.parametrize("uri", OUTSIDE)
+def test_a_gltf_gets_nothing_from_outside_of_its_folder(exported, refusal, uri: object) -> None:
+    path, _ = exported(".gltf")
+    path.with_suffix(".bin").rename(path.parent.parent / "walk.bin")
+    document = json.loads(path.read_text())
+    document["buffers"][0]["uri"] = uri
+    path.write_text(json.dumps(document))
+    assert refusal(str(path))[1].startswith("buffer 0 is outside of its folder (")
+
+
+def test_a_gltf_gets_its_buffers_from_its_folder_and_from_itself(exported, refusal) -> None:
+    path, seen = exported(".gltf")
+    document, data = json.loads(path.read_text()), path.with_suffix(".bin").read_bytes()
+    path.with_suffix(".bin").unlink()
+    assert refusal(str(path))[1] == (
+        "buffer 0, 'walk.bin', is not there; bring that file along, or export it as .glb, which is one file"
+    )
+    (path.parent / "a b").mkdir()
+    (path.parent / "a b" / "data").write_bytes(data)
+    packed = base64.b64encode(data).decode()
+    for uri in ("a%20b/data", "./a b/../a b/data", f"data:application/octet-stream;base64,{packed}"):
+        document["buffers"][0]["uri"] = uri
+        path.write_text(json.dumps(document))
+        np.testing.assert_allclose(places(whole(path)), seen, atol=SINGLE)
+
+
+def test_images_materials_and_extras_of_a_gltf_never_reach_blender(exported, tmp_path: Path) -> None:
+    path, seen = exported(".gltf")
+    document = json.loads(path.read_text())
+    document["images"] = [{"uri": "../../secret.png"}, {"uri": "http://localhost:1/x.png"}]
+    document["textures"] = [{"source": 0}]
+    document["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    document["extras"] = document["nodes"][0]["extras"] = {"anything": 1}
+    document["meshes"][0]["primitives"][0]["material"] = 0
+    document["nodes"][0]["extensions"] = {"KHR_lights_punctual": {"light": 3}}
+    path.write_text(json.dumps(document))
+    files = sorted(os.listdir(tmp_path))
+    np.testing.assert_allclose(places(whole(path)), seen, atol=SINGLE)
+    assert sorted(os.listdir(tmp_path)) == files

@@ -1,0 +1,389 @@
+"""Logs in the spellings that people have: each is the motion that was recorded, or says what is to be done."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from tests.scripts.recordings import logs
+from tests.scripts.recordings.logs import MOTIONS, assert_is_the_motion, log, names, spellings
+from tests.thoroughness import tried
+
+TIME, POSITION, QUATERNION = "t", "pos_{}", "rot_{}"
+
+
+def read_one(source: str, **options: object) -> object:
+    (trajectory,) = read_trajectories(source, ReadingOptions(**options)).trajectories
+    return trajectory
+
+
+# -- names and units --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", logs.TIMES)
+@pytest.mark.parametrize("start", [0, logs.EPOCH], ids=["from 0", "from 1970"])
+def test_every_spelling_of_time_in_its_unit(write, unit: str, start: int) -> None:
+    for number, time in enumerate(spellings(logs.TIMES[unit])):
+        source = write(f"{number}.csv", log(names(time, POSITION, QUATERNION), unit, start=start))
+        assert_is_the_motion(read_one(source), MOTIONS["left"], start=start, unit=unit)
+
+
+@pytest.mark.parametrize("unit", logs.LENGTHS)
+def test_every_spelling_of_positions_in_every_unit(write, unit: str) -> None:
+    for number, position in enumerate(spellings(logs.POSITIONS)):
+        for place, suffix in enumerate(spellings(logs.LENGTHS[unit])):
+            header = names(TIME, position, "q{}", unit=suffix)
+            trajectory = read_one(write(f"{number}-{place}.csv", log(header, metres=logs.METRES[unit])))
+            assert trajectory.metres_per_unit == logs.METRES[unit]
+            assert_is_the_motion(trajectory, MOTIONS["left"])
+
+
+def test_every_spelling_of_quaternions(write) -> None:
+    for number, rotation in enumerate(spellings(logs.QUATERNIONS)):
+        source = write(f"{number}.csv", log(names(TIME, "p{}", rotation)))
+        assert_is_the_motion(read_one(source), MOTIONS["left"])
+
+
+def test_axes_in_units_of_their_own_become_metres(write) -> None:
+    motion = MOTIONS["left"]
+    poses = logs.pose_texts(motion, np.array((1.0, 0.01, 0.001)), motion.turns.as_quat())
+    rows = [[time, *pose] for time, pose in zip(logs.time_texts("s", 0), poses, strict=True)]
+    source = write("take.csv", logs.written(["t", "x", "y_cm", "z [mm]", "qx", "qy", "qz", "qw"], rows))
+    assert_is_the_motion(read_one(source), motion)
+
+
+def test_a_line_that_tells_spreadsheets_the_separator_is_no_header(write) -> None:
+    assert_is_the_motion(read_one(write("take.csv", "sep=,\n" + log(names("t", "{}", "q{}")))), MOTIONS["left"])
+
+
+# -- what the user says -----------------------------------------------------------------------------------------------
+
+
+def test_columns_may_be_named_one_by_one(write) -> None:
+    source = write("take.csv", log(["when", "a", "b", "c", "d", "e", "f", "g"]))
+    named = zip(("t", "x", "y", "z", "qx", "qy", "qz", "qw"), ("When", "a", "b", "c", "d", "e", "f", "g"), strict=True)
+    assert_is_the_motion(read_one(source, columns=tuple(named)), MOTIONS["left"])
+
+
+def test_a_column_that_is_named_goes_before_what_its_name_says_and_keeps_its_unit(write) -> None:
+    header = ["frame_ms", *names("t", "{}", "q{}")]
+    rows = log(header[1:]).splitlines()[1:]
+    ticks = logs.time_texts("ms", 0)
+    text = "\n".join([",".join(header), *(f"{tick},7{row}" for tick, row in zip(ticks, rows, strict=True))])
+    assert_is_the_motion(read_one(write("take.csv", text), columns=[("t", "frame_ms")]), MOTIONS["left"], unit="ms")
+
+
+@pytest.mark.parametrize("name", ["take.csv", "take.tum"])
+@pytest.mark.parametrize("unit", logs.TIMES)
+@pytest.mark.parametrize("start", [0, logs.EPOCH], ids=["from 0", "from 1970"])
+def test_a_unit_of_time_may_be_said(write, name: str, unit: str, start: int) -> None:
+    text = log(names("t", "{}", "q{}"), unit, start=start)
+    text = text if name.endswith("csv") else "#" + text.replace(",", " ")
+    assert_is_the_motion(read_one(write(name, text), time_unit=unit), MOTIONS["left"], start=start, unit=unit)
+
+
+@pytest.mark.parametrize("time", ["t", "t_s", "t [ns]", "t [min]"])
+def test_a_unit_of_time_that_is_said_goes_before_that_in_the_name(write, time: str) -> None:
+    source = write("take.csv", log(names(time, "{}", "q{}"), "ms"))
+    assert_is_the_motion(read_one(source, time_unit="ms"), MOTIONS["left"], unit="ms")
+
+
+@pytest.mark.parametrize("position", ["{}", "{}_mm", "{} [furlongs]"])
+def test_a_scale_goes_before_the_unit_in_the_name(write, position: str) -> None:
+    text = log(["t", *(position.format(axis) for axis in "xyz"), "qx", "qy", "qz", "qw"], metres=0.01)
+    assert_is_the_motion(read_one(write("take.csv", text), scale=0.01), MOTIONS["left"])
+
+
+# -- Euler angles -----------------------------------------------------------------------------------------------------
+
+
+def euler_log(header: Sequence[str], order: str, degrees: bool) -> str:
+    motion = MOTIONS["left"]
+    angles = motion.turns.as_euler(order, degrees=degrees)
+    by_axis = angles[:, np.argsort(list(order.lower()))]
+    rows = zip(logs.time_texts("s", 0), logs.pose_texts(motion, 1.0, by_axis), strict=True)
+    return logs.written(header, [[time, *pose] for time, pose in rows])
+
+
+@pytest.mark.parametrize("order", ["XYZ", "YXZ", "ZYX", "zxy", "xyz", "yzx"])
+@pytest.mark.parametrize("degrees", [False, True])
+def test_euler_angles_are_read_in_the_order_that_is_said_as_scipy_has_it(write, order: str, degrees: bool) -> None:
+    source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), order, degrees))
+    assert_is_the_motion(read_one(source, euler=order, degrees=degrees), MOTIONS["left"])
+
+
+@pytest.mark.parametrize("unit", logs.ANGLES)
+def test_every_spelling_of_euler_angles_with_its_unit(write, unit: str) -> None:
+    for number, template in enumerate(spellings(logs.EULERS)):
+        for place, suffix in enumerate(spellings(logs.ANGLES[unit])):
+            header = names("t", "{}", template + suffix, "xyz")
+            source = write(f"{number}-{place}.csv", euler_log(header, "YXZ", unit == "deg"))
+            assert_is_the_motion(read_one(source, euler="YXZ"), MOTIONS["left"])
+
+
+def test_roll_pitch_and_yaw_are_read_where_it_is_said_which_is_which(write, refusal) -> None:
+    source = write("take.csv", euler_log(["t", "x", "y", "z", "roll", "pitch", "yaw"], "ZYX", False))
+    which = [("rx", "roll"), ("ry", "pitch"), ("rz", "yaw")]
+    assert_is_the_motion(read_one(source, euler="ZYX", columns=which), MOTIONS["left"])
+    _, message = refusal(source, euler="ZYX")
+    assert "--columns rx=roll,ry=pitch,rz=yaw in ROS" in message
+
+
+def test_unity_turns_about_z_then_x_then_y_of_the_world(write) -> None:
+    """As its manual says of Transform.eulerAngles."""
+    header, row = "t,x,y,z,eulerAngles.x,eulerAngles.y,eulerAngles.z", "0,0,0,30,45,60"
+    source = write("take.csv", f"{header}\n0,{row}\n.1,{row}\n")
+    turns = [
+        Rotation.from_rotvec(np.radians(angle) * axis) for angle, axis in zip((30, 45, 60), np.eye(3), strict=True)
+    ]
+    expected = (turns[1] * turns[0] * turns[2]).as_quat(scalar_first=True)
+    for order in ("YXZ", "zxy"):
+        np.testing.assert_allclose(read_one(source, euler=order, degrees=True).poses.quaternions[0], expected)
+
+
+def test_quaternions_are_read_beside_euler_angles_unless_these_are_asked_for(write) -> None:
+    rows = "0,0,0,0,0,0,0,1,90,0,0\n.1,0,0,0,0,0,0,1,90,0,0\n"
+    source = write("take.csv", "t,x,y,z,qx,qy,qz,qw,euler_x,euler_y,euler_z\n" + rows)
+    np.testing.assert_array_equal(read_one(source).poses.quaternions[0], [1, 0, 0, 0])
+    turned = read_one(source, euler="XYZ", degrees=True).poses.quaternions[0]
+    np.testing.assert_allclose(turned, [0.5**0.5, 0.5**0.5, 0, 0])
+
+
+def test_degrees_that_could_be_radians_are_told(write) -> None:
+    source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), "XYZ", False))
+    (warning,) = read_one(source, euler="XYZ", degrees=True).warnings
+    assert warning.endswith("radians need no --degrees")
+
+
+# -- several bodies ---------------------------------------------------------------------------------------------------
+
+
+def long_log(device: str, header: Sequence[str] = ("t", "x", "y", "z", "qx", "qy", "qz", "qw"), unit: str = "s") -> str:
+    """Two devices that take turns, told by a column."""
+    lines = [log(header, unit, side=side).splitlines()[1:] for side in MOTIONS]
+    rows = [f"{row},{side}" for both in zip(*lines, strict=True) for row, side in zip(both, MOTIONS, strict=True)]
+    return "\n".join([f"{','.join(header)},{device}", *rows])
+
+
+def wide_log(prefixes: Sequence[str]) -> str:
+    """Two bodies in every row."""
+    left, right = (log(names("t", POSITION, QUATERNION), side=side).splitlines()[1:] for side in MOTIONS)
+    rows = (f"{one},{other.partition(',')[2]}" for one, other in zip(left, right, strict=True))
+    return "\n".join([",".join(names("t", POSITION, QUATERNION, prefixes=prefixes)), *rows])
+
+
+def assert_holds_both(source: str, bodies: Sequence[str], **options: object) -> None:
+    for body, motion in zip(bodies, MOTIONS.values(), strict=True):
+        trajectory = read_one(f"{source}:{body}", **options)
+        assert trajectory.name == body
+        assert_is_the_motion(trajectory, motion)
+    assert [body.name for body in read_trajectories(f"{source}:*", ReadingOptions(**options)).trajectories] == bodies
+
+
+@pytest.mark.parametrize("device", spellings(logs.DEVICES))
+def test_a_column_tells_devices_apart(write, device: str) -> None:
+    source = write("log.csv", long_log(device))
+    assert_holds_both(source, ["left", "right"])
+    assert read_trajectories(source).note.startswith(f"{source} holds 2 bodies; took left; others: right; name one")
+
+
+@pytest.mark.parametrize(
+    ("prefixes", "bodies"),
+    [
+        (["left_", "right_"], ["left", "right"]),
+        (["LeftHand.", "RightHand."], ["LeftHand", "RightHand"]),
+        (["tracker 1 ", "tracker 2 "], ["tracker 1", "tracker 2"]),
+        (["", "head "], ["log", "head"]),
+    ],
+)
+def test_columns_of_several_bodies_are_told_by_what_is_in_front(write, prefixes: list[str], bodies: list[str]) -> None:
+    assert_holds_both(write("log.csv", wide_log(prefixes)), bodies)
+
+
+def test_a_column_of_devices_under_another_name_may_be_said(write) -> None:
+    source = write("log.csv", long_log("who"))
+    assert_holds_both(source, ["left", "right"], columns=[("device", "who")])
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.tum"])
+def test_devices_that_nothing_tells_apart_are_refused_with_the_columns_there_are(write, refusal, name: str) -> None:
+    rows = [line.rpartition(",")[0] for line in long_log("who").splitlines()]
+    text = "\n".join(rows) if name == "log.csv" else "# " + "\n".join(rows).replace(",", " ")
+    _, message = refusal(write(name, text))
+    assert re.match(
+        r"\d+ of 48 samples jump from one place to another and back, at [\d.]+ m/s: these are several", message
+    )
+    found = "--columns device=NAME (found t, x, y, z, qx, qy, qz, qw), or split the file"
+    assert message.endswith(found if name == "log.csv" else "; write a file for each")
+
+
+def test_a_running_number_is_no_device(write) -> None:
+    rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
+    text = "\n".join([f"id,{rows[0]}", *(f"{number},{row}" for number, row in enumerate(rows[1:]))])
+    assert read_one(write("log.csv", text)).name == "log"
+
+
+def test_a_column_that_is_named_for_devices_and_is_none_is_refused(write, refusal) -> None:
+    rows = "".join(f"{number},0.1,0,0,0,0,0,0,1\n" for number in range(1200))
+    source = write("log.csv", f"id,t,x,y,z,qx,qy,qz,qw\n{rows}")
+    _, message = refusal(source, columns=[("device", "id"), ("t", "t")])
+    assert message.startswith("more than 1000 different values in the column of devices; name another with --columns")
+
+
+def test_a_device_that_is_alone_is_asked_for_by_its_name(write) -> None:
+    rows = log(["t", "x", "y", "z", "qx", "qy", "qz", "qw"]).splitlines()
+    text = "\n".join([f"hand,{rows[0]}", *(f"left,{row}" for row in rows[1:])])
+    source = write("log.csv", text)
+    assert [read_one(source).name, read_one(f"{source}:left").name] == ["left", "left"]
+
+
+def test_a_body_without_rotations_is_no_body(write) -> None:
+    header = "t,x,y,z,qx,qy,qz,qw,velocity_x,velocity_y,velocity_z\n"
+    recording = read_trajectories(write("log.csv", header + "0,1,2,3,0,0,0,1,9,9,9\n.1,1,2,3,0,0,0,1,9,9,9\n"))
+    assert [trajectory.name for trajectory in recording.trajectories] == ["log"]
+    assert recording.others == ()
+
+
+# -- refusals ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "told"),
+    [
+        ("when,a,b,c,d,e,f,g", {}, "no column has a known name (found when, a, b, c, d, e, f, g); known are t, time, "),
+        (
+            "0,1,2,3,4,5,6,7",
+            {},
+            "no column has a known name (found 0, 1, 2, 3, 4, 5, 6, 7); write a first line of names",
+        ),
+        ("t,x,y,z,qx,qy,qz,r", {}, "no column named qw (found t, x, y, z, qx, qy, qz, r); known are t, time, time"),
+        (
+            "frame,button,hp_x",
+            {},
+            "no column named t, x, y, z, qx, qy, qz, qw (found frame, button, hp_x); known are t,",
+        ),
+        ("when,x,y,z,qx,qy,qz,qw", {}, "no column named t (found when, x,"),
+        ("t,left_x,left_y,left_z,left_qx", {}, "no column named qy, qz, qw for 'left' (found t, left_x,"),
+        ("t,time,x,y,z,qx,qy,qz,qw", {}, "two columns mean t ('t', 'time'); say which with --columns t=NAME, or"),
+        ("t,x,px,y,z,qx,qy,qz,qw", {}, "two columns mean x ('x', 'px'); say which with --columns x=NAME, or"),
+        (
+            "t,x,y,z,rx,ry,rz",
+            {},
+            "rotations are Euler angles here (rx, ry, rz), and their order is not said; say it: -",
+        ),
+        ("t,x,y,z,roll,pitch,yaw", {}, "rotations are Euler angles here (roll, pitch, yaw), and their order is not sa"),
+        ("t,x,y,z,qx,qy,qz,qw", {"euler": "XYZ"}, "no column named rx, ry, rz (found t, x, y, z, qx, qy, qz, qw); kn"),
+        ("t,x,y,z,qx,qy,qz,qw", {"columns": [("t", "when")]}, "no column is named 'when'; --columns t=NAME takes one "),
+        ("t [min],x,y,z,qx,qy,qz,qw", {}, "'min' is no unit of time that is known; --time-unit s, ms, us, ns"),
+        ("t,x [furlong],y,z,qx,qy,qz,qw", {}, "'furlong' is no unit of length that is known; say how many metres it "),
+    ],
+)
+def test_a_refusal_says_what_was_found_what_is_known_and_what_helps(
+    write, refusal, header: str, options: dict, told: str
+) -> None:
+    row = ",".join("0" for _ in header.split(","))
+    line, message = refusal(write("take.csv", f"{header}\n{row}\n"), **options)
+    assert message.startswith(told)
+    assert line == 1
+    if "known are" in message:
+        assert (
+            "known are t, time, timestamp_ms; x, px, pos_x, position.x; qw, rot_w, rotation.w; or --columns" in message
+        )
+
+
+def test_many_columns_are_not_all_listed(write, refusal) -> None:
+    _, message = refusal(write("take.csv", ",".join(f"column {number}" for number in range(99))))
+    assert "column 11 and 87 more)" in message
+
+
+def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
+    source = write("take.csv", "t,x,y,z,rx,ry,rz\n0,0,0,0,359,0,0\n.1,0,0,0,1,0,0\n")
+    assert refusal(source, euler="XYZ")[1].startswith("angles go up to 359, which are no radians; say so: --degrees;")
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [
+        ({"columns": [("t", "t")]}, "--columns is for CSV with named columns, and this is TUM"),
+        ({"euler": "XYZ"}, "--euler is for CSV with named columns, and this is TUM"),
+    ],
+)
+def test_an_option_that_means_nothing_to_a_format_is_refused(write, refusal, given: dict, name: str) -> None:
+    assert (
+        refusal(write("take.tum", "0 0 0 0 0 0 0 1\n"), **given)[1]
+        == f"{name}; leave it out; its files say that themselves"
+    )
+
+
+# -- everything at once -----------------------------------------------------------------------------------------------
+
+
+@st.composite
+def loggers(draw: st.DrawFn) -> tuple[str, ReadingOptions, str, int]:
+    """A log of both motions as somebody may have it, what has to be said of it, its unit of time and its start."""
+    unit = draw(st.sampled_from(list(logs.TIMES)))
+    start = draw(st.sampled_from([0, logs.EPOCH]))
+    length = draw(st.sampled_from(list(logs.LENGTHS)))
+    position = draw(st.sampled_from(spellings(logs.POSITIONS))) + draw(st.sampled_from(spellings(logs.LENGTHS[length])))
+    said: dict[str, object] = {"scale": logs.METRES[length]} if position.endswith(("}", "position")) else {}
+    order = draw(st.sampled_from([None, "YXZ", "ZYX", "zxy"]))
+    angle = draw(st.sampled_from(list(logs.ANGLES)))
+    if order:
+        suffix = draw(st.sampled_from(["", *spellings(logs.ANGLES[angle])]))
+        rotation, axes = draw(st.sampled_from(spellings(logs.EULERS))) + suffix, "xyz"
+        said |= {"euler": order, "degrees": angle == "deg"}
+    else:
+        rotation, axes = draw(st.sampled_from(spellings(logs.QUATERNIONS))), "xyzw"
+
+    def columns_of(side: str, prefix: str) -> dict[str, list[str]]:
+        motion = MOTIONS[side]
+        turns = motion.turns.as_quat()
+        if order:
+            by_turn = motion.turns.as_euler(order, degrees=angle == "deg")
+            turns = by_turn[:, np.argsort(list(order.lower()))]
+        header = names("", position, rotation, axes, prefixes=[prefix])[1:]
+        cells = logs.pose_texts(motion, logs.METRES[length], turns)
+        return {name: [row[place] for row in cells] for place, name in enumerate(header)}
+
+    time = draw(st.sampled_from(spellings(logs.TIMES[unit])))
+    times = {time: logs.time_texts(unit, start)}
+    if time in ("t", "T", "time", "Time", "timestamp", "TimeStamp", "ts", "elapsed time"):
+        said["time_unit"] = unit
+    if draw(st.booleans(), label="a body has columns of its own"):
+        columns = times | columns_of("left", "left_") | columns_of("right", "right_")
+    else:
+        device = draw(st.sampled_from(spellings(logs.DEVICES)))
+        both = [times | columns_of(side, "") | {device: [side] * logs.COUNT} for side in MOTIONS]
+        columns = {
+            name: [cell for pair in zip(*(one[name] for one in both), strict=True) for cell in pair] for name in both[0]
+        }
+    for extra in draw(st.lists(st.sampled_from(spellings(logs.EXTRAS)), unique=True, max_size=3)):
+        columns[extra] = ["0.5"] * len(columns[time])
+    header, rows = logs.named({name: columns[name] for name in draw(st.permutations(list(columns)))})
+    separator = draw(st.sampled_from([",", ";", "\t"]))
+    text = logs.written(header, rows, separator)
+    if separator == ";" and draw(st.booleans()) and "." not in "".join(header):
+        text = text.replace(".", ",")
+    return text, ReadingOptions(**said), unit, start
+
+
+@settings(max_examples=tried(100))
+@given(loggers())
+def test_any_spelling_any_unit_any_order_and_any_layout_is_the_motion(
+    tmp_path_factory: pytest.TempPathFactory, logger: tuple[str, ReadingOptions, str, int]
+) -> None:
+    text, options, unit, start = logger
+    path = Path(tmp_path_factory.getbasetemp()) / "logger.csv"
+    path.write_text(text, encoding="utf-8")
+    trajectories = read_trajectories(f"{path}:*", options).trajectories
+    assert {trajectory.name for trajectory in trajectories} == set(MOTIONS)
+    for trajectory in trajectories:
+        assert_is_the_motion(trajectory, MOTIONS[trajectory.name], start=start, unit=unit)

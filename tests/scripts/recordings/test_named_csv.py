@@ -1,0 +1,216 @@
+"""CSV with named columns."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from rigid_motion_batch.recordings.sense import FEWEST
+from tests.thoroughness import tried
+
+HEADER = "t,x,y,z,qx,qy,qz,qw"
+ROWS = "0.0,1,2,3,0.1,0.2,0.3,0.9\n0.1,4,5,6,0.4,0.5,0.6,0.4\n"
+
+
+def assert_holds_the_rows(source: str) -> None:
+    (trajectory,) = read_trajectories(source).trajectories
+    np.testing.assert_array_equal(trajectory.times, [0.0, 0.1])
+    np.testing.assert_array_equal(trajectory.poses.positions, [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, [[0.9, 0.1, 0.2, 0.3], [0.4, 0.4, 0.5, 0.6]])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"{HEADER}\n{ROWS}",
+        f"{HEADER}\r\n{ROWS}".replace("\n", "\r\n").replace("\r\r", "\r"),
+        f"{HEADER}\n{ROWS}".replace("\n", "\r"),
+        f"{HEADER}\n{ROWS}".rstrip(),
+        f"\ufeff{HEADER}\n{ROWS}",
+        f"# made by hand\n\n{HEADER}\n# and\n\n{ROWS}\n\n",
+        f"# {HEADER}\n{ROWS}",
+        f"{HEADER.upper()}\n{ROWS}",
+        f"{HEADER}\n{ROWS}".replace(",", ";"),
+        f"{HEADER}\n{ROWS}".replace(",", "\t"),
+        f"{HEADER}\n{ROWS}".replace(",", " "),
+        f"{HEADER}\n{ROWS}".replace(",", ";").replace(".", ","),
+        f"{HEADER}\n{ROWS}".replace(",", " , "),
+        f"{HEADER},\n{ROWS}".replace("\n0", ",\n0").replace("0.4\n", "0.4,\n"),
+        "Time [s],X [m],Y [m],Z [m],qx,qy,qz,qw\n" + ROWS,
+        '"t","x","y","z","qx","qy","qz","qw"\n"0.0","1","2","3","0.1","0.2","0.3","0.9"\n0.1,4,5,6,0.4,0.5,0.6,0.4\n',
+        "qw,button,z,y,x,t,qz,qy,qx\n0.9,A,3,2,1,0.0,0.3,0.2,0.1\n0.4,B,6,5,4,0.1,0.6,0.5,0.4\n",
+        "t,x,y,z,qw,qx,qy,qz\n0.0,1,2,3,0.9,0.1,0.2,0.3\n0.1,4,5,6,0.4,0.4,0.5,0.6\n",
+    ],
+    ids=[
+        "plain",
+        "Windows line ends",
+        "old line ends",
+        "no end of line at the end",
+        "byte order mark",
+        "comments and blank lines",
+        "header in a comment",
+        "capital names",
+        "semicolons",
+        "tabs",
+        "blanks",
+        "decimal commas",
+        "blanks around the commas",
+        "commas at the line ends",
+        "units in the names",
+        "quotes",
+        "another order and more columns",
+        "as the program writes it",
+    ],
+)
+def test_columns_are_found_by_their_names(write, text: str) -> None:
+    assert_holds_the_rows(write("take.csv", text))
+
+
+@pytest.mark.parametrize("name", ["take.CSV", "take.tsv", "take.txt"])
+def test_other_extensions_of_the_same_content(write, name: str) -> None:
+    assert_holds_the_rows(write(name, f"{HEADER}\n{ROWS}".replace(",", "\t")))
+
+
+def test_the_text_may_be_utf16_as_spreadsheets_write_it(write) -> None:
+    assert_holds_the_rows(write("take.csv", f"{HEADER}\n{ROWS}".replace(",", "\t").encode("utf-16")))
+
+
+def test_the_body_has_the_name_of_the_file(write) -> None:
+    recording = read_trajectories(write("drill v2.csv", f"{HEADER}\n{ROWS}"))
+    assert [trajectory.name for trajectory in recording.trajectories] == ["drill v2"]
+    assert recording.others == ()
+    assert recording.note == ""
+
+
+def test_what_is_broken_in_the_recording_is_kept_for_the_repair(write) -> None:
+    text = f"{HEADER}\n5,0,0,0,0,0,0,0\n5,nan,,NaN,0,0,0,-2\n4,inf,0,0,0,0,0,1\n"
+    (trajectory,) = read_trajectories(write("take.csv", text)).trajectories
+    np.testing.assert_array_equal(trajectory.times, [5, 5, 4])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, [[0, 0, 0, 0], [-2, 0, 0, 0], [1, 0, 0, 0]])
+    np.testing.assert_array_equal(trajectory.poses.positions[1], [np.nan] * 3)
+    assert trajectory.poses.positions[2, 0] == np.inf
+
+
+@pytest.mark.parametrize("name", ["s", "Scale"])
+def test_a_scale_is_read_where_there_is_one(write, name: str) -> None:
+    rows = ROWS.replace("0.9\n", "0.9,1\n").replace("0.4\n", "0.4,2.5\n")
+    (trajectory,) = read_trajectories(write("take.csv", f"{HEADER},{name}\n{rows}")).trajectories
+    np.testing.assert_array_equal(trajectory.poses.scales, [1.0, 2.5])
+
+
+def test_a_scale_that_is_always_1_is_none(write) -> None:
+    rows = ROWS.replace("\n", ",1.0\n")
+    (trajectory,) = read_trajectories(write("take.csv", f"{HEADER},s\n{rows}")).trajectories
+    assert trajectory.poses.scales is None
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        ("", None, "the file is empty"),
+        ("\n \n", None, "the file is empty"),
+        (f"{HEADER}\n", None, "'take' has 0 samples"),
+        (f"{HEADER}\n0,1,2,3,0,0,0,1\n", None, "'take' has 1 samples"),
+        (f"{HEADER.removesuffix(',qw')}\n{ROWS}", 1, "no column named qw"),
+        ("# about\n\nt,x,y,z\n0,1,2,3\n", 3, "no column named qx, qy, qz, qw"),
+        (ROWS, 1, "no column has a known name"),
+        ("# nothing but a comment\n", 2, "no column has a known name"),
+        (f"{HEADER},time\n{ROWS}", 1, "two columns mean t"),
+        (f"{HEADER}\n{ROWS}# a comment\n0.2,1,2,three,0,0,0,1\n", 5, "z is 'three', not a number"),
+        (f"{HEADER}\n{ROWS}\n0.2,1,2,3,0,0,0,1e\n", 5, "qw is '1e', not a number"),
+        (f"{HEADER}\n{ROWS}0.2,1,2\n", 4, "3 columns where 8 are needed"),
+        (f"{HEADER}\n0,1,2,3,0,0,0,1,5\n{ROWS}", 2, "9 columns where 8 have a name"),
+        (f"{HEADER}\n0,0,1,5,2,5,3,5,0,0,0,0,0,0,1,0\n{ROWS}", 2, "16 columns where 8 have a name"),
+        (f"{HEADER}\n{ROWS}1_0,1,2,3,0,0,0,1\n", 4, "t is '1_0', not a number"),
+        (f"{HEADER}\n{ROWS}{'9' * 100_000},{'x' * 100_000},2,3,0,0,0,1\n", 4, f"x is '{'x' * 24}...', not a number"),
+        (f"{HEADER}\n{ROWS}\x1b[2J,1,2,3,0,0,0,1\n", 4, r"t is '\x1b[2J', not a number"),
+        (f'{HEADER}\n{ROWS}""\n', 4, "1 columns where 8 are needed"),
+        (f"{HEADER}\n{ROWS}0.2,1,2 3,4,0,0,0,1\n", 4, "y is '2 3', not a number"),
+        (f"{HEADER}\n{ROWS}0.2,1,2,\t,0,0,0,1\n", 4, "z is '', not a number"),
+        (f"{HEADER}{' ' * 1_000_000}p\n{ROWS}", 1, "this line is no header"),
+        ("x" * 3_000_000, 1, "no column has a known name"),
+        ("x," * 50_000, 1, "no column named t, y, z, qx, qy, qz, qw"),
+        ("\0\1\2\3", 1, "this is not text but binary data"),
+        (f"{HEADER}\n{ROWS}".encode() + b"0.2,\xff\xfe,2,3,0,0,0,1\n", 4, "this is not text (byte 0xff)"),
+        (bytes(range(1, 256)) * 100, 2, "this is not text (byte 0x80)"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, line: int | None, problem: str) -> None:
+    told_line, message = refusal(write("take.csv", text))
+    assert message.startswith(problem)
+    assert told_line == line
+    assert len(message) < 200
+
+
+def test_a_missing_column_is_answered_with_the_columns_that_are_needed(write, refusal) -> None:
+    _, message = refusal(write("take.csv", f"{HEADER.removesuffix(',qw')}\n{ROWS}"))
+    assert message == (
+        "no column named qw (found t, x, y, z, qx, qy, qz); known are t, time, timestamp_ms; x, px, pos_x, position.x; "
+        "qw, rot_w, rotation.w; or --columns qw=NAME"
+    )
+
+
+METADATA = ["Recorder v1.2", "Date: 2026-11-22", "Rate,90", 'Operator,"Ann, Bob"', "", "# calibrated", "gain;1;2;3"]
+
+
+@pytest.mark.parametrize("count", range(len(METADATA) + 1))
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_a_header_is_found_behind_lines_that_are_none(write, count: int, separator: str) -> None:
+    table = f"{HEADER}\n\n{ROWS}".replace(",", separator)
+    assert_holds_the_rows(write("take.csv", "\n".join([*METADATA[:count], table])))
+
+
+def test_a_header_behind_other_lines_may_have_columns_without_numbers_and_a_row_with_empty_cells(write) -> None:
+    rows = "left,A,0.0,1,2,3,0.1,0.2,0.3,0.9\nleft,B,0.1,4,5,6,0.4,0.5,0.6,0.4\n"
+    assert_holds_the_rows(write("take.csv", f"Recorder v1.2\nhand,button,{HEADER}\n{rows}"))
+    gap = "0.0,,,,,,,\n0.1,4,5,6,0.4,0.5,0.6,0.4\n"
+    (trajectory,) = read_trajectories(write("take.csv", f"Recorder v1.2\n{HEADER}\n{gap}")).trajectories
+    np.testing.assert_array_equal(trajectory.times, [0.0, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        (
+            f"Recorder v1.2\n\n{HEADER[:-3]}\n" + ROWS.replace(",0.9", "").replace(",0.4\n", "\n"),
+            3,
+            "no column named qw",
+        ),
+        (f"Recorder v1.2\na,b,c\n{ROWS}", 1, "no column has a known name (found Recorder, v1.2)"),
+        (f"Recorder v1.2\n{HEADER},spare\n{ROWS}", 1, "no column has a known name (found Recorder, v1.2)"),
+        (f"Recorder\n{HEADER}\n{ROWS}{HEADER}\n{ROWS}", 2, "lines 2 and 5 both name columns"),
+        ("Recorder\n" * 49 + f"{HEADER}\n{ROWS}", 1, "no column has a known name (found Recorder)"),
+        (f"Recorder\n{HEADER}\n{ROWS}0.2,1,2,three,0,0,0,1\n", 5, "z is 'three', not a number"),
+    ],
+)
+def test_what_is_no_header_behind_other_lines_is_told(write, refusal, text: str, line: int, problem: str) -> None:
+    told_line, message = refusal(write("take.csv", text))
+    assert message.startswith(problem)
+    assert told_line == line
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False)
+samples = st.lists(st.tuples(*[numbers] * 9), min_size=2, max_size=FEWEST - 1).map(np.array)
+"""Too few to be told from those of several devices."""
+
+
+@settings(max_examples=tried(60))
+@given(samples, st.permutations(range(9)), st.sampled_from([",", ";", "\t"]))
+def test_what_is_written_in_full_precision_comes_back_exactly(
+    tmp_path_factory: pytest.TempPathFactory, table: np.ndarray, order: list[int], separator: str
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "round_trip.csv"
+    names = ["t", "x", "y", "z", "qw", "qx", "qy", "qz", "scale"]
+    lines = [[names[column] for column in order], *[[repr(float(row[column])) for column in order] for row in table]]
+    Path(path).write_text("\n".join(separator.join(line) for line in lines))
+    (trajectory,) = read_trajectories(str(path), ReadingOptions(time_unit="s")).trajectories
+    np.testing.assert_array_equal(trajectory.times, table[:, 0])
+    np.testing.assert_array_equal(trajectory.poses.positions, table[:, 1:4])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, table[:, 4:8])
+    if trajectory.poses.scales is None:
+        np.testing.assert_array_equal(table[:, 8], 1.0)
+    else:
+        np.testing.assert_array_equal(trajectory.poses.scales, table[:, 8])

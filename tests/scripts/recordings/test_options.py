@@ -1,0 +1,72 @@
+"""What a user says of recordings: checked when it is said, and the same when it has travelled with a task."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+
+import pytest
+
+from rigid_motion_batch.recordings import ReadingOptions
+from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+
+SAID = ["--columns", "t=when, x=a,device=who", "--time-unit", "ms", "--scale", "0.01", "--euler", "zxy", "--degrees"]
+MEANT = ReadingOptions((("t", "when"), ("x", "a"), ("device", "who")), "ms", 0.01, "zxy", True)
+
+
+def parsed(*arguments: str) -> ReadingOptions:
+    parser = argparse.ArgumentParser()
+    add_reading_options(parser)
+    return reading_options(parser.parse_args(arguments))
+
+
+def test_a_command_line_says_all_of_them() -> None:
+    assert parsed(*SAID) == MEANT
+    assert parsed() == ReadingOptions()
+
+
+def test_they_are_the_same_after_a_journey_as_json() -> None:
+    for options in (MEANT, ReadingOptions()):
+        assert ReadingOptions(**json.loads(json.dumps(asdict(options)))) == options
+
+
+def test_those_that_say_anything_are_known() -> None:
+    assert MEANT.given == ("columns", "time_unit", "scale", "euler", "degrees")
+    assert ReadingOptions().given == ()
+
+
+@pytest.mark.parametrize(("order", "intrinsic"), [("XYZ", "XYZ"), ("zxy", "YXZ"), ("YZX", "YZX"), ("xzy", "YZX")])
+def test_turns_about_fixed_axes_are_turns_about_moved_ones_in_the_opposite_order(order: str, intrinsic: str) -> None:
+    assert ReadingOptions(euler=order).intrinsic_order == intrinsic
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--columns", "when"], "'when' names no columns; write t=timestamp_ms,x=pos_x,..."),
+        (["--columns", "t="], "'t=' names no columns"),
+        (
+            ["--columns", "q=a"],
+            "a column cannot mean 'q'; known are t, x, y, z, qw, qx, qy, qz, rx, ry, rz, scale, dev",
+        ),
+        (["--columns", "t=a,t=b"], "two columns for t; name one"),
+        (["--time-unit", "min"], "invalid choice: 'min'"),
+        (["--scale", "0"], "a unit cannot be 0.0 metres long; give a number such as 0.01 for centimetres"),
+        (["--scale", "cm"], "a unit cannot be nan metres long"),
+        (["--scale", "inf"], "a unit cannot be inf metres long"),
+        (["--euler", "XYX"], "'XYX' is no order of Euler angles; give the three axes once each, in capitals (YXZ) for"),
+        (["--euler", "xYz"], "'xYz' is no order of Euler angles"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_at_once(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+) -> None:
+    with pytest.raises(SystemExit):
+        parsed(*arguments)
+    assert told in capsys.readouterr().err
+
+
+def test_degrees_of_no_angles_are_refused() -> None:
+    with pytest.raises(ValueError, match="--degrees is for Euler angles: add their order"):
+        parsed("--degrees")

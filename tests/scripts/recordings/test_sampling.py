@@ -1,0 +1,271 @@
+"""Which moments of FBX, glTF and .blend files become samples: every key of every curve, and more where it bends."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.recordings import Trajectory, read_trajectories
+from rigid_motion_batch.recordings.sampling import CLOSEST, merged
+from tests.scripts.recordings.blends import FPS, empty, key, rig
+from tests.scripts.recordings.glbs import Body, Track, chain, curved, mixed_rates, turning
+
+bpy = pytest.importorskip("bpy")
+anim_utils = pytest.importorskip("bpy_extras.anim_utils")
+
+SINGLE = 2e-5
+"""Metres: single precision in files and in Blender, through a chain of 20 joints."""
+
+WITHIN = 1e-3
+"""Metres: what may be between samples."""
+
+
+def read(source: object) -> Trajectory:
+    (trajectory,) = read_trajectories(str(source)).trajectories
+    return trajectory
+
+
+def at(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
+    """Where the joints are at some times by straight in-betweens in their parents' space, shape (joints, times, 3)."""
+    local = [interpolate(trajectory.times, own, times, "lerp_slerp") for own in trajectory.poses]
+    poses = Poses(*(np.stack([getattr(own, part) for own in local]) for part in ("positions", "quaternions")))
+    return trajectory.figure.skeleton.in_root_space(poses).positions
+
+
+def off(trajectory: Trajectory, body: Body, times: np.ndarray) -> float:
+    order = [trajectory.figure.joints.index(f"Joint{joint}") for joint in range(len(body.parents))]
+    return float(np.linalg.norm(at(trajectory, times)[order] - body.places(times), axis=-1).max())
+
+
+# -- glTF -------------------------------------------------------------------------------------------------------------
+
+
+def test_the_densest_curve_says_the_rate(tmp_path: Path) -> None:
+    body = mixed_rates()
+    found = read(body.write(tmp_path / "mixed.glb"))
+    assert found.rate == 30.0
+    np.testing.assert_allclose(found.times, np.arange(61) / 30.0, atol=1e-6)
+    assert off(found, body, np.arange(61) / 30.0) < SINGLE
+    assert off(found, body, body.moments) < WITHIN
+    assert found.warnings == ()
+
+
+def test_thinned_tracks_have_the_rate_of_what_they_were_thinned_from(tmp_path: Path) -> None:
+    parents, offsets = chain(3, 0.5)
+    times = np.arange(60) / 30
+    kept = [np.array([0, *range(1, 58, 2), 58, 59]), np.array([0, 4, 9, 30, 59]), np.array([0, 7, 59])]
+    tracks = [
+        Track(joint, "rotation", times[rows], turning(times[rows], 0.2 * np.sin(3 * times[rows] + joint)))
+        for joint, rows in enumerate(kept)
+    ]
+    body = Body(parents, offsets, tracks)
+    found = read(body.write(tmp_path / "soldier.glb"))
+    assert len(found.times) == 60
+    assert found.times[-1] == pytest.approx(59 / 30, abs=1e-6)
+    assert off(found, body, times) < 0.1 * WITHIN  # Blender turns on lines of quaternions, here of up to 0.5.
+
+
+def test_keys_between_the_even_ones_are_samples(tmp_path: Path) -> None:
+    parents, offsets = chain(3, 0.5)
+    even, odd = np.arange(31) / 30, np.array([0.0, 0.21, 0.215, 0.5123, 1.0])
+    tracks = [
+        Track(0, "rotation", even, turning(even, 0.2 * np.sin(3 * even))),
+        Track(1, "rotation", odd, turning(odd, np.array([0.0, 0.6, -0.2, 0.7, 0.0]), (1, 0, 0))),
+    ]
+    body = Body(parents, offsets, tracks)
+    found = read(body.write(tmp_path / "odd.glb"))
+    assert np.abs(found.times - odd[:, None]).min(axis=1).max() < 1e-6
+    assert off(found, body, odd) < SINGLE
+    assert off(found, body, body.moments) < WITHIN
+
+
+def test_parents_of_the_armature_count(tmp_path: Path) -> None:
+    body = mixed_rates()
+    fast = np.arange(0, 61) / 30
+    node = len(body.parents)
+    moved = Body(
+        body.parents,
+        body.offsets,
+        [*body.tracks[:-1], Track(node, "translation", fast, 0.5 * np.sin(20 * fast)[:, None] * [1.0, 0, 0])],
+    )
+    found = read(moved.write(tmp_path / "carried.glb"))
+    assert len(found.times) == 61
+    still = Body(body.parents, body.offsets, body.tracks[:-1]).places(fast)
+    expected = still + 0.5 * np.sin(20 * fast)[None, :, None] * [1.0, 0, 0]
+    assert np.abs(at(found, fast) - expected).max() < SINGLE
+
+
+@pytest.mark.parametrize("size", [1.0, 0.01])
+def test_splines_are_read_with_their_tangents(tmp_path: Path, size: float) -> None:
+    body = curved(size)
+    found = read(body.write(tmp_path / "curved.glb"))
+    assert off(found, body, body.moments) < WITHIN
+    assert (found.rate, found.warnings) == (60.0, ()), "two keys a second tell no rate"
+
+
+def test_wide_turns_are_even(tmp_path: Path) -> None:
+    parents, offsets = chain(4, 0.4)
+    times = np.arange(4) / 2
+    tracks = [
+        Track(joint, "rotation", times, turning(times, 2.5 * np.sin(2 * times + joint), np.eye(3)[joint % 3]))
+        for joint in range(4)
+    ]
+    body = Body(parents, offsets, tracks)
+    assert off(read(body.write(tmp_path / "wide.glb")), body, body.moments) < WITHIN
+
+
+def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
+    parents, offsets = chain(3, 0.5)
+    even = np.arange(31) / 30
+    tracks = [
+        Track(0, "rotation", even, turning(even, 0.1 * even)),
+        Track(1, "rotation", np.array([0.0, 0.4, 1.0]), turning(even[:3], np.array([0.0, 0.8, 0.8])), "STEP"),
+    ]
+    body = Body(parents, offsets, tracks)
+    found = read(body.write(tmp_path / "step.glb"))
+    assert len(found.times) == 32
+    times = body.moments[(body.moments < 0.4 - 0.03 / 30) | (body.moments >= 0.4)]
+    assert off(found, body, times) < WITHIN
+    (warning,) = found.warnings
+    assert "it jumps" in warning
+    assert "first at 0.3992 s" in warning
+
+
+# -- which moments ----------------------------------------------------------------------------------------------------
+
+
+def test_keys_that_are_as_near_as_a_hundredth_of_a_step_are_one() -> None:
+    even = np.arange(5.0)
+    keys = np.array([0.9999, 1.5, 1.505, 2.02, 3.5, 1.5, -3.0, 9.0])
+    np.testing.assert_array_equal(merged(even, keys, 1.0), [0, 1, 1.5, 2, 2.02, 3, 3.5, 4])
+    assert np.diff(merged(even, np.random.default_rng(1).uniform(0, 4, 999), 1.0)).min() >= CLOSEST
+
+
+# -- .blend -----------------------------------------------------------------------------------------------------------
+
+
+def truth(name: str, frames: np.ndarray, bone: str | None = None) -> np.ndarray:
+    """Where an object or a bone of the open scene is on some frames, shape (n, 3)."""
+    obj, seen = bpy.data.objects[name], []
+    for frame in frames.tolist():
+        bpy.context.scene.frame_set(int(frame // 1), subframe=frame % 1)
+        shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        place = shown.matrix_world @ shown.pose.bones[bone].matrix if bone else shown.matrix_world
+        seen.append(np.array(place.translation))
+    return np.array(seen)
+
+
+def in_a_strip(obj: bpy.types.Object, start: float, **settings: object) -> None:
+    """Put the Action of an object into a strip, which begins there."""
+    data = obj.animation_data
+    strip = data.nla_tracks.new().strips.new("Strip", int(start), data.action)
+    if strip.action_slot is None:
+        strip.action_slot = data.action.slots[0]
+    data.action = None
+    for name, value in settings.items():
+        setattr(strip, name, value)
+
+
+STRIPS = [
+    {"scale": 1.5},
+    {"scale": 0.37, "repeat": 3.0},
+    {"scale": 1.5, "use_reverse": True},
+    {"frame_start": 5.3},
+]
+
+
+def keyed_object() -> None:
+    """With Blender's own easing, every third frame, as an animator blocks it out."""
+    tool = empty("Tool")
+    for number, frame in enumerate(range(1, 32, 3)):
+        key(tool, frame, location=(0.3 * (number % 2), 0.1 * number, 0))
+
+
+@pytest.mark.parametrize("settings", STRIPS)
+def test_an_object_in_a_strip_is_read_within_a_millimetre_at_every_eighth(saved, scene, settings: dict) -> None:
+    keyed_object()
+    in_a_strip(bpy.data.objects["Tool"], 1, **settings)
+    strip = bpy.data.objects["Tool"].animation_data.nla_tracks[0].strips[0]
+    frames = np.arange(np.ceil(8 * strip.frame_start) + 1, 8 * strip.frame_end - 1) / 8
+    if "repeat" in settings:
+        turns = strip.frame_start + 30 * strip.scale * np.arange(1, 3)
+        frames = frames[np.abs(frames - turns[:, None]).min(axis=0) > 0.05]
+    expected = truth("Tool", frames)
+    found = read(saved())
+    made = interpolate(found.times, found.poses, frames / FPS, "lerp_slerp").positions
+    assert np.linalg.norm(made - expected, axis=-1).max() < WITHIN
+
+
+def test_bones_in_a_scaled_strip_are_read_within_a_millimetre_at_every_eighth(saved, scene) -> None:
+    arm = rig("Rig", {"Upper": ((0, 0, 0), (0, 0, 0.4), None), "Hand": ((0, 0, 0.4), (0, 0, 0.8), "Upper")})
+    for number, frame in enumerate(range(1, 32, 3)):
+        key(arm.pose.bones["Upper"], frame, rotation_euler=(0.4 * (number % 2), 0, 0.1 * number))
+        key(arm.pose.bones["Hand"], frame, rotation_euler=(0, 0.5 * (number % 3), 0))
+    in_a_strip(arm, 1, scale=1.5)
+    frames = np.arange(8, 46 * 8) / 8
+    expected = np.stack([truth("Rig", frames, bone) for bone in ("Upper", "Hand")])
+    recording = read_trajectories(saved())
+    (found,) = recording.trajectories
+    assert np.linalg.norm(at(found, frames / FPS) - expected, axis=-1).max() < WITHIN
+    assert "samples between frames" in recording.note
+
+
+def test_keys_off_whole_frames_are_samples(saved) -> None:
+    tool = empty("Tool")
+    for frame, x in ((1, 0), (2.4, 1), (2.7, -1), (6, 0)):
+        key(tool, frame, location=(x, 0, 0))
+    for fcurve in anim_utils.action_get_channelbag_for_slot(
+        tool.animation_data.action, tool.animation_data.action_slot
+    ).fcurves:
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
+    found = read(saved())
+    np.testing.assert_allclose(found.times * FPS, [1, 2, 2.4, 2.7, 3, 4, 5, 6], atol=1e-6)
+    np.testing.assert_allclose(found.poses.positions[2:4, 0], [1, -1], atol=1e-6)
+
+
+def test_keys_on_every_frame_are_all_that_is_read(saved) -> None:
+    arm = rig("Rig", {"Upper": ((0, 0, 0), (0, 0, 0.4), None), "Hand": ((0, 0, 0.4), (0, 0, 0.8), "Upper")})
+    for frame in range(1, 41):
+        for number, bone in enumerate(arm.pose.bones):
+            bone.rotation_mode = "QUATERNION"
+            half = 0.3 * np.sin(0.2 * frame + number)
+            key(bone, frame, rotation_quaternion=(np.cos(half), np.sin(half), 0, 0))
+    for fcurve in anim_utils.action_get_channelbag_for_slot(
+        arm.animation_data.action, arm.animation_data.action_slot
+    ).fcurves:
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
+    recording = read_trajectories(saved())
+    np.testing.assert_allclose(recording.trajectories[0].times * FPS, np.arange(1, 41))
+    assert recording.note == ""
+
+
+def test_angles_that_flip_between_frames_are_no_motion(saved) -> None:
+    tool = empty("Tool")
+    for frame in range(1, 21):
+        key(tool, frame, rotation_euler=(0, 0, np.radians((170 + 2 * frame + 180) % 360 - 180)))
+    for fcurve in anim_utils.action_get_channelbag_for_slot(
+        tool.animation_data.action, tool.animation_data.action_slot
+    ).fcurves:
+        for point in fcurve.keyframe_points:
+            point.interpolation = "LINEAR"
+    recording = read_trajectories(saved())
+    assert len(recording.trajectories[0].times) == 20
+    assert "taken to go the short way" in recording.note
+
+
+def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None:
+    tool = empty("Tool")
+    for frame in (1, 11):
+        key(tool, frame, location=(frame, 0, 0))
+    channels = anim_utils.action_get_channelbag_for_slot(tool.animation_data.action, tool.animation_data.action_slot)
+    noise = channels.fcurves[0].modifiers.new("FNGENERATOR")
+    noise.function_type, noise.amplitude, noise.phase_multiplier, noise.use_additive = "SIN", 0.5, 400.0, True
+    found = read(saved())
+    (warning,) = found.warnings
+    assert "mm off a straight way" in warning
+    assert len(found.times) < 300

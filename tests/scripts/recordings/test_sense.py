@@ -1,0 +1,194 @@
+"""What no hand, no device and no clock does is refused or said; what people record is neither."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.recordings.sense import doubts, require_one_body
+from rigid_motion_batch.recordings.times import typical_interval
+from tests.recordings import RECORDINGS
+
+COUNT = 90
+
+
+def hand(side: float = 1.0, rate: float = 90.0) -> Trajectory:
+    """One that swings to and fro within half a metre."""
+    times = np.arange(COUNT) / rate
+    positions = np.stack((side * 0.4 + 0.2 * np.sin(9.0 * times), 1.0 + 0.1 * times, 0.0 * times), axis=-1)
+    return Trajectory("hand", times, Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (COUNT, 1))))
+
+
+def mixed(bodies: list[Trajectory], delay: float, order: Callable[[np.ndarray], np.ndarray]) -> Trajectory:
+    """The rows of several in one, each body a little later than the one before, by what `order` makes of the times."""
+    times = np.concatenate([body.times + delay * place for place, body in enumerate(bodies)])
+    rows = np.argsort(order(times), kind="stable")
+    poses = Poses(
+        *(np.concatenate([getattr(body.poses, part) for body in bodies]) for part in ("positions", "quaternions"))
+    )
+    return Trajectory("mixed", np.sort(times), poses[rows])
+
+
+def jittered(times: np.ndarray) -> np.ndarray:
+    return times + np.random.default_rng(0).uniform(0.0, 0.02, len(times))
+
+
+@pytest.mark.parametrize("order", [np.asarray, jittered], ids=["by turns", "in any order"])
+@pytest.mark.parametrize("delay", [0.0, 0.002], ids=["at the same times", "one after the other"])
+@pytest.mark.parametrize("sides", [(-1.0, 1.0), (-1.0, 0.0, 1.0)], ids=["two", "three"])
+@pytest.mark.parametrize("scale", [1.0, 100.0, 1000.0])
+def test_devices_that_are_mixed_are_refused(order, delay: float, sides: tuple[float, ...], scale: float) -> None:
+    both = mixed([hand(side) for side in sides], delay, order)
+    both = replace(both, poses=Poses(scale * both.poses.positions, both.poses.quaternions))
+    with pytest.raises(TrajectoryError, match=r"log.csv:1: \d+ of \d+ samples jump .* several devices; split it"):
+        require_one_body(both, "log.csv", "split it", 1)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1000.0])
+@pytest.mark.parametrize("rate", [10.0, 90.0, 1000.0])
+@pytest.mark.parametrize("rounded_to", [0.0, 1e-4, 1e-2])
+def test_one_device_is_not_refused(scale: float, rate: float, rounded_to: float) -> None:
+    one = hand(rate=rate)
+    positions = scale * one.poses.positions
+    positions = np.round(positions / rounded_to) * rounded_to if rounded_to else positions
+    require_one_body(replace(one, poses=Poses(positions, one.poses.quaternions)), "log.csv", "", 1)
+
+
+def test_a_device_at_rest_that_trembles_between_two_numbers_is_not_refused() -> None:
+    one = hand()
+    positions = np.zeros((COUNT, 3))
+    positions[::2, 0] = 1e-3
+    require_one_body(replace(one, poses=Poses(positions, one.poses.quaternions)), "log.csv", "", 1)
+
+
+def test_hands_are_not_doubted() -> None:
+    assert doubts(hand()) == ()
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "told"),
+    [
+        (hand(rate=4.0), "only 4 samples a second, fewer than any motion needs"),
+        (hand(rate=90e3), "9e+04 samples a second, more than any device has"),
+        (
+            replace(hand(), metres_per_unit=100.0),
+            "a twentieth of its speeds are above 179 m/s, and it goes 41.1 m far, as no hand does; if its",
+        ),
+        (replace(hand(), metres_per_unit=1000.0), "a twentieth of its speeds are above 1.79e+03 m/s"),
+    ],
+)
+def test_what_nobody_records_is_said(trajectory: Trajectory, told: str) -> None:
+    assert doubts(trajectory)[0].startswith(told)
+
+
+def test_the_unit_of_time_is_a_way_out_only_where_a_format_takes_one() -> None:
+    assert doubts(hand(rate=1.0), time_unit=True)[0].endswith("if its times are no seconds, --time-unit ms, us or ns")
+    assert "--time-unit" not in doubts(hand(rate=1.0))[0]
+
+
+@pytest.mark.parametrize(("jump", "samples", "said"), [(0.6, 60, 1), (0.02, 60, 0), (0.6, 12, 0), (np.nan, 60, 0)])
+def test_a_pose_before_the_recording_is_said(jump: float, samples: int, said: int) -> None:
+    times = np.arange(samples) / 120.0
+    turned = np.array((np.cos(0.5 * jump), np.sin(0.5 * jump), 0.0, 0.0))
+    poses = Poses(np.zeros((2, samples, 3)), np.tile((1.0, 0.0, 0.0, 0.0), (2, samples, 1)))
+    poses.positions[1], poses.quaternions[0, 0] = (0.0, 0.0, 1.0), turned
+    poses.positions[0, :, 0] = 1e-3 * np.arange(samples)
+    rest = Poses(((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), np.tile((1.0, 0.0, 0.0, 0.0), (2, 1)))
+    body = Figure(("Hips", "Head"), np.array((-1, 0)), rest, np.ones((2, 3)))
+    found = doubts(Trajectory("body", times, poses, figure=body))
+    assert len(found) == said
+    assert all("the next 'Head' jumps 0.59 m, and none jumps more than 0.001 m" in one for one in found)
+
+
+def test_recordings_one_behind_the_other_are_said() -> None:
+    one = hand()
+    poses = Poses(np.tile(one.poses.positions, (2, 1)), np.tile(one.poses.quaternions, (2, 1)))
+    (said,) = doubts(Trajectory("two", np.tile(one.times, 2), poses))
+    assert said.startswith("its time runs backwards at row 90, and 89 of 180 rows are lost to that: these are several")
+
+
+@pytest.mark.parametrize("row", [0, 40, COUNT - 1])
+@pytest.mark.parametrize("time", [-1e25, 0.0, 1e6, 1e25, np.nan])
+def test_one_wild_time_stamp_is_no_reason_for_doubts(row: int, time: float) -> None:
+    one = hand()
+    times = 1.7e9 + one.times
+    times[row] = time
+    assert doubts(replace(one, times=times)) == ()
+    assert typical_interval(times) == pytest.approx(1.0 / 90.0, rel=1e-4)
+
+
+# -- units of time ----------------------------------------------------------------------------------------------------
+
+
+def csv_of(times: list[str]) -> str:
+    return "t,x,y,z,qx,qy,qz,qw\n" + "".join(f"{time},0,0,0,0,0,0,1\n" for time in times)
+
+
+@pytest.mark.parametrize("name", ["take.csv", "take.tum"])
+@pytest.mark.parametrize("start", [0, 1_700_000_000], ids=["from 0", "from 1970"])
+@pytest.mark.parametrize(
+    ("unit", "ticks", "told"),
+    [
+        (
+            "ms",
+            1_000,
+            "t goes in steps of 11: as seconds that is one sample in 11 s; these look like milliseconds (90.9",
+        ),
+        (
+            "us",
+            10**6,
+            "t goes in steps of 1.1e+04: as seconds that is one sample in 1.1e+04 s; these look like microse",
+        ),
+        ("ns", 10**9, "t goes in steps of 1.1e+07: as seconds that is one sample in 1.1e+07 s; these look like nanose"),
+    ],
+)
+def test_times_that_are_no_seconds_are_refused_with_their_unit(
+    write, refusal, name: str, start: int, unit: str, ticks: int, told: str
+) -> None:
+    text = csv_of([str(start * ticks + row * 11 * ticks // 1000) for row in range(9)])
+    source = write(name, text if name.endswith(".csv") else "# " + text.replace(",", " "))
+    line, message = refusal(source)
+    assert line == 1
+    assert message.startswith(told)
+    assert message.endswith(f"--time-unit {unit}, or --time-unit s if they are seconds")
+    (trajectory,) = read_trajectories(source, ReadingOptions(time_unit=unit)).trajectories
+    np.testing.assert_array_equal(trajectory.times - trajectory.times[0], [row * 11 / 1000 for row in range(9)])
+    (trajectory,) = read_trajectories(source, ReadingOptions(time_unit="s")).trajectories
+    assert typical_interval(trajectory.times) == pytest.approx(11 * ticks / 1000, rel=0.05)
+
+
+def test_steps_that_fit_no_unit_are_refused_as_well(write, refusal) -> None:
+    _, message = refusal(write("take.csv", csv_of(["0", "1e15", "2e15", "3e15"])))
+    assert message.endswith("; say what it counts: --time-unit s, ms, us, ns")
+
+
+def test_a_sample_a_second_is_read_and_said(write) -> None:
+    (trajectory,) = read_trajectories(write("take.csv", csv_of(["0", "1", "2", "3"]))).trajectories
+    assert trajectory.warnings[0].startswith("only 1 samples a second")
+
+
+def test_of_nanoseconds_since_1970_none_is_lost_in_a_csv(write) -> None:
+    text = csv_of([str(1_403_636_580_838_555_648 + 5_000_001 * row) for row in range(4)]).replace("t,", "t [ns],", 1)
+    (trajectory,) = read_trajectories(write("take.csv", text)).trajectories
+    np.testing.assert_array_equal(trajectory.times, np.arange(4) * 5_000_001 / 1e9)
+
+
+@pytest.mark.parametrize("wild", ["1e30", "0", "", "99999999999999999999"])
+def test_a_wild_time_stamp_first_costs_the_others_no_more_than_a_float_does(write, wild: str) -> None:
+    text = csv_of([wild, *(str(1_700_000_000_000_000_000 + 11_000_000 * row) for row in range(9))])
+    (trajectory,) = read_trajectories(write("take.csv", text.replace("t,", "t_ns,", 1))).trajectories
+    steps = np.diff(trajectory.times[1:])
+    np.testing.assert_allclose(steps, 0.011, atol=np.spacing(1.7e18) * 1e-9 if wild != "0" else 1e-15)
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.[ctb][suv][vmh]")), ids=lambda path: path.name)
+def test_other_peoples_recordings_make_sense(path) -> None:
+    for trajectory in read_trajectories(f"{path}:*").trajectories:
+        assert trajectory.warnings == ()

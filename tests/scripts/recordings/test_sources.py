@@ -1,0 +1,192 @@
+"""What the user names: files, bodies in them, and what is told about the rest."""
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
+from rigid_motion_batch.recordings.reading import FORMATS, files_of, split_source
+from rigid_motion_batch.recordings.recordings import listed, unique
+
+CSV = "t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"
+BVH = """HIERARCHY
+ROOT mixamorig:Hips
+{
+OFFSET 0 0 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+JOINT mixamorig:Spine
+{
+OFFSET 0 1 0
+CHANNELS 3 Zrotation Xrotation Yrotation
+}
+}
+MOTION
+Frames: 2
+Frame Time: 0.01
+0 0 0 0 0 0
+0 0 0 0 0 0
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_path_alone_asks_for_no_body(folder: Path) -> None:
+    (folder / "take.csv").write_text(CSV)
+    assert split_source("take.csv") == (Path("take.csv"), None)
+    assert split_source(str(folder / "take.csv")) == (folder / "take.csv", None)
+
+
+@pytest.mark.parametrize("body", ["Drill", "*", "mixamorig:Hips", "", "C:\\x", "a/b"])
+def test_what_follows_the_file_and_a_colon_is_the_body(folder: Path, body: str) -> None:
+    (folder / "take.csv").write_text(CSV)
+    assert split_source(f"take.csv:{body}") == (Path("take.csv"), body)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no colons in file names there")
+def test_a_file_with_a_colon_in_its_name_is_a_file(folder: Path) -> None:
+    (folder / "take.csv").write_text(CSV)
+    (folder / "take.csv:10:30.csv").write_text(CSV)
+    assert split_source("take.csv:10:30.csv") == (Path("take.csv:10:30.csv"), None)
+    assert split_source("take.csv:10:30.csv:Drill") == (Path("take.csv:10:30.csv"), "Drill")
+    assert split_source("take.csv:10") == (Path("take.csv"), "10")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="imitates a Windows path elsewhere")
+@pytest.mark.parametrize("name", ["C:\\x\\take.csv", "c:/x/take.csv"])
+def test_the_letter_of_a_windows_drive_is_no_file(folder: Path, name: str) -> None:
+    (folder / name[0]).write_text(CSV)
+    with pytest.raises(TrajectoryError, match="no such file"):
+        split_source(name)
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(CSV)
+    assert split_source(name) == (Path(name), None)
+    assert split_source(f"{name}:Drill") == (Path(name), "Drill")
+
+
+@pytest.mark.parametrize(
+    "source", ["gone.csv", "gone.csv:Drill", "", ":", ":Drill", "C:\\gone.csv", "a\0b.csv", "x" * 5000]
+)
+def test_a_missing_file_is_told(folder: Path, source: str) -> None:
+    with pytest.raises(TrajectoryError, match="no such file; check the path") as caught:
+        read_trajectories(source)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_told(folder: Path) -> None:
+    with pytest.raises(TrajectoryError, match="a folder without recordings; name a file"):
+        read_trajectories(str(folder))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such files there")
+@pytest.mark.parametrize("body", ["", ":left", ":*"])
+def test_what_is_no_file_is_told_and_never_opened(folder: Path, body: str) -> None:
+    os.mkfifo("pipe.csv")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket.csv")
+        Path("circle.csv").symlink_to("circle.csv")
+        Path("dangling.csv").symlink_to("gone.csv")
+        told = {
+            "pipe.csv": r"this is a pipe \(FIFO\), not a file; write what comes out of it to a file, and name that",
+            "socket.csv": "this is a socket, not a file; write what comes out of it",
+            "/dev/zero": "this is a device, not a file; name a file",
+            "circle.csv": "this is a symbolic link that leads in a circle; name the file itself",
+            "dangling.csv": "this is a symbolic link to 'gone.csv', where nothing is; name the file itself",
+        }
+        for path, problem in told.items():
+            with pytest.raises(TrajectoryError, match=f"^{path}: {problem}"):
+                read_trajectories(f"{path}{body}")
+
+
+def test_an_unknown_extension_is_answered_with_the_known_ones(write, refusal) -> None:
+    _, message = refusal(write("take.usd", "PXR-USDC"))
+    assert message.startswith("unknown extension '.usd'; known are .csv, ")
+    assert all(extension in message for known in FORMATS for extension in known.extensions)
+
+
+def test_a_body_with_colons_in_its_name_is_found(write) -> None:
+    (spine,) = read_trajectories(write("walk.bvh", BVH) + ":mixamorig:Spine").trajectories
+    assert spine.name == "mixamorig:Spine"
+    np.testing.assert_array_equal(spine.poses.positions, [[0, 1, 0]] * 2)
+
+
+def test_a_missing_body_is_answered_with_those_there_are(write, refusal) -> None:
+    _, message = refusal(write("walk.bvh", BVH) + ":Hand")
+    assert message == "no body named 'Hand'; it holds mixamorig:Hips, mixamorig:Spine"
+
+
+HANDS = {"left": -1.0, "right": 1.0}
+
+
+def test_the_note_tells_how_to_get_the_others(write) -> None:
+    rows = "".join(f"{step * 0.01},{device},{x},0,0,0,0,0,1\n" for step in range(9) for device, x in HANDS.items())
+    path = write("log.csv", f"t,device,x,y,z,qx,qy,qz,qw\n{rows}")
+    note = f"{path} holds 2 bodies; took left; others: right; name one with {path}:NAME, all with {path}:*"
+    assert read_trajectories(path).note == note
+
+
+@pytest.mark.parametrize("body", ["mixamorig:Hips", "*"])
+def test_who_names_a_body_needs_no_note(write, body: str) -> None:
+    assert read_trajectories(f"{write('walk.bvh', BVH)}:{body}").note == ""
+
+
+def test_a_name_from_a_file_cannot_reach_the_terminal(write) -> None:
+    recording = read_trajectories(write("walk.bvh", BVH.replace("mixamorig:Spine", "\x1b[2JSpine")))
+    assert recording.note.isprintable()
+
+
+def test_a_file_that_may_not_be_read_is_told(write, refusal, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    path = write("walk.bvh", BVH)
+    monkeypatch.setattr(Path, "open", refuse)
+    assert refusal(path)[1] == "this file cannot be read (Permission denied); check its permissions"
+
+
+def test_names_that_occur_twice_are_numbered_around_those_there_are() -> None:
+    assert unique(["Hand", "Hand", "Hand.001", "Hand"]) == ["Hand", "Hand.002", "Hand.001", "Hand.003"]
+
+
+def test_a_hundred_thousand_equal_names_are_numbered_without_trying_every_number_for_each() -> None:
+    assert unique(["Hand"] * 100_000)[-1] == "Hand.99999"
+
+
+def test_a_list_too_long_to_read_is_cut() -> None:
+    assert listed([str(number) for number in range(100)], limit=3) == "0, 1, 2 and 97 more"
+
+
+def test_text_formats_need_no_blender(write) -> None:
+    """Only .blend does: elsewhere reading works where bpy cannot even be imported."""
+    script = (
+        "import sys; sys.modules['bpy'] = None\n"
+        "from rigid_motion_batch.recordings import read_trajectories, TrajectoryError\n"
+        "for source in sys.argv[1:3]: read_trajectories(source)\n"
+        "try: read_trajectories(sys.argv[3])\n"
+        "except TrajectoryError as error: print(error)\n"
+    )
+    sources = [write("take.csv", CSV), write("walk.bvh", BVH), write("scene.blend", b"BLENDER")]
+    root = Path(__file__).parents[3]
+    result = subprocess.run(
+        [sys.executable, "-c", script, *sources], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() == f"{sources[2]}: this needs Blender; run it in Blender, or pip install bpy"
+
+
+def test_a_folder_stands_for_the_recordings_in_it(tmp_path):
+    for name in ("b.bvh", "a.CSV", "notes.md", "c.glb"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "deeper.csv").mkdir()
+    assert files_of(str(tmp_path)) == [str(tmp_path / name) for name in ("a.CSV", "b.bvh", "c.glb")]
+    assert files_of(str(tmp_path / "b.bvh")) == [str(tmp_path / "b.bvh")]
+    assert files_of(str(tmp_path / "deeper.csv")) == [str(tmp_path / "deeper.csv")]
+    assert files_of("nothing:Body") == ["nothing:Body"]
+    assert files_of("\0") == ["\0"]

@@ -1,0 +1,60 @@
+"""TUM trajectories."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from rigid_motion_batch.recordings.sense import FEWEST
+from tests.thoroughness import tried
+
+COMMENTS = "# ground truth trajectory\n# file: 'dataset.bag'\n# timestamp tx ty tz qx qy qz qw\n"
+ROWS = "1305031098.6659 1.3 0.6 1.6 0.6132 0.5962 -0.3311 -0.3986\n1305031098.6758 1.4 0.7 1.7 0.1 0.2 0.3 0.4\n"
+
+
+@pytest.mark.parametrize("name", ["walk.tum", "walk.txt", "walk.csv"])
+@pytest.mark.parametrize("text", [COMMENTS + ROWS, ROWS, ROWS.replace(" ", "\t"), f"\n{ROWS}\n"])
+def test_eight_numbers_in_a_line_are_time_position_and_scalar_last_quaternion(write, name: str, text: str) -> None:
+    (trajectory,) = read_trajectories(write(name, text)).trajectories
+    assert trajectory.name == "walk"
+    np.testing.assert_array_equal(trajectory.times, [1305031098.6659, 1305031098.6758])
+    np.testing.assert_array_equal(trajectory.poses.positions, [[1.3, 0.6, 1.6], [1.4, 0.7, 1.7]])
+    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [-0.3986, 0.6132, 0.5962, -0.3311])
+    assert trajectory.poses.scales is None
+
+
+def test_a_comment_that_names_another_order_is_believed(write) -> None:
+    text = "# t x y z qw qx qy qz\n0 1 2 3 0.9 0.1 0.2 0.3\n1 1 2 3 0.9 0.1 0.2 0.3\n"
+    (trajectory,) = read_trajectories(write("walk.txt", text)).trajectories
+    np.testing.assert_array_equal(trajectory.poses.quaternions[0], [0.9, 0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "problem"),
+    [
+        ("", None, "the file is empty"),
+        (COMMENTS, None, "'walk' has 0 samples"),
+        (f"{COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
+        (f"{COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
+        (f"{COMMENTS}{ROWS}0.1 1 2 3 0 0 O 1\n", 6, "qz is 'O', not a number"),
+        (f"{ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str, line: int | None, problem: str) -> None:
+    told_line, message = refusal(write("walk.tum", text))
+    assert message.startswith(problem)
+    assert told_line == line
+
+
+@settings(max_examples=tried(60))
+@given(st.lists(st.tuples(*[st.floats(allow_nan=False)] * 8), min_size=2, max_size=FEWEST - 1).map(np.array))
+def test_what_is_written_in_full_precision_comes_back_exactly(
+    tmp_path_factory: pytest.TempPathFactory, table: np.ndarray
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "round_trip.tum"
+    path.write_text("\n".join(" ".join(repr(float(number)) for number in row) for row in table))
+    (trajectory,) = read_trajectories(str(path), ReadingOptions(time_unit="s")).trajectories
+    np.testing.assert_array_equal(trajectory.times, table[:, 0])
+    np.testing.assert_array_equal(trajectory.poses.positions, table[:, 1:4])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, table[:, [7, 4, 5, 6]])

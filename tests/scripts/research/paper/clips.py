@@ -1,0 +1,43 @@
+"""Made-up clips of which it is known what should come out, and the throw of the assets."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import Clip
+
+ASSETS = Path(__file__).resolve().parents[4] / "assets"
+
+
+def clip(name: str, times: np.ndarray, positions: np.ndarray, angles: np.ndarray) -> Clip:
+    """A body at these positions (n, 3) that is turned about z by these angles (n,)."""
+    zero = np.zeros_like(angles)
+    quaternions = np.stack((np.cos(angles / 2.0), zero, zero, np.sin(angles / 2.0)), axis=-1)
+    return Clip(name, f"{name}.csv", "blender", times, Poses(positions, quaternions), ())
+
+
+def circling(name: str = "circling", turns: float = 0.0, *, rate: float = 240.0, seconds: float = 4.0) -> Clip:
+    """A body on a circle of 30 cm, 0.4 times a second round; it turns so many times as much: 1 is a pivot."""
+    times = np.arange(round(rate * seconds) + 1) / rate
+    angles = 2.0 * np.pi * 0.4 * times
+    positions = 0.3 * np.stack((np.cos(angles), np.sin(angles), np.zeros_like(angles)), axis=-1)
+    return clip(name, times, positions, turns * angles)
+
+
+def spinning_straight(name: str = "straight") -> Clip:
+    """A body that turns about z, evenly, while its origin runs straight."""
+    times = np.arange(481) / 120.0
+    positions = np.stack((0.5 * times, np.zeros_like(times), np.zeros_like(times)), axis=-1)
+    return clip(name, times, positions, 3.0 * times)
+
+
+@cache
+def thrown() -> Clip:
+    """A drill that is thrown and caught."""
+    (clip,), _ = read_clips([str(ASSETS / "throw.csv")], "blender")
+    return clip

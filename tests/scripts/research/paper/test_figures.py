@@ -1,0 +1,89 @@
+"""The figures: what they show, in numbers, and that it fits on the sheet."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+from research.paper import claims, picture, strips, triangle
+from research.paper.catching import build, views
+from rigid_motion_batch.scenes.film import render_still
+from tests.scripts.research.paper.clips import thrown
+
+
+def words_on(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
+    """Text to its left, right, foot and top, in pixels from the lower left corner."""
+    bpy.context.view_layer.update()
+    width, height = scene.render.resolution_x, scene.render.resolution_y
+    frame = bpy.data.objects["Frame"].matrix_world.inverted()
+    found = {}
+    for obj in scene.objects:
+        if obj.type == "FONT":
+            corners = np.array([frame @ obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+            left, foot = corners[:, :2].min(axis=0) * height + (width / 2.0, height / 2.0)
+            right, top = corners[:, :2].max(axis=0) * height + (width / 2.0, height / 2.0)
+            found[obj.data.body] = np.array((left, right, foot, top))
+    return found
+
+
+def test_lerp_lags_behind_and_then_overtakes_and_slerp_turns_evenly():
+    steps = triangle.steps()
+    assert len(steps) == 20
+    slerp = np.array([one.slerp_turned_deg for one in steps])
+    lerp = np.array([one.lerp_turned_deg for one in steps])
+    np.testing.assert_allclose(np.diff(slerp), slerp[0], rtol=1e-9)
+    assert np.all(lerp[:10] < slerp[:10])
+    assert np.all(lerp[10:] > slerp[10:])
+
+
+def test_the_tip_rests_under_screws_and_leaves_its_place_under_the_state_of_the_art():
+    instants = strips.instants()
+    assert {one.mode for one in instants} == set(strips.ENGINES)
+    for one in instants:
+        if one.mode != "lerp_slerp" or one.at in (0.0, 1.0):
+            assert one.tip_off_m < 1e-9
+    assert max(one.tip_off_m for one in instants) > 0.05
+
+
+def test_the_triangle_is_in_the_colours_of_the_paper():
+    scene = triangle.build()
+    inks = {obj.name: obj.data.materials[0].name for obj in scene.objects if obj.name.endswith("edges")}
+    assert inks["lerp edges"] == f"Ink {claims.COLOURS['lerp']}"
+    assert inks["slerp edges"] == f"Ink {claims.COLOURS['slerp']}"
+    curves = bpy.data.objects["lerp edges"].data.splines
+    assert len(curves) == triangle.IN_BETWEENS
+
+
+@pytest.mark.parametrize("figure", ["triangle", "strips", "catching"])
+def test_all_words_stand_on_the_sheet_and_are_large_enough_to_read(figure: str):
+    scene = {
+        "triangle": triangle.build,
+        "strips": strips.build,
+        "catching": lambda: build(thrown(), views(thrown()), film=False),
+    }[figure]()
+    assert scene.render.resolution_x == picture.WIDTH
+    words = words_on(scene)
+    assert words
+    for text, (left, right, foot, top) in words.items():
+        assert left >= 0.0, text
+        assert right <= scene.render.resolution_x, text
+        assert foot >= 0.0, text
+        assert top <= scene.render.resolution_y, text
+    sizes = [obj.data.size * scene.render.resolution_y for obj in scene.objects if obj.type == "FONT"]
+    assert min(sizes) >= 6.0 * picture.DOTS_PER_INCH / 72.0 - 1e-3
+
+
+def test_a_picture_is_as_wide_as_a_column_and_has_both_colours(tmp_path):
+    path = tmp_path / "triangle.png"
+    scene = triangle.build()
+    scene.display.render_aa = "OFF"
+    render_still(scene, path)
+    image = bpy.data.images.load(str(path))
+    assert tuple(image.size) == (picture.WIDTH, scene.render.resolution_y)
+    pixels = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
+    for colour in claims.COLOURS.values():
+        wanted = np.array([int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)])
+        assert np.count_nonzero(np.abs(pixels - wanted).max(axis=1) < 0.06) > 500
+    assert np.all(pixels[:: picture.WIDTH] > 0.97)

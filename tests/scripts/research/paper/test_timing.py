@@ -1,0 +1,73 @@
+"""What is raced is the same work, and what is made of the seconds is right. How long it takes is for nobody to test."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from research.paper import claims, timing
+from research.paper.timing import ALGEBRA, AS_GOOD, EQUAL, FAST, PAPER, SINGLE, Work
+from rigid_motion.motion import MODES
+from tests.scripts.research.paper.clips import circling
+
+CLIP = circling(turns=0.7, rate=90.0, seconds=1.0)
+EXACT = [mode for mode in MODES if not MODES[mode].is_smooth]
+
+
+@pytest.mark.parametrize("mode", EXACT)
+def test_all_readings_generate_the_same_frames(mode: str):
+    fast = timing.fast(CLIP, mode, 10.0)
+    arrays = timing.in_the_algebra(CLIP, mode, 10.0)
+    single = timing.one_by_one(CLIP, mode, 10.0)
+    assert fast.frames == arrays.frames == timing.USERS * 90
+    one_user = fast.run().positions[0]
+    np.testing.assert_allclose(arrays.run().positions[:90], one_user, atol=1e-12)
+    np.testing.assert_allclose([pose.positions[0] for pose in single.run()], one_user[: timing.SINGLES], atol=1e-12)
+
+
+def test_everyone_runs_as_often_and_the_turn_to_begin_goes_round():
+    ran: list[str] = []
+    contestants = {name: Work(lambda name=name: ran.append(name), 10) for name in "abc"}
+    wall, processor = timing.race(contestants, 3)
+    firsts = [ran[turn * 3 * (1 + timing.RUNS)] for turn in range(3)]
+    assert firsts == ["a", "b", "c"]
+    assert {name: ran.count(name) for name in "abc"} == dict.fromkeys("abc", 3 * (1 + timing.RUNS))
+    assert all(len(seconds) == 3 for seconds in (*wall.values(), *processor.values()))
+
+
+def test_engines_are_held_against_the_state_of_the_art_of_the_same_round():
+    pace = np.array([1.0, 10.0, 1.0, 10.0, 1.0])  # The machine slows down every other round.
+    assert timing.compared(0.8 * pace, pace) == pytest.approx((0.8, 0.8, 0.8))
+
+
+def test_the_interval_holds_the_ratio_and_narrows_with_more_rounds():
+    random = np.random.default_rng(3)
+
+    def interval(rounds: int) -> tuple[float, float, float]:
+        return timing.compared(0.9 * random.lognormal(0.0, 0.05, rounds), np.ones(rounds))
+
+    few, many = interval(10), interval(400)
+    assert few[1] <= few[0] <= few[2]
+    assert many[1] < 0.9 < many[2]
+    assert many[2] - many[1] < few[2] - few[1]
+
+
+def test_the_races_have_every_mode_at_the_rates_that_were_asked_for(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(timing, "USERS", 2)
+    rounds = []
+    needed = {30: {"lerp_slerp": 29.0, "dq_sclerp": 25.0, "motor_spline": 19.0}, 12: {"pga_lerp": 11.0}}
+    found = timing.races(CLIP, needed, 2, lambda: rounds.append(1))
+    races: dict[tuple[str, str, float], dict[str, float]] = {}
+    for one in found:
+        races.setdefault((one.reading, one.pace, one.reference_updates), {})[one.mode] = one.updates
+        assert one.seconds > 0.0
+        assert one.relative == 1.0 or one.mode != "lerp_slerp"
+    for row in claims.TABLE:
+        rate = row.state_of_the_art
+        assert races[FAST, EQUAL, rate] == dict.fromkeys(MODES, rate)
+        others = dict.fromkeys((mode for mode in EXACT if mode != "lerp_slerp"), row.multivectors)
+        assert races[FAST, PAPER, rate] == {"lerp_slerp": rate} | others
+    assert races[FAST, AS_GOOD, 30] == {"lerp_slerp": 30.0, "dq_sclerp": 25.0, "motor_spline": 19.0}
+    assert races[FAST, AS_GOOD, 12] == {"lerp_slerp": 12.0, "pga_lerp": 11.0}
+    assert races[ALGEBRA, EQUAL, 30] == races[SINGLE, EQUAL, 30] == dict.fromkeys(EXACT, 30.0)
+    assert len(rounds) == 2 * timing.RACES

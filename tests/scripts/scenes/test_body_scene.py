@@ -1,0 +1,330 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+from scipy.spatial.transform import Rotation
+
+from rigid_motion import animation
+from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.palette import full_colour
+from rigid_motion_batch.scenes.armature import Rest, Rig
+from rigid_motion_batch.scenes.bodies import ERROR, SHADES, flashes
+from rigid_motion_batch.scenes.body_scene import build_body_stage
+from rigid_motion_batch.scenes.film import save_blend
+from rigid_motion_batch.scenes.physique import BONE
+from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.timeline import Timeline
+from tests.scripts.comparison.dancers import JOINTS, dancing_clip
+from tests.scripts.scenes.test_scene import evaluated_points
+from tests.thoroughness import sample
+
+SETTINGS = StageSettings(resolution=(160, 90), fps=24)
+TWO = ("lerp_slerp", "motor_spline")
+RADIUS = 0.03
+RADII = np.full(len(JOINTS), RADIUS)
+
+
+def made_of(clip, modes=TWO, rate="5") -> BodyReconstruction:
+    made = reconstruct_body(clip, Uniform(rate), modes, RADIUS)
+    assert made is not None
+    return made
+
+
+def timeline_of(made: BodyReconstruction) -> Timeline:
+    return Timeline.between(float(made.times[0]), float(made.times[-1]), SETTINGS.fps, SETTINGS.slow_motion)
+
+
+def bones_of_joints() -> list[str]:
+    """What the bones of the joints are called; Blender has an order of its own."""
+    return [group.name for group in bpy.data.objects["lerp_slerp keys"].vertex_groups]
+
+
+def seen(rig: bpy.types.Object, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the joints are that bones are turned from, in the space of the armature, as Blender shows them now."""
+    evaluated = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    matrices = np.array([evaluated.pose.bones[bone].matrix for bone in bones_of_joints()])
+    quaternions = Rotation.from_matrix(matrices[:, :3, :3]) * Rotation.from_quat(turns, scalar_first=True).inv()
+    return matrices[:, :3, 3], quaternions.as_quat(scalar_first=True)
+
+
+def turns_of(rig: bpy.types.Object, rest: Rest) -> np.ndarray:
+    """How bones are turned from their joints."""
+    bones = np.array([rig.data.bones[bone].matrix_local for bone in bones_of_joints()])[:, :3, :3]
+    joints = Rotation.from_quat(rest.joints.quaternions, scalar_first=True)
+    return (joints.inv() * Rotation.from_matrix(bones)).as_quat(scalar_first=True)
+
+
+def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple[str, ...]) -> None:
+    timeline = timeline_of(made)
+    times = timeline.times_of(timeline.frames)
+    centre = np.array(scene["recording_centre_m"])
+    clip = made.clip
+    rest = Rest.of(clip.figure, clip.metres_per_unit, clip.axes)
+    wanted = {mode: to_blender(made.shown(mode, times), clip.axes) for mode in modes}
+    turns = {mode: turns_of(bpy.data.objects[mode], rest) for mode in modes}
+    columns = [np.interp(times, clip.times, column) for column in clip.poses.positions[0].T]
+    root = to_blender(clip.in_metres(Poses(np.stack(columns, axis=-1), np.zeros((len(times), 4)))), clip.axes).positions
+    for number, frame in enumerate(timeline.frames.astype(int).tolist()):
+        scene.frame_set(frame)
+        for mode in modes:
+            places, quaternions = seen(bpy.data.objects[mode], turns[mode])
+            assert np.abs(places + centre - wanted[mode].positions[:, number]).max() < 2e-5
+            assert angle_between(quaternions, wanted[mode].quaternions[:, number]).max() < 2e-4
+        places, _ = seen(bpy.data.objects[f"{modes[0]} recording"], turns[modes[0]])
+        assert np.abs(places[0] + centre - root[number]).max() < 2e-4
+
+
+@pytest.mark.parametrize(("axes", "metres_per_unit"), [("blender", 1.0), ("opengl", 0.01), ("unity", 0.0254)])
+def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes, metres_per_unit):
+    modes = tuple(MODES)
+    made = made_of(dancing_clip(axes=axes, metres_per_unit=metres_per_unit), modes)
+    assert_played(made, build_body_stage(made, SETTINGS, RADII), modes)
+
+
+def test_keys_between_frames_and_of_each_joint_its_own_are_played_too():
+    clip = dancing_clip(rate=97.0)
+    made = reconstruct_body(clip, Tolerance("0.02"), TWO, RADIUS)
+    assert len({len(own) for own in made.keys["lerp_slerp"]}) > 1
+    assert_played(made, build_body_stage(made, SETTINGS, RADII), TWO)
+
+
+def test_bones_have_the_keys_that_were_kept_and_their_mode(tmp_path):
+    made = made_of(dancing_clip(still=[2]))
+    build_body_stage(made, SETTINGS, RADII)
+    save_blend(tmp_path / "stage.blend")
+    assert not hasattr(bpy.types.PoseBone, "rigid_motion")
+    animation.register()
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "stage.blend"))
+        for mode in TWO:
+            for joint, name in enumerate(JOINTS):
+                bone = bpy.data.objects[mode].pose.bones[name]
+                keys = animation.key_frames(bone)
+                if joint == 2:
+                    assert not len(keys)
+                    continue
+                wanted = timeline_of(made).frames_of(made.clip.times[made.keys[mode][joint]])
+                assert keys == pytest.approx(wanted, abs=1e-3)
+                assert set(animation.modes_of(bone, keys[:-1])) == {mode}
+    finally:
+        animation.unregister()
+
+
+def test_the_saved_file_plays_without_the_extension(tmp_path):
+    made = made_of(dancing_clip())
+    build_body_stage(made, SETTINGS, RADII)
+    save_blend(tmp_path / "stage.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "stage.blend"), use_scripts=False)
+    assert not hasattr(bpy.types.PoseBone, "rigid_motion")
+    assert_played(made, bpy.context.scene, TWO)
+
+
+def test_the_extension_stays_where_it_was_there_before():
+    animation.register()
+    try:
+        build_body_stage(made_of(dancing_clip()), SETTINGS, RADII)
+        assert hasattr(bpy.types.PoseBone, "rigid_motion")
+    finally:
+        animation.unregister()
+
+
+def errors_at(made: BodyReconstruction, mode: str, frame: int) -> np.ndarray:
+    """How far any point of the ball at each joint is off, tried with many points."""
+    time = np.atleast_1d(timeline_of(made).times_of(np.array(float(frame))))
+    number = int(np.searchsorted(made.clip.times, time[0] - 1e-9))
+    assert made.clip.times[number] == pytest.approx(time[0])
+    shown, truth = made.shown(mode, time)[:, 0], made.truth(slice(number, number + 1))[:, 0]
+    random = np.random.default_rng(0).normal(size=(4000, 3))
+    ball = RADIUS * random / np.linalg.norm(random, axis=1, keepdims=True)
+
+    def points(poses: Poses) -> np.ndarray:
+        turns = Rotation.from_quat(poses.quaternions, scalar_first=True).as_matrix()
+        return np.einsum("jab,pb->jpa", turns, ball) + poses.positions[:, None]
+
+    return np.linalg.norm(points(shown) - points(truth), axis=-1).max(axis=1)
+
+
+@pytest.mark.parametrize("skin", [False, True], ids=["solids", "skin"])
+def test_the_colour_of_each_face_is_that_of_its_joints_error(skin):
+    # Every frame shows a sample.
+    made = made_of(dancing_clip(rate=48.0, skin=skin))
+    scene = build_body_stage(made, SETTINGS, RADII)
+    materials = bpy.data.objects["lerp_slerp figure"].data.materials
+    full = float(materials[SHADES - 1].name.split()[1]) * 1e-3
+    for mode in TWO:
+        for frame in (1, 4, 9, 15):
+            scene.frame_set(frame)
+            wanted = errors_at(made, mode, frame) / full * SHADES
+            figure = bpy.data.objects[f"{mode} figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+            bones = [face.value for face in figure.data.attributes[BONE].data]
+            assert set(bones) == set(range(len(JOINTS)))
+            for bone, face in zip(bones, figure.data.polygons, strict=True):
+                assert face.material_index == pytest.approx(min(max(wanted[bone] - 0.5, 0), SHADES - 1), abs=0.6)
+
+
+def test_full_colour_is_nearly_the_largest_error():
+    errors = np.append(np.linspace(0.0, 1.0, 10_001), 50.0)
+    assert full_colour([errors]) == pytest.approx(0.995, abs=1e-3)
+    assert full_colour([np.zeros(5)]) == 1.0
+    assert full_colour([np.append(np.zeros(5000), 3.0)]) == 3.0
+
+
+def instances_of(name: str) -> list[np.ndarray]:
+    """Where the instances of an object are."""
+    return [
+        np.array(one.matrix_world.translation)
+        for one in bpy.context.evaluated_depsgraph_get().object_instances
+        if one.is_instance and one.parent.name == name
+    ]
+
+
+def in_picture(scene: bpy.types.Scene, place: np.ndarray) -> np.ndarray:
+    return np.array(world_to_camera_view(scene, scene.camera, Vector(place)))[:2]
+
+
+def test_joints_flash_at_their_keys_and_the_worst_has_the_ring():
+    made = made_of(dancing_clip(still=[1], rate=48.0))
+    scene = build_body_stage(made, SETTINGS, RADII)
+    frames = timeline_of(made).frames_of(made.clip.times[made.keys["lerp_slerp"][0]])
+    scene.frame_set(int(frames[1]))
+    assert len(instances_of("lerp_slerp keys")) == len(JOINTS) - 1
+    between = int(frames[2]) - 1
+    scene.frame_set(between)
+    assert not instances_of("lerp_slerp keys")
+    (ring,) = instances_of("lerp_slerp worst joint")
+    worst = int(errors_at(made, "lerp_slerp", between).argmax())
+    rig = bpy.data.objects["lerp_slerp"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    joint = np.array(rig.matrix_world @ rig.pose.bones[JOINTS[worst]].head)
+    # Nearer to the camera, and at the same place of the picture.
+    assert np.abs(in_picture(scene, ring) - in_picture(scene, joint)).max() < 1e-4
+    assert np.linalg.norm(ring - joint) > 0.1
+
+
+def test_flashes_fade_and_begin_with_the_key():
+    found = flashes([np.array([2.0, 6.5]), np.array([3.0])], np.arange(1.0, 11.0), 4.0)
+    assert found[0] == pytest.approx([0.0, 1.0, 0.75, 0.5, 0.25, 0.0, 0.875, 0.625, 0.375, 0.125])
+    assert not found[1].any()
+
+
+def text_of(name: str) -> str:
+    """What a node group writes now, by the width of it: among the names of joints no two are equally wide."""
+    obj = bpy.data.objects[name]
+    width = np.ptp(evaluated_points(obj)[:, 0]) / obj.matrix_world.to_scale().x
+    widths = {}
+    for joint in JOINTS:
+        font = bpy.data.curves.new("Measured", "FONT")
+        font.body = joint
+        measured = bpy.data.objects.new("Measured", font)
+        bpy.context.scene.collection.objects.link(measured)
+        bpy.context.view_layer.update()
+        widths[joint] = measured.dimensions.x
+        bpy.data.curves.remove(font)
+    return min(widths, key=lambda joint: abs(widths[joint] - width))
+
+
+def test_the_joint_of_the_number_is_named():
+    made = made_of(dancing_clip(rate=48.0))
+    scene = build_body_stage(made, SETTINGS, RADII)
+    named = set()
+    for frame in (3, 4, 8, 9, 13, 18, 24):
+        errors = errors_at(made, "motor_spline", frame)
+        scene.frame_set(frame)
+        if errors.max() > 1.05 * np.sort(errors)[-2]:
+            named.add(JOINTS[int(errors.argmax())])
+            assert text_of("motor_spline joint") == JOINTS[int(errors.argmax())]
+    assert len(named) > 1
+
+
+def test_a_skin_is_carried_as_linear_blending_does():
+    made = made_of(dancing_clip(skin=True, axes="opengl", metres_per_unit=0.01))
+    clip = made.clip
+    scene = build_body_stage(made, SETTINGS, RADII)
+    scene.frame_set(9)
+    centre = np.array(scene["recording_centre_m"])
+    time = timeline_of(made).times_of(np.array([9.0]))
+    skin = clip.figure.skin
+    shown = made.shown("lerp_slerp", time)[:, 0]
+    rest = clip.in_metres(clip.figure.rest)
+    turns, still = (Rotation.from_quat(some.quaternions, scalar_first=True).as_matrix() for some in (shown, rest))
+    vertices = skin.vertices * clip.metres_per_unit
+    wanted = np.zeros_like(vertices)
+    for column in range(4):
+        bones = skin.joints[:, column]
+        arms = np.einsum("vba,vb->va", still[bones], vertices - rest.positions[bones])
+        moved = np.einsum("vab,vb->va", turns[bones], arms) + shown.positions[bones]
+        wanted += skin.weights[:, column, None] * moved
+    wanted = wanted @ np.array(((1, 0, 0), (0, 0, -1), (0, 1, 0))).T - centre
+    figure = bpy.data.objects["lerp_slerp figure"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    found = np.array([vertex.co for vertex in figure.data.vertices])
+    assert np.abs(found - wanted).max() < 1e-4
+
+
+HOSTILE = ("a" * 300, "a" * 299, 'quo"te\\', "['x']", "", "Kopf\n<b>\u00e4")
+
+
+def test_hostile_names_of_joints_are_names_of_bones():
+    made = made_of(dancing_clip(joints=HOSTILE))
+    assert_played(made, build_body_stage(made, SETTINGS, RADII), TWO)
+    assert len(bpy.data.objects["lerp_slerp"].pose.bones) == len(HOSTILE)
+
+
+def test_a_body_that_stands_still_has_a_film():
+    made = made_of(dancing_clip(still=range(len(JOINTS))))
+    scene = build_body_stage(made, SETTINGS, RADII)
+    scene.frame_set(5)
+    assert not instances_of("lerp_slerp worst joint")
+
+
+@pytest.mark.parametrize("walked", [0.0, 12.0])
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
+def test_bodies_stay_within_their_cards(walked, modes):
+    made = made_of(dancing_clip(walked=walked), modes)
+    scene = build_body_stage(made, SETTINGS, RADII)
+    for frame in sample(range(1, scene.frame_end + 1, 3)):
+        scene.frame_set(frame)
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        for mode in modes:
+            card = bpy.data.objects[f"{mode} card"]
+            corners = np.array([in_picture(scene, card.matrix_world @ vertex.co) for vertex in card.data.vertices])
+            for name in (f"{mode} figure", f"{mode} recording figure"):
+                figure = bpy.data.objects[name].evaluated_get(depsgraph)
+                points = np.array([in_picture(scene, figure.matrix_world @ v.co) for v in figure.data.vertices])
+                assert (points >= corners.min(axis=0)).all()
+                assert (points <= corners.max(axis=0)).all()
+
+
+def test_channels_and_joints_lead_to_each_other():
+    clip = dancing_clip(axes="unity")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    rest = Rest.of(clip.figure, 1.0, clip.axes)
+    rig = Rig("Rig", rest, clip.figure.joints, bpy.context.scene.collection)
+    joints = to_blender(clip.poses, clip.axes)
+    back = rig.joints_of(rig.channels_of(joints))
+    assert np.abs(back.positions - joints.positions).max() < 1e-12
+    assert angle_between(back.quaternions, joints.quaternions).max() < 1e-7
+
+
+def test_errors_are_stored_frame_by_frame():
+    made = made_of(dancing_clip(rate=48.0))
+    build_body_stage(made, SETTINGS, RADII)
+    stored = bpy.data.objects["lerp_slerp errors"].data.attributes[ERROR].data
+    own = [stored[8 * len(JOINTS) + joint].value for joint in range(len(JOINTS))]
+    assert own == pytest.approx(errors_at(made, "lerp_slerp", 9), abs=2e-4)
+
+
+def test_a_stage_is_the_same_when_made_again(tmp_path: Path):
+    made = made_of(dancing_clip())
+    names = []
+    for _ in range(2):
+        build_body_stage(made, SETTINGS, RADII)
+        names.append(sorted(block.name for block in bpy.data.user_map()))
+    assert names[0] == names[1]

@@ -1,0 +1,332 @@
+"""Whole bodies beside Blender's Decimate: on a leg that swings as it goes, with a foot that is fixed to it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_body
+from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, SHARED, KeysOfBody
+from rigid_motion_batch.analysis.body_metrics import measure_modes
+from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.cli import compare
+from rigid_motion_batch.cli.job_bundle import _kind_of
+from rigid_motion_batch.comparison import steps
+from rigid_motion_batch.comparison.planning import MOST_DECIMATED, Study, comparison_tasks, reading_tasks
+from rigid_motion_batch.comparison.report.decimated_table import decimated_table
+from rigid_motion_batch.comparison.storage import ClipReference
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import Figure
+from rigid_motion_batch.scenes import decimated_bodies, graph_decimate
+from rigid_motion_batch.scenes.decimated_bodies import Decimations, Left
+from rigid_motion_batch.scenes.decimating import DecimatedBody, beside_decimate, frames_of
+from rigid_motion_batch.workplan import Task
+from tests.balls import largest_displacements
+from tests.scripts.comparison.test_planning import WANTED
+
+RADIUS = np.array((0.03, 0.05, 0.02, 0.03))
+
+MODES = ("lerp_slerp", "motor_spline")
+
+COLUMNS = "clip,mode,how,rate_hz,frames_with_keys,keys,numbers,max_shell_m,decimation,tolerance_m"
+
+JOINTS = ("Hip", "Knee", "Foot", 'A "bone" of\\any name')
+
+PARENTS = np.array((-1, 0, 1, 0))
+
+
+def leg(name: str = "leg", samples: int = 40) -> Clip:
+    """In centimetres, y upwards."""
+    times = 12.5 + np.arange(samples) / 30.0
+    places = np.tile(np.array(((0.0, 90.0, 0.0), (0, -45, 0), (0, -45, 0), (10, 0, 0)))[:, None], (1, samples, 1))
+    places[0, :, 2] += 60.0 * np.sin(2.0 * times)
+    axes = np.array(((1.0, 0.2, 0.0), (1.0, 0.0, 0.3), (0.0, 1.0, 0.0), (0.0, 0.5, 1.0)))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    angles = np.array((0.7, 1.1, 0.0, 0.5))[:, None] * np.sin(np.array((5.0, 7.0, 0.0, 3.0))[:, None] * times)
+    turns = np.concatenate((np.cos(angles / 2)[..., None], np.sin(angles / 2)[..., None] * axes[:, None]), axis=-1)
+    poses = Poses(places, turns)
+    tails = np.tile((0.0, -20.0, 0.0), (4, 1))
+    figure = Figure(JOINTS, PARENTS, poses[:, 0], tails)
+    rest = figure.skeleton.in_root_space(poses[:, 0])
+    return Clip(name, f"{name}.bvh", "opengl", times, poses, (), 0.01, figure=replace(figure, rest=rest))
+
+
+def made_of(clip: Clip, *, shared: bool = False, tolerance: str = "1cm") -> BodyReconstruction:
+    return reconstruct_body(clip, Tolerance(tolerance), MODES, RADIUS, shared=shared)
+
+
+def in_world(clip: Clip) -> np.ndarray:
+    """Matrices of all joints in Blender's axes and metres, by hand, shape (n, joints, 4, 4)."""
+    axes, samples = AXES[clip.axes], len(clip.times)
+    world = np.tile(np.eye(4), (samples, len(JOINTS), 1, 1))
+    for joint, parent in enumerate(PARENTS):
+        own = np.tile(np.eye(4), (samples, 1, 1))
+        own[:, :3, :3] = Rotation.from_quat(clip.poses.quaternions[joint], scalar_first=True).as_matrix()
+        own[:, :3, 3] = clip.poses.positions[joint] * clip.metres_per_unit
+        world[:, joint] = own if parent < 0 else world[:, parent] @ own
+    world[..., :3, :3] = axes @ world[..., :3, :3] @ axes.T
+    world[..., :3, 3] = world[..., :3, 3] @ axes.T
+    return world
+
+
+def as_blender_shows(body: DecimatedBody) -> np.ndarray:
+    """Matrices of all bones in the world, frame by frame, shape (n, joints, 4, 4)."""
+    shown = []
+    for frame in body.frames:
+        bpy.context.scene.frame_set(int(frame))
+        rig = body.rig.obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        shown.append([np.array(rig.matrix_world @ rig.pose.bones[name].matrix) for name in body.rig.bones])
+    return np.array(shown)
+
+
+def errors_by_hand(shown: np.ndarray, recorded: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """How far off bones are, shape (joints, n): a bone is turned from its joint, and the stage has its own origin."""
+    from_bone = np.linalg.inv(recorded[0, :, :3, :3]) @ truth[0, :, :3, :3]
+    origin = recorded[0, 0, :3, 3] - truth[0, 0, :3, 3]
+    turns = shown[..., :3, :3] @ from_bone - truth[..., :3, :3]
+    offsets = shown[..., :3, 3] - origin - truth[..., :3, 3]
+    return np.array([largest_displacements(offsets[:, j], RADIUS[j] * turns[:, j]) for j in range(len(JOINTS))])
+
+
+def test_errors_of_decimated_curves_are_those_of_what_blender_shows() -> None:
+    clip = leg()
+    body, truth = DecimatedBody(made_of(clip), RADIUS), in_world(clip)
+    recorded = as_blender_shows(body)
+    assert body.errors().max() < 1e-6
+    assert errors_by_hand(recorded, recorded, truth).max() < 2e-6
+    for margin in (0.003, 0.05):
+        graph_decimate.decimate(body.rig.obj, mode="ERROR", remove_error_margin=margin)
+        found = errors_by_hand(as_blender_shows(body), recorded, truth)
+        np.testing.assert_allclose(body.errors(), found, atol=3e-6)
+        assert body.left().largest == pytest.approx(found.max(), abs=3e-6)
+        assert found.max() > 1e-3
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_decimate_is_held_to_our_largest_error_and_all_is_counted(monkeypatch, shared: bool) -> None:
+    tried: list[Left] = []
+    left = DecimatedBody.left
+
+    def counted(body: DecimatedBody) -> Left:
+        curves = body.rig.obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+        still = {(curve.data_path, curve.array_index) for curve in curves} - body._counted
+        keys = [
+            [key.co.x for key in curve.keyframe_points]
+            for curve in curves
+            if (curve.data_path, curve.array_index) not in still
+        ]
+        tried.append(left(body))
+        assert tried[-1].keys == sum(map(len, keys))
+        assert tried[-1].frames == len({frame for own in keys for frame in own})
+        assert tried[-1].numbers == 6 * tried[-1].keys
+        return tried[-1]
+
+    monkeypatch.setattr(DecimatedBody, "left", counted)
+    made = made_of(leg(), shared=shared)
+    measured = measure_modes(made, RADIUS)
+    rows = beside_decimate(made, RADIUS, measured.rows)
+    how = SHARED if shared else OWN
+    assert [(row.mode, row.how) for row in rows] == [(mode, one) for mode in MODES for one in (how, DECIMATE)]
+    for own, theirs, metrics in zip(rows[::2], rows[1::2], measured.rows, strict=True):
+        keys = [joint for joint in made.keys[own.mode] if len(joint) > 1]
+        assert own.frames_with_keys == len(set(np.concatenate(keys).tolist()))
+        assert own.keys == metrics.keys
+        # The hip moves and turns, two others turn; of key poses the time is there once.
+        channels = sum(len(joint) * (7 if number == 0 else 4) for number, joint in enumerate(keys))
+        assert own.numbers == channels + (len(keys[0]) if shared else sum(map(len, keys)))
+        assert own.max_shell_m == metrics.max_shell_m
+        assert 0.0 < theirs.max_shell_m <= own.max_shell_m
+        found = Left(DECIMATE, theirs.frames_with_keys, theirs.keys, theirs.numbers, theirs.max_shell_m)
+        assert found in tried
+        assert found.keys == min(one.keys for one in tried if one.largest <= own.max_shell_m)
+        assert found.keys < max(one.keys for one in tried)
+
+
+def test_only_channels_that_vary_are_counted() -> None:
+    clip = leg(samples=12)
+    body = DecimatedBody(made_of(clip), RADIUS)
+    values = decimated_bodies.values_of(body.rig.obj, body.frames)
+    vary = [curve for curve, own in values.items() if np.ptp(own) > 1e-4]
+    assert 0 < len(vary) < len(values)
+    assert body.left() == Left(DECIMATE, 12, 12 * len(vary), 6 * 12 * len(vary), body.errors().max())
+
+
+def test_a_body_that_stays_and_an_error_beyond_single_precision_have_no_row_of_decimate() -> None:
+    clip = leg(samples=10)
+    still = replace(clip, poses=Poses(clip.poses.positions[:, [0] * 10], clip.poses.quaternions[:, [0] * 10]))
+    made = made_of(still)
+    assert [row.how for row in beside_decimate(made, RADIUS, measure_modes(made, RADIUS).rows)] == [OWN, OWN]
+    every = BodyReconstruction(clip, Tolerance("1cm"), dict.fromkeys(MODES, (np.arange(10),) * 4), shared=False)
+    rows = beside_decimate(every, RADIUS, measure_modes(every, RADIUS).rows)
+    assert [row.how for row in rows] == [OWN, OWN]
+    assert "not reached" in decimated_table("leg", rows, (MODES,))
+
+
+def test_samples_are_on_whole_frames_where_they_are_even() -> None:
+    even = 100.0 + np.arange(50) / 29.97
+    assert frames_of(even).tolist() == list(range(1, 51))
+    assert frames_of(np.round(even, 3)).tolist() == list(range(1, 51))
+    uneven = np.delete(even, (3, 4, 20))
+    np.testing.assert_allclose(frames_of(uneven), 1.0 + (uneven - uneven[0]) * 29.97, rtol=1e-6)
+    with pytest.raises(RuntimeError, match=r"too close for Blender's frames, at 101 s"):
+        frames_of(np.array((100.0, 101.0, 101.0 + 1e-9, 102.0, 103.0)))
+
+
+def test_uneven_samples_are_decimated_as_well() -> None:
+    clip = leg(samples=30)
+    kept = np.delete(np.arange(30), (4, 5, 11, 20))
+    made = made_of(replace(clip, times=clip.times[kept], poses=clip.poses[:, kept]))
+    body = DecimatedBody(made, RADIUS)
+    assert body.errors().max() < 1e-6
+    found = body.within(0.02)
+    assert 0.0 < found.largest <= 0.02
+    assert found.frames <= len(kept)
+
+
+def test_what_was_tried_for_one_error_is_known_for_the_next(monkeypatch) -> None:
+    obj = bpy.data.objects.new("carrier", None)
+    obj.animation_data_create().action = recorded = bpy.data.actions.new("recorded")
+    margins = []
+
+    def decimate(_obj: object, *, mode: str, remove_error_margin: float) -> None:
+        assert mode == "ERROR"
+        margins.append(remove_error_margin)
+
+    def seen() -> Left:
+        """Keys are the fewer, and errors the larger, the larger the margin is."""
+        assert obj.animation_data.action != recorded
+        return Left(DECIMATE, 1, int(100.0 / margins[-1] ** 0.5), 1, 3.0 * margins[-1] ** 1.3)
+
+    monkeypatch.setattr(decimated_bodies, "decimate", decimate)
+    decimations = Decimations(obj, seen)
+    first = decimations.within(0.01)
+    assert 0.98 * 0.01 <= first.largest <= 0.01
+    count = len(margins)
+    assert count <= 6
+    assert decimations.within(1.001 * first.largest) == first
+    assert len(margins) == count
+    assert decimations.within(1e-12) is None
+    assert decimations.within(1e9).largest > 50.0
+    assert len(margins) <= 4 * decimated_bodies.TRIALS
+    assert obj.animation_data.action == recorded
+    assert not [action for action in bpy.data.actions if action.name.startswith("recorded.")]
+
+
+# -- the plan, the table, the report ----------------------------------------------------------------------------------
+
+
+def tasks(joints: int, samples: int = 270) -> dict[str, Task]:
+    (read,) = reading_tasks(["walk.bvh"], "opengl")
+    choices = (Uniform("5"), Budget("5"), Tolerance("5mm"))
+    clip = ClipReference("walk", read.arguments["recording"], 0)
+    study = Study(clip, samples, dict.fromkeys(choices, (0.0, 3.0)), joints)
+    said = "not compared with Blender's Decimate" in study.not_decimated
+    assert said == (joints * samples > MOST_DECIMATED)
+    wanted = replace(WANTED, choices=choices, stage=None)
+    return {task.name: task for task in comparison_tasks([study], [read], wanted)}
+
+
+def test_only_bodies_with_adaptive_keys_are_decimated() -> None:
+    of_body, rigid, long = tasks(4), tasks(0), tasks(60, 20_000)
+    names = {"decimate walk/budget-5", "decimate walk/tolerance-5mm"}
+    assert {name for name in of_body if name.startswith("decimate")} == {*names, steps.DECIMATED}
+    assert names <= set(of_body[steps.REPORT].after)
+    assert names < set(of_body[steps.DECIMATED].after)
+    assert "measure walk/budget-5" in of_body["decimate walk/budget-5"].after
+    for others in (rigid, long):
+        assert not [name for name in others if name.startswith("decimate")]
+    assert {_kind_of(name)[0] for name in names} == {"Decimate"}
+
+
+def row(how: str, mode: str, **values: object) -> KeysOfBody:
+    standard = {"clip": "walk", "rate_hz": "", "frames_with_keys": 20, "keys": 50, "numbers": 300}
+    standard |= {"max_shell_m": 0.005, "decimation": "adaptive", "tolerance_m": 0.005}
+    return KeysOfBody(mode=mode, how=how, **{**standard, **values})
+
+
+def test_modes_that_decimate_is_held_to_alike_share_its_row() -> None:
+    theirs = {"frames_with_keys": 30, "keys": 150, "numbers": 900, "max_shell_m": 0.0045}
+    rows = [
+        *(row(OWN, "lerp_slerp"), row(DECIMATE, "lerp_slerp", **theirs)),
+        *(row(OWN, "motor_spline", numbers=200), row(DECIMATE, "motor_spline", **theirs)),
+    ]
+    groups = (("lerp_slerp",), ("motor_spline",))
+    shown = decimated_table("<walk> within 5 mm", rows, groups)
+    assert "&lt;walk&gt; within 5 mm" in shown
+    assert "<walk>" not in shown
+    text = [cell for cell in re.sub("<[^>]+>", "|", shown).split("|") if cell]
+    assert text.count("Blender&#x27;s Decimate") == 1
+    assert [text.count(cell) for cell in ("1.50", "3.00", "4.50", "900", "4.50")] == [2, 1, 2, 1, 2]
+    other = [*rows[:3], row(DECIMATE, "motor_spline", **{**theirs, "keys": 140})]
+    assert decimated_table("walk", other, groups).count(", beside ") == 2 * 2
+
+
+HOSTILE = """HIERARCHY
+ROOT <b>Hip&"
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT </table><script>alert(1)</script>
+  {
+    OFFSET 0 -50 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 -50 0
+    }
+  }
+}
+MOTION
+Frames: 30
+Frame Time: 0.0333333
+"""
+
+
+def test_a_run_has_the_table_in_its_report_and_goes_on_without_it(tmp_path: Path, monkeypatch, capfd) -> None:
+    source, output = tmp_path / "<i>leg&.bvh", tmp_path / "output"
+    rows = [f"{n} {90 + n % 5} 0 {40 * np.sin(n / 5):.3f} {n} 0 {50 * np.cos(n / 4):.3f} 0 0" for n in range(30)]
+    source.write_text(HOSTILE + "\n".join(rows) + "\n", encoding="utf-8")
+    adaptive = ["--decimate", "adaptive", "--tolerance", "1cm", "--rates", "5", "--modes", "lerp_slerp,motor_spline"]
+    command = ["--jobs", "0", str(source), *adaptive, "--no-video", "--output", str(output)]
+    assert compare.main(command) == 0
+    page = (output / "report.html").read_text(encoding="utf-8")
+    assert page.count("Beside Blender&#x27;s Decimate, at the same largest error") == 1
+    assert "<script>alert" not in page
+    assert "<i>leg" not in page
+    with (output / steps.DECIMATED).open(encoding="utf-8", newline="") as stream:
+        table = list(csv.DictReader(stream))
+    assert ",".join(table[0]) == COLUMNS
+    assert [(line["mode"], line["how"]) for line in table] == [(mode, how) for mode in MODES for how in (OWN, DECIMATE)]
+    with (output / "metrics.csv").open(encoding="utf-8", newline="") as stream:
+        metrics = {line["mode"]: line for line in csv.DictReader(stream) if line["decimation"] == "adaptive"}
+    for own, theirs in zip(table[::2], table[1::2], strict=True):
+        measured = metrics[own["mode"]]
+        assert [own[name] for name in ("keys", "max_shell_m", "clip")] == [
+            measured[name] for name in ("keys", "max_shell_m", "clip")
+        ]
+        assert own["frames_with_keys"] == measured["key_frames"]
+        assert float(theirs["max_shell_m"]) <= float(own["max_shell_m"]) <= 0.01
+        assert float(own["tolerance_m"]) == 0.01
+
+    def without_window(*_: object, **__: object) -> None:
+        raise RuntimeError("Error: no\nwindow")
+
+    monkeypatch.setattr(decimated_bodies, "decimate", without_window)
+    capfd.readouterr()
+    assert compare.main([*command, "--force"]) == 1
+    said = capfd.readouterr().err
+    assert "within 1 cm: not compared with Blender's Decimate: Error: no window" in said
+    assert "Traceback" not in said
+    assert "Beside Blender" not in (output / "report.html").read_text(encoding="utf-8")
+    assert (output / steps.DECIMATED).read_text(encoding="utf-8") == f"{COLUMNS}\n"
+    assert compare.main(["--jobs", "0", str(source), "--rates", "5", "--no-video", "--output", str(output)]) == 0
+    assert not (output / steps.DECIMATED).exists()

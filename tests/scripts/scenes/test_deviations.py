@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.scenes.deviations import largest_deviation, magnification, magnified
+from rigid_motion_batch.scenes.layout import swept_points
+
+RANDOM = np.random.default_rng(8)
+MIDDLE = np.array((0.03, -0.1, 0.05))
+POINTS = MIDDLE + RANDOM.normal(size=(40, 3)) * 0.1
+
+
+def some_poses(count: int = 50, scales: bool = False) -> Poses:
+    turns = Rotation.random(count, random_state=4).as_quat()[:, [3, 0, 1, 2]]
+    return Poses(RANDOM.normal(size=(count, 3)), turns, RANDOM.uniform(0.5, 2.0, count) if scales else None)
+
+
+def beside(poses: Poses, offset: float, angle: float) -> Poses:
+    turns = Rotation.from_rotvec(angle * RANDOM.normal(size=(len(poses), 3)))
+    turned = (turns * Rotation.from_quat(poses.quaternions[:, [1, 2, 3, 0]])).as_quat()[:, [3, 0, 1, 2]]
+    signs = RANDOM.choice((-1.0, 1.0), len(poses))[:, None]
+    return Poses(poses.positions + offset * RANDOM.normal(size=(len(poses), 3)), signs * turned, poses.scales)
+
+
+@pytest.mark.parametrize("scales", [False, True])
+def test_every_point_is_displaced_by_the_factor_times_what_it_was(scales):
+    truth = some_poses(scales=scales)
+    shown = beside(truth, 1e-4, 1e-4)
+    apart = swept_points(shown, POINTS) - swept_points(truth, POINTS)
+    drawn = swept_points(magnified(shown, truth, 10.0, MIDDLE), POINTS) - swept_points(truth, POINTS)
+    assert np.abs(drawn - 10.0 * apart).max() < 1e-2 * np.abs(drawn).max()
+
+
+def test_what_is_drawn_is_as_large_as_the_object_at_most():
+    truth = some_poses()
+    shown = beside(truth, 1e-3, 2e-3)
+    factor = magnification(largest_deviation(shown, truth, POINTS), float(np.ptp(POINTS, axis=0).max()))
+    assert factor > 1.0
+    drawn = largest_deviation(magnified(shown, truth, factor, MIDDLE), truth, POINTS)
+    assert drawn < 0.45 * np.ptp(POINTS, axis=0).max()
+
+
+@pytest.mark.parametrize(
+    ("deviation", "factor"), [(0.0, 1.0), (1e-5, 2000.0), (1e-3, 20.0), (0.004, 10.0), (0.021, 1.0), (3.0, 1.0)]
+)
+def test_the_factor_is_a_round_number(deviation, factor):
+    assert magnification(deviation, 0.1) == factor
+
+
+def test_what_is_seen_anyway_is_drawn_as_it_is():
+    truth = some_poses()
+    shown = beside(truth, 0.1, 0.1)
+    assert magnified(shown, truth, 1.0, MIDDLE) is shown
+
+
+def test_a_large_turn_is_not_wound_up():
+    truth = some_poses()
+    drawn = magnified(beside(truth, 0.0, 1.0), truth, 100.0, MIDDLE)
+    cosines = np.abs(np.einsum("nk,nk->n", drawn.quaternions, truth.quaternions))
+    assert cosines.max() <= 1.0 + 1e-12
+    assert np.allclose(np.linalg.norm(drawn.quaternions, axis=-1), 1.0)
+    assert np.all(cosines < 1e-6 + np.cos(np.pi / 2.0) + 1e-6)

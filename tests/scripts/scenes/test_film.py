@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion_batch.scenes.film import join_pieces, render_film, render_piece, save_blend
+from rigid_motion_batch.scenes.scene import build_stage
+from rigid_motion_batch.scenes.settings import StageSettings
+from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+
+SETTINGS = StageSettings(resolution=(160, 90), fps=10)
+RENDER_SAVED = """
+import os, sys, bpy
+blend, picture, frame = sys.argv[1:]
+bpy.ops.wm.open_mainfile(filepath=blend)
+scene = bpy.context.scene
+scene.frame_set(int(frame))
+if hasattr(scene.render.image_settings, "media_type"):
+    scene.render.image_settings.media_type = "IMAGE"
+scene.render.image_settings.file_format = "PNG"
+scene.render.filepath = picture
+bpy.ops.render.render(write_still=True)
+sys.stdout.flush()
+os._exit(0)
+"""
+
+
+@pytest.fixture
+def scene():
+    return build_stage(reconstruct(swinging_clip(seconds=0.8), "5", ("lerp_slerp", "dq_sclerp")), SETTINGS)
+
+
+def handlers() -> dict[str, list]:
+    lists = ((name, getattr(bpy.app.handlers, name)) for name in dir(bpy.app.handlers))
+    return {name: list(kind) for name, kind in lists if isinstance(kind, list)}
+
+
+def render_still(scene: bpy.types.Scene, path: Path, frame: int) -> None:
+    scene.frame_set(frame)
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels
+
+
+def test_the_film_has_every_frame_at_the_size_asked_for(scene, tmp_path):
+    film = tmp_path / "clip" / "10" / "comparison.mp4"
+    seen = []
+    seconds = render_film(scene, film, lambda done, total: seen.append((done, total)))
+    movie = bpy.data.movieclips.load(str(film))
+    assert movie.frame_duration == scene.frame_end == 9
+    assert tuple(movie.size) == (160, 90)
+    assert seen == [(done, 9) for done in range(1, 10)]
+    assert seconds > 0.0
+    assert [path.name for path in film.parent.iterdir()] == ["comparison.mp4"]
+
+
+def test_the_film_is_what_browsers_play(scene, tmp_path):
+    render_film(scene, tmp_path / "comparison.mp4")
+    data = (tmp_path / "comparison.mp4").read_bytes()
+    assert data[4:8] == b"ftyp"
+    avc = data.index(b"avcC")
+    profile = data[avc + 5]
+    assert profile in (66, 77, 100)  # Baseline, Main, High: all of 8 bits and 4:2:0.
+
+
+def test_nothing_is_left_behind_and_nothing_is_said(scene, tmp_path, capfd):
+    before = handlers()
+    render_film(scene, tmp_path / "comparison.mp4", lambda done, total: None)
+    save_blend(tmp_path / "comparison.blend")
+    assert capfd.readouterr().out == ""
+    assert handlers() == before
+
+
+def test_the_file_tells_nothing_of_the_machine_it_was_made_on(scene, tmp_path):
+    render_film(scene, tmp_path / "comparison.mp4")
+    assert scene.render.filepath == "//comparison.mp4"
+    assert bpy.utils.blend_paths(absolute=False) == []
+
+
+def test_a_film_that_cannot_be_rendered_leaves_the_old_one(scene, tmp_path):
+    film = tmp_path / "comparison.mp4"
+    film.write_bytes(b"the film of yesterday")
+    scene.camera = None
+    with pytest.raises(RuntimeError):
+        render_film(scene, film)
+    assert film.read_bytes() == b"the film of yesterday"
+    assert os.listdir(tmp_path) == ["comparison.mp4"]
+
+
+def test_the_saved_file_renders_the_same_picture_in_another_process(scene, tmp_path):
+    render_film(scene, tmp_path / "comparison.mp4")
+    save_blend(tmp_path / "comparison.blend")
+    again = tmp_path / "again.png"
+    command = [sys.executable, "-c", RENDER_SAVED, str(tmp_path / "comparison.blend"), str(again), "6"]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    if hasattr(scene.render.image_settings, "media_type"):
+        scene.render.image_settings.media_type = "IMAGE"
+    render_still(scene, tmp_path / "here.png", 6)
+    render_still(scene, tmp_path / "other.png", 3)
+    here, there = pixels_of(tmp_path / "here.png"), pixels_of(again)
+    assert np.abs(here - there).max() < 0.02
+    assert np.abs(here - pixels_of(tmp_path / "other.png")).max() > 0.1
+
+
+def test_a_film_that_was_rendered_in_pieces_is_the_same_to_the_bit(scene, tmp_path):
+    blend = tmp_path / "comparison.blend"
+    save_blend(blend)
+    render_film(scene, tmp_path / "whole.mp4")
+    seen = []
+    pieces = {tmp_path / "1.mkv": (1, 4), tmp_path / "5.mkv": (5, 5), tmp_path / "6.mkv": (6, 9)}
+    for path, (first, last) in pieces.items():
+        assert render_piece(blend, first, last, path, lambda done, total: seen.append((done, total))) > 0.0
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4), (1, 1), (1, 4), (2, 4), (3, 4), (4, 4)]
+    join_pieces(blend, list(pieces), tmp_path / "joined.mp4")
+    assert (tmp_path / "joined.mp4").read_bytes() == (tmp_path / "whole.mp4").read_bytes()
+
+
+def test_a_film_is_not_joined_while_a_piece_is_missing(scene, tmp_path):
+    blend = tmp_path / "comparison.blend"
+    save_blend(blend)
+    render_piece(blend, 1, 4, tmp_path / "1.mkv")
+    with pytest.raises(RuntimeError, match="its pieces have 4 frames of 9"):
+        join_pieces(blend, [tmp_path / "1.mkv"], tmp_path / "joined.mp4")
+    assert not (tmp_path / "joined.mp4").exists()

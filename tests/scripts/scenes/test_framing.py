@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.scenes.framing import Framing, Jointed, Solid
+
+CUBE = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+STILL = (1.0, 0.0, 0.0, 0.0)
+
+
+def moving(places: np.ndarray) -> Poses:
+    return Poses(places, np.tile(STILL, (len(places), 1)))
+
+
+def test_a_long_way_is_followed_and_the_object_fills_the_picture():
+    way = moving(np.linspace((0.0, 0.0, 0.0), (30.0, 4.0, 1.0), 400))
+    framing = Framing.of(Solid(way, CUBE), smoothing=10.0)
+    assert framing.follows
+    low, high = framing.extent([Solid(way, CUBE)])
+    assert (high - low)[:2].max() < 0.4
+
+
+def test_what_has_room_where_it_is_is_not_followed():
+    angles = np.linspace(0.0, 20.0, 400)
+    sway = moving(0.01 * np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=-1))
+    framing = Framing.of(Solid(sway, CUBE), smoothing=10.0)
+    assert not framing.follows
+    assert np.array_equal(framing.focus, np.zeros((400, 3)))
+
+
+def test_the_focus_is_smooth_and_keeps_to_the_way():
+    random = np.random.default_rng(3)
+    way = np.linspace((0.0, 0.0, 0.0), (30.0, 0.0, 0.0), 300)
+    framing = Framing.of(Solid(moving(way + 0.05 * random.normal(size=way.shape)), CUBE), smoothing=12.0)
+    assert np.abs(framing.focus - way)[40:-40].max() < 0.05
+    assert np.abs(np.diff(framing.focus, 2, axis=0)).max() < 0.02
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_the_shortest_of_films_has_a_frame(count):
+    way = moving(np.linspace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), count))
+    low, high = Framing.of(Solid(way, CUBE), smoothing=14.4).extent([Solid(way, CUBE)])
+    assert np.all(high > low)
+
+
+def walking(*, climbs: float = 0.0) -> np.ndarray:
+    """Joints of a body that bobs as it goes, and climbs by so many metres."""
+    steps = np.linspace(0.0, 12.0, 200)
+    middle = np.stack((steps, 0.0 * steps, 1.0 + 0.03 * np.sin(5.0 * steps) + climbs * steps / 12.0), axis=-1)
+    return middle[:, None] + np.array([(0.0, 0.2, 0.8), (0.1, -0.2, 0.7), (0.2, 0.0, -1.0), (-0.3, 0.0, -1.0)])
+
+
+def test_a_walk_is_followed_without_a_nod():
+    framing = Framing.of(Jointed(walking()), smoothing=4.0)
+    assert framing.follows
+    assert np.ptp(framing.focus[:, 2]) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(framing.focus[:, 0]) > 11.0
+
+
+def test_a_body_that_climbs_is_followed_upwards():
+    framing = Framing.of(Jointed(walking(climbs=5.0)), smoothing=4.0)
+    assert np.ptp(framing.focus[:, 2]) > 4.5

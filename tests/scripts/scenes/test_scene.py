@@ -1,0 +1,352 @@
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Vector
+
+from rigid_motion.animation import channelbag_of, read_poses
+from rigid_motion.motion import KEYFRAME_MODES, Poses, interpolate
+from rigid_motion.motion.quaternions import angle_between, conjugate, multiply, rotate
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
+from rigid_motion_batch.axes import to_blender
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.scenes import layout
+from rigid_motion_batch.scenes.nodes import input_path
+from rigid_motion_batch.scenes.scene import build_stage
+from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.scenes.subject import vertices_of
+from rigid_motion_batch.scenes.timeline import Timeline
+from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.thoroughness import sample
+
+SETTINGS = StageSettings(resolution=(160, 90), fps=12)
+TWO = ("lerp_slerp", "dq_sclerp")
+
+
+def changed(clip: Clip, scale: float | tuple[float, ...] = 1.0, offset: float = 0.0) -> Clip:
+    return dataclasses.replace(clip, poses=Poses(clip.poses.positions * scale + offset, clip.poses.quaternions))
+
+
+def evaluated_points(obj: bpy.types.Object) -> np.ndarray:
+    """World points of the object as it is drawn, instances included."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    points = [np.empty((0, 3))]
+    for instance in depsgraph.object_instances:
+        owner = instance.parent if instance.is_instance else instance.object
+        if owner.name == obj.name and instance.object.type == "MESH":
+            matrix = np.array(instance.matrix_world)
+            points.append(vertices_of(instance.object.data) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(points)
+
+
+def poses_on(frames: np.ndarray, names: Iterable[str]) -> dict[str, Poses]:
+    """World poses of several objects, for which the scene steps through the frames only once."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    shown = {name: ([], []) for name in names}
+    for frame in frames.astype(int).tolist():
+        bpy.context.scene.frame_set(frame)
+        for name, (positions, quaternions) in shown.items():
+            location, rotation, _ = bpy.data.objects[name].evaluated_get(depsgraph).matrix_world.decompose()
+            positions.append(location)
+            quaternions.append(rotation)
+    return {name: Poses(np.array(positions), np.array(quaternions)) for name, (positions, quaternions) in shown.items()}
+
+
+def assert_same_poses(found: Poses, wanted: Poses) -> None:
+    assert np.abs(found.positions - wanted.positions).max() < 1e-5
+    assert angle_between(found.quaternions, wanted.quaternions).max() < 1e-5 * 4
+
+
+@pytest.mark.parametrize("axes", ["blender", "unity"])
+def test_every_mode_is_played_on_every_frame_as_it_was_computed(axes):
+    clip = dataclasses.replace(changed(swinging_clip(seconds=1.0), offset=300.0), axes=axes)
+    reconstruction = reconstruct(clip, "5")
+    scene = build_stage(reconstruction, SETTINGS)
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    times = timeline.times_of(timeline.frames)
+    centre = np.array(scene["recording_centre_m"])
+    found_of = poses_on(
+        timeline.frames,
+        [name for mode in KEYFRAME_MODES for name in (f"Lane {mode}", mode, f"{mode} recording")],
+    )
+    for mode in KEYFRAME_MODES:
+        turn = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world.to_quaternion())
+        places = found_of[f"Lane {mode}"].positions
+        kept = reconstruction.keys[mode]
+        shown = {
+            mode: interpolate(clip.times[kept], clip.poses[kept], times, mode),
+            f"{mode} recording": interpolate(clip.times, clip.poses, times, "dq_sclerp"),
+        }
+        for name, poses in shown.items():
+            found = found_of[name]
+            wanted = to_blender(poses, axes)
+            at_home = Poses(
+                rotate(conjugate(turn), found.positions - places) + centre,
+                multiply(conjugate(turn), found.quaternions),
+            )
+            assert_same_poses(at_home, wanted)
+
+
+def test_the_keys_of_a_mode_are_ordinary_keys_for_every_frame():
+    scene = build_stage(reconstruct(swinging_clip(seconds=1.0), "5", TWO), SETTINGS)
+    for mode in TWO:
+        fcurves = channelbag_of(bpy.data.objects[mode]).fcurves
+        assert {curve.data_path for curve in fcurves} == {"location", "rotation_quaternion"}
+        assert {len(curve.keyframe_points) for curve in fcurves} == {scene.frame_end}
+        assert bpy.data.objects[mode].animation_data.action.name == mode
+
+
+def test_an_object_that_grows_grows_on_the_stage():
+    clip = swinging_clip(seconds=0.6)
+    scales = np.linspace(1.0, 2.0, len(clip.times))
+    growing = dataclasses.replace(clip, poses=Poses(clip.poses.positions, clip.poses.quaternions, scales))
+    scene = build_stage(reconstruct(growing, "5", ("cga_slerp",)), SETTINGS)
+    found = read_poses(bpy.data.objects["cga_slerp"], np.array([1.0, scene.frame_end]))
+    assert found.scales[0] == pytest.approx(1.0, abs=1e-5)
+    assert found.scales[1] > 1.6
+
+
+CLIPS = {
+    "as recorded": (1.0, 0.0),
+    "a millimetre": (1e-3, 0.0),
+    "a kilometre": (1e3, 0.0),
+    "far away": (1.0, 1e4),
+    "flat on the floor": ((1.0, 1.0, 0.0), 0.0),
+    "up and down": ((0.0, 0.0, 3.0), 0.0),
+    "on the spot": (0.0, 5.0),
+}
+
+
+@pytest.mark.parametrize("clip", CLIPS)
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
+def test_everything_that_moves_stays_within_its_own_card(clip, modes):
+    scene = build_stage(reconstruct(changed(swinging_clip(seconds=1.0), *CLIPS[clip]), "5", modes), SETTINGS)
+    aspect = SETTINGS.resolution[0] / SETTINGS.resolution[1]
+    deviating = {mode: f"{mode} deviating" for mode in modes if f"{mode} deviating" in bpy.data.objects}
+    moving = {mode: (deviating.get(mode, mode), f"{mode} recording") for mode in modes}
+    meshes = {bpy.data.objects[name].data for names in moving.values() for name in names}
+    outermost = {mesh: layout.outermost(vertices_of(mesh)) for mesh in meshes}
+    for frame in sample(range(1, scene.frame_end + 1, 2)):
+        scene.frame_set(frame)
+        for mode in modes:
+            card = bpy.data.objects[f"{mode} card"]
+            size = card.data.vertices
+            half = np.abs([vertex.co[:2] for vertex in size]).max(axis=0)
+            for name in moving[mode]:
+                obj = bpy.data.objects[name]
+                world = np.array(obj.matrix_world)
+                points = outermost[obj.data] @ world[:3, :3].T + world[:3, 3]
+                seen = np.array([world_to_camera_view(scene, scene.camera, Vector(point)) for point in points])
+                places = (seen[:, :2] - 0.5) * (aspect, 1.0) - np.array(card.location[:2])
+                assert (np.abs(places) < half).all()
+                assert (seen[:, 2] > scene.camera.data.clip_start).all()
+                assert (seen[:, 2] < scene.camera.data.clip_end).all()
+
+
+def test_everything_that_is_written_is_within_the_picture():
+    clip = dataclasses.replace(swinging_clip(seconds=0.6), name="a_recording_with_quite_a_long_name_" * 3)
+    scene = build_stage(reconstruct(clip, "7.5"), SETTINGS)
+    for obj in bpy.data.objects["Frame"].children:
+        corners = evaluated_points(obj) if obj.type == "MESH" else [obj.matrix_world @ Vector(c) for c in obj.bound_box]
+        assert len(corners)
+        for corner in corners:
+            x, y, depth = world_to_camera_view(scene, scene.camera, Vector(corner))
+            assert -1e-6 <= x <= 1 + 1e-6, obj.name
+            assert -1e-6 <= y <= 1 + 1e-6, obj.name
+            assert scene.camera.data.clip_start < depth < scene.camera.data.clip_end
+
+
+def test_the_number_and_the_graph_show_the_error_of_the_frame():
+    reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
+    scene = build_stage(reconstruction, SETTINGS)
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    times = timeline.times_of(timeline.frames)
+    errors = {mode: 1e3 * np.interp(times, reconstruction.times, reconstruction.errors[mode].shell) for mode in TWO}
+    tallest = {mode: vertices_of(bpy.data.objects[f"{mode} graph"].data)[:, 1].max() for mode in TWO}
+    ratio = errors["dq_sclerp"].max() / errors["lerp_slerp"].max()
+    assert tallest["dq_sclerp"] / tallest["lerp_slerp"] == pytest.approx(ratio, rel=1e-5)
+    for mode in TWO:
+        number, graph = bpy.data.objects[f"{mode} error"], bpy.data.objects[f"{mode} graph"]
+        path = input_path(number.modifiers[0], "Value")
+        written = channelbag_of(number).fcurves.find(path, index=0)
+        base = graph.matrix_world.translation.x
+        width = np.ptp(vertices_of(graph.data)[:, 0]) * graph.matrix_world.to_scale().x
+        drawn = []
+        for frame, error in enumerate(errors[mode], start=1):
+            scene.frame_set(frame)
+            assert written.evaluate(frame) == pytest.approx(error, abs=1e-4)
+            drawn.append(evaluated_points(number))
+            passed = (evaluated_points(graph)[:, 0].max(initial=base) - base) / width
+            assert passed == pytest.approx((frame - 1) / (scene.frame_end - 1), abs=1e-4)
+        assert all(len(points) for points in drawn)
+        assert any(len(points) != len(drawn[0]) for points in drawn)
+
+
+def test_the_number_ends_where_it_ended():
+    scene = build_stage(reconstruct(swinging_clip(seconds=1.0), "5", TWO), SETTINGS)
+    clock = bpy.data.objects["Time"]
+    ends = []
+    for frame in (2, 6, 11):
+        scene.frame_set(frame)
+        ends.append(evaluated_points(clock)[:, 0].max())
+    assert np.ptp(ends) < 0.006 * bpy.data.objects["Frame"].scale.x
+
+
+def test_the_trail_ends_at_the_object_and_follows_it_for_a_while():
+    reconstruction = reconstruct(swinging_clip(seconds=2.0), "5", TWO)
+    scene = build_stage(reconstruction, SETTINGS)
+    frame = scene.frame_end
+    for mode in TWO:
+        trail = bpy.data.objects[f"{mode} trail"]
+        path = vertices_of(trail.data)
+        scene.frame_set(frame)
+        world = np.array(bpy.data.objects[f"Lane {mode}"].matrix_world)
+        path = path @ world[:3, :3].T + world[:3, 3]
+        drawn = evaluated_points(trail)
+        reach = 0.02 * bpy.data.objects["Frame"].scale.x
+        gaps = np.linalg.norm(drawn[None] - path[:, None], axis=-1).min(axis=1)
+        assert gaps[-1] < reach
+        assert gaps[0] > reach
+        scene.frame_set(1)
+        assert len(evaluated_points(trail)) < len(drawn) / 4
+
+
+def test_keys_are_marked_where_the_modes_meet_the_recording():
+    reconstruction = reconstruct(swinging_clip(seconds=1.0), "5", TWO)
+    scene = build_stage(reconstruction, SETTINGS)
+    keys = bpy.data.objects["dq_sclerp keys"]
+    assert len(keys.data.vertices) == len(reconstruction.keys["dq_sclerp"])
+    scene.frame_set(scene.frame_end)
+    radius = 0.02 * bpy.data.objects["Frame"].scale.x
+    world = np.array(keys.matrix_world)
+    last = vertices_of(keys.data)[-1] @ world[:3, :3].T + world[:3, 3]
+    assert np.linalg.norm(evaluated_points(keys) - last, axis=1).min() < radius
+
+
+def test_the_file_needs_no_script_to_play():
+    build_stage(reconstruct(swinging_clip(seconds=0.6), "5"), SETTINGS)
+    assert not bpy.data.texts
+    for block in bpy.data.user_map():
+        data = getattr(block, "animation_data", None)
+        assert data is None or not data.drivers, block
+
+
+def test_the_outliner_tells_what_is_what():
+    scene = build_stage(reconstruct(swinging_clip("arm", seconds=0.6), "7.5", TWO), SETTINGS)
+    assert scene.name == "arm 7.5"
+    assert {child.name for child in scene.collection.children} == {"Lane lerp_slerp", "Lane dq_sclerp", "Captions"}
+    assert {"dq_sclerp", "dq_sclerp recording"} <= set(bpy.data.collections["Lane dq_sclerp"].objects.keys())
+
+
+def test_a_clip_shorter_than_a_frame_is_one_frame():
+    scene = build_stage(reconstruct(swinging_clip(seconds=0.05), "30", TWO), SETTINGS)
+    assert (scene.frame_start, scene.frame_end) == (1, 1)
+    assert len(evaluated_points(bpy.data.objects["Time"]))
+
+
+@pytest.mark.parametrize("engine", ["workbench", "eevee", "cycles"])
+def test_every_engine_can_be_chosen(engine):
+    reconstruction = reconstruct(swinging_clip(seconds=0.6), "5", ("dq_sclerp",))
+    scene = build_stage(reconstruction, dataclasses.replace(SETTINGS, engine=engine))
+    assert engine in scene.render.engine.lower()
+
+
+def test_an_object_that_would_be_lost_on_its_path_is_shown_larger_and_says_so():
+    build_stage(reconstruct(changed(swinging_clip(seconds=1.0), 100.0), "5", TWO), SETTINGS)
+    assert "object shown" in bpy.data.curves["Legend"].body
+    assert np.ptp(vertices_of(bpy.data.objects["dq_sclerp"].data), axis=0).max() > 5.0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"engine": "lux"}, "engine 'lux': there are workbench, eevee, cycles"),
+        ({"resolution": (641, 360)}, "resolution 641x360: give two even numbers"),
+        ({"fps": 0}, "0 frames a second"),
+        ({"slow_motion": 0.0}, "slow motion by 0.0"),
+        ({"antialiasing": "7"}, "antialiasing '7'"),
+        ({"theme": "sepia"}, "theme 'sepia': there are dark, light"),
+        ({"deviation": 0.5}, "deviations 0.5 times as large: give 1 to 1000"),
+    ],
+)
+def test_settings_that_make_no_film_are_refused(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        StageSettings(**wrong)
+
+
+def test_adaptive_keys_are_marked_in_the_lane_of_the_mode_they_are_of_and_counted_in_its_caption():
+    reconstruction = choose(swinging_clip(seconds=1.0), Tolerance("5mm"), ("lerp_slerp", "motor_spline"), 0.1)
+    scene = build_stage(reconstruction, SETTINGS)
+    assert scene.name == "swing tolerance-5mm"
+    assert bpy.data.curves["Choice of keys"].body == "within 5 mm"
+    timeline = Timeline.of(reconstruction, SETTINGS.fps, 1.0)
+    assert len(reconstruction.keys["motor_spline"]) < len(reconstruction.keys["lerp_slerp"])
+    for mode, keys in reconstruction.keys.items():
+        marks = bpy.data.objects[f"{mode} keys"].data
+        frames = np.empty(len(marks.vertices), dtype=np.float32)
+        marks.attributes["frame"].data.foreach_get("value", frames)
+        assert np.allclose(frames, timeline.frames_of(reconstruction.clip.times[keys]), atol=1e-4)
+        caption = " ".join(bpy.data.curves[f"{mode} names"].body.split())
+        assert caption == f"{mode}, {(len(keys) - 1) / 1.0:.1f} keys/s"
+
+
+@pytest.mark.parametrize("modes", [TWO, tuple(KEYFRAME_MODES)], ids=["two", "all"])
+@pytest.mark.parametrize("clip", [1.0, (0.0, 0.0, 3.0)], ids=["as recorded", "up and down"])
+@pytest.mark.parametrize("distinct", [False, True], ids=["each", "distinct"])
+def test_what_a_caption_says_stands_apart(modes, clip, distinct):
+    settings = dataclasses.replace(SETTINGS, distinct=distinct)
+    build_stage(choose(changed(swinging_clip(seconds=1.0), clip), Tolerance("5mm"), modes, 0.1), settings)
+    for mode in [obj.name.removesuffix(" names") for obj in bpy.data.objects if obj.name.endswith(" names")]:
+        low, high = {}, {}
+        for part in ("title", "names", "error", "graph"):
+            obj = bpy.data.objects[f"{mode} {part}"]
+            inside = obj.parent.matrix_world.inverted()
+            found = (
+                evaluated_points(obj) if obj.type == "MESH" else [obj.matrix_world @ Vector(c) for c in obj.bound_box]
+            )
+            corners = np.array([inside @ Vector(corner) for corner in found])
+            low[part], high[part] = corners.min(axis=0), corners.max(axis=0)
+        for upper, lower in (("title", "names"), ("names", "error"), ("error", "graph")):
+            assert low[upper][1] > high[lower][1]
+
+
+def test_modes_that_are_one_motion_share_a_lane_that_names_them_all():
+    made = reconstruct(swinging_clip(seconds=1.0), "5")
+    scene = build_stage(made, dataclasses.replace(SETTINGS, distinct=True))
+    lanes = [child.name for child in scene.collection.children if child.name.startswith("Lane ")]
+    assert lanes == ["Lane lerp_slerp", "Lane dq_sclerp", "Lane pga_lerp", "Lane motor_spline"]
+    names = bpy.data.curves["dq_sclerp names"].body.replace(",", " ").split()
+    assert names == ["dq_sclerp", "pga_slerp", "cga_slerp"]
+
+
+def test_a_deviation_of_millimetres_is_drawn_larger_and_the_picture_says_how_much():
+    clip = swinging_clip(seconds=1.0)
+    settings = dataclasses.replace(SETTINGS, deviation=20.0)
+    made = reconstruct(clip, "10", TWO)
+    scene = build_stage(made, settings)
+    assert scene["deviation_shown_times"] == 20.0
+    assert "deviation drawn 20 times as large" in bpy.data.curves["Legend"].body
+    for mode in TWO:
+        true, shown, truth = (bpy.data.objects[name] for name in (mode, f"{mode} deviating", f"{mode} recording"))
+        assert true.hide_render
+        assert not shown.hide_render
+        true.hide_viewport = False
+        bpy.context.view_layer.update()
+        frames = np.arange(1.0, scene.frame_end + 1.0)
+        poses = [read_poses(obj, frames) for obj in (true, shown, truth)]
+        middle = np.mean([vertices_of(true.data).min(axis=0), vertices_of(true.data).max(axis=0)], axis=0)
+        places = [layout.swept_points(some, middle[None]) for some in poses]
+        assert np.allclose(places[1] - places[2], 20.0 * (places[0] - places[2]), atol=1e-5)
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_letters_stand_out_from_their_cards(theme):
+    build_stage(reconstruct(swinging_clip(seconds=0.6), "5", TWO), dataclasses.replace(SETTINGS, theme=theme))
+    card, ink = (np.array(bpy.data.materials[name].diffuse_color)[:3].mean() for name in ("Card", "Ink"))
+    assert (ink > card) == (theme == "dark")

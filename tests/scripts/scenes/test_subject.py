@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion_batch.scenes.settings import MODELS, SubjectError
+from rigid_motion_batch.scenes.subject import load_subject, shrink, tinted_slots, vertices_of
+
+
+def painted(picture: Path) -> bpy.types.Material:
+    """A material with an image of its own."""
+    image = bpy.data.images.new("Paint", 4, 4)
+    image.filepath_raw, image.file_format = str(picture), "PNG"
+    image.save()
+    material = bpy.data.materials.new("Paint")
+    if material.node_tree is None:
+        material.use_nodes = True
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = bpy.data.images.load(str(picture))
+    return material
+
+
+@pytest.fixture
+def user_file(tmp_path, empty_file):
+    """A cube under a parent of twice the size, with a modifier, a material and a script; and a lamp."""
+    cube = bpy.data.objects.new("Cube", bpy.data.meshes.new("Cube"))
+    corners = np.array(np.meshgrid((-1, 1), (-1, 1), (-1, 1))).reshape(3, -1).T
+    cube.data.from_pydata(corners.tolist(), [], [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6)])
+    cube.data.materials.append(painted(tmp_path / "paint.png"))
+    array = cube.modifiers.new("Array", "ARRAY")
+    array.use_relative_offset, array.use_constant_offset = False, True
+    array.count, array.constant_offset_displace = 3, (10.0, 0.0, 0.0)
+    parent = bpy.data.objects.new("Parent", None)
+    parent.scale = (2.0, 2.0, 2.0)
+    cube.parent = parent
+    cube.keyframe_insert("location", frame=1)
+    bpy.data.texts.new("startup.py").use_module = True
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    for obj in (cube, parent, lamp):
+        bpy.context.scene.collection.objects.link(obj)
+    path = tmp_path / "tools.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return path
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_our_models_are_as_large_as_a_hand_holds_and_take_the_colour_of_a_mode(model, empty_file):
+    mesh = load_subject(model)
+    assert 0.1 < np.ptp(vertices_of(mesh), axis=0).max() < 0.4
+    assert [mesh.materials[slot].name for slot in tinted_slots(mesh)] == ["Mode"]
+
+
+def test_a_users_object_comes_with_its_modifiers_and_its_size(user_file):
+    vertices = vertices_of(load_subject(f"{user_file}:Cube"))
+    assert len(vertices) == 24
+    assert np.allclose(np.ptp(vertices, axis=0), (44.0, 4.0, 4.0))
+
+
+def test_nothing_else_of_the_users_file_stays(user_file):
+    scene_blocks = set(bpy.data.user_map())
+    mesh = load_subject(f"{user_file}:Cube")
+    arrived = set(bpy.data.user_map()) - scene_blocks
+    assert arrived == {mesh, mesh.materials[0], bpy.data.images["paint.png"]}
+    assert mesh.materials[0].name == "Paint"
+    assert not bpy.data.texts
+
+
+def test_what_is_shown_can_be_opened_elsewhere(user_file, tmp_path):
+    mesh = load_subject(f"{user_file}:Cube")
+    (tmp_path / "paint.png").unlink()
+    assert bpy.data.images["paint.png"].packed_file
+    assert mesh.materials[0].library_weak_reference is None
+
+
+def test_an_object_without_our_material_is_tinted_in_its_first_slot(user_file):
+    assert tinted_slots(load_subject(f"{user_file}:Cube")) == [0]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        ("{file}:Sphere", "tools.blend: has no object 'Sphere'; it has Cube, Lamp, Parent"),
+        ("{file}:Lamp", "tools.blend: 'Lamp' has no faces to show"),
+        ("{file}:Parent", "tools.blend: 'Parent' has no faces to show"),
+        ("{folder}/none.blend:Cube", "none.blend: there is no such file"),
+        ("{folder}/text.blend:Cube", "text.blend: is not a .blend file"),
+        ("hammer", "object 'hammer': give drill, controller or file.blend:Name"),
+    ],
+)
+def test_what_cannot_be_shown_is_said_in_one_line(wanted, said, user_file, tmp_path):
+    (tmp_path / "text.blend").write_text("no Blender file\n" * 20)
+    before = set(bpy.data.user_map())
+    with pytest.raises(SubjectError) as error:
+        load_subject(wanted.format(file=user_file, folder=tmp_path))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+    assert set(bpy.data.user_map()) == before
+
+
+def test_a_shrunken_mesh_lies_inside_the_whole_one(empty_file):
+    mesh = load_subject("drill")
+    before = vertices_of(mesh)
+    shrink(mesh, 1e-3)
+    assert np.allclose(np.linalg.norm(vertices_of(mesh) - before, axis=1), 1e-3, atol=1e-5)
+    assert (np.ptp(vertices_of(mesh), axis=0) < np.ptp(before, axis=0)).all()
