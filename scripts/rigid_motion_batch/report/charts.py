@@ -13,8 +13,8 @@ import numpy as np
 import vl_convert
 from markupsafe import Markup
 
-from rigid_motion_batch.comparison.study.choices import Tolerance, Uniform
-from rigid_motion_batch.comparison.study.needed import KeysNeeded, overall
+from rigid_motion_batch.analysis.choices import Tolerance, Uniform
+from rigid_motion_batch.analysis.needed import KeysNeeded, overall
 
 from .numbers import ERROR, Numbers
 

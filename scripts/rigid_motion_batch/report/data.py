@@ -23,9 +23,9 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply
+from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
-from rigid_motion_batch.comparison.study.choices import Tolerance
-from rigid_motion_batch.figures import carrying, short_names
+from rigid_motion_batch.recordings.figures import carrying, short_names
 
 from .mesh import Mesh
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
-from rigid_motion_batch.figures import short_names
+from rigid_motion_batch.recordings.figures import short_names
 
 from .colours import error_rgb
 from .numbers import Numbers, digits
@@ -54,8 +54,11 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
     pictures = [
         (numbers.joined(motion.modes), heat_map(some, top)) for motion, some in zip(motions, errors, strict=True)
     ]
-    columns = [value for some in errors for value in (np.sqrt(np.square(some).mean(axis=1)), some.max(axis=1))]
-    rows = [[digits(value) for value in row] for row in np.stack(columns, axis=1).tolist()]
+    by_mode = [[row for row in result.joints if row.mode == motion.modes[0]] for motion in motions]
+    rows = [
+        [digits(1e3 * value) for row in of_joint for value in (row.rms_shell_m, row.max_shell_m)]
+        for of_joint in zip(*by_mode, strict=True)
+    ]
     names = short_names(clip.joint_names)
     return Joints(place, clip.facts.name, result.choice.name, result.choice.title, names, digits(top), pictures, rows)
 

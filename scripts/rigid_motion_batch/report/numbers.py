@@ -11,11 +11,11 @@ from math import floor, isfinite, log10
 
 import numpy as np
 
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import NOTHING, Metrics, geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE, label_of
+from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
 from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.comparison.study.choices import Budget, Choice, Tolerance, Uniform
-from rigid_motion_batch.comparison.study.metrics import NOTHING, Metrics, geometric_mean
-from rigid_motion_batch.comparison.study.modes import REFERENCE, label_of
-from rigid_motion_batch.comparison.study.reconstructions import Groups, joint_groups
 
 
 @dataclass(frozen=True)

@@ -22,13 +22,12 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.comparison.study.choices import Choice
-from rigid_motion_batch.comparison.study.metrics import Metrics
-from rigid_motion_batch.comparison.study.modes import description_of
-from rigid_motion_batch.comparison.study.needed import KeysNeeded
-from rigid_motion_batch.comparison.study.radii import JOINT
-from rigid_motion_batch.comparison.study.results import ClipFacts
+from rigid_motion_batch.analysis.choices import Choice
+from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.modes import description_of
+from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.analysis.results import ClipFacts, ClipResult
 from rigid_motion_batch.files import replacing, write_text
 from rigid_motion_batch.rows import line_of
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigid_motion_batch.analysis.body_decimated import DECIMATE
+from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
-from rigid_motion_batch.comparison.study.body_decimated import DECIMATE
-from rigid_motion_batch.comparison.study.modes import BEST_OF
-from rigid_motion_batch.comparison.study.needed import DECIMATIONS, KeysNeeded, overall
 
 from .numbers import MEASURES, MINUS, NONE, Numbers, digits, listed, percent
 

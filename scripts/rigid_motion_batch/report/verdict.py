@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import MODES
-from rigid_motion_batch.comparison.study.choices import Budget, Tolerance
-from rigid_motion_batch.comparison.study.metrics import NOTHING, geometric_mean
-from rigid_motion_batch.comparison.study.modes import BEST_OF, REFERENCE
-from rigid_motion_batch.comparison.study.needed import DECIMATIONS, KeysNeeded, overall
+from rigid_motion_batch.analysis.choices import Budget, Tolerance
+from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
 
 from .numbers import ERROR, KINDS, MINUS, Numbers, digits, listed, percent
 

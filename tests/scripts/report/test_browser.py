@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from rigid_motion_batch.analysis.results import ClipWarning
-from rigid_motion_batch.comparison.study.choices import Budget, Tolerance
+from rigid_motion_batch.analysis.choices import Budget, Tolerance
+from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import Settings, pages, write_overview, write_report
 from tests.scripts.comparison.bodies import swinging_body
 from tests.scripts.comparison.recordings import swinging_clip

@@ -11,8 +11,8 @@ import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.results import ClipResult
-from rigid_motion_batch.comparison.study.choices import Uniform
 from rigid_motion_batch.report import data
 from rigid_motion_batch.report.data import Block, clip_data, json_in_page, mesh_data
 from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill

@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion_batch.analysis.results import ClipResult, ClipWarning
-from rigid_motion_batch.comparison.study.body_decimated import DECIMATE, OWN, KeysOfBody
-from rigid_motion_batch.comparison.study.choices import Budget, Tolerance, Uniform
-from rigid_motion_batch.comparison.study.metrics import Metrics
-from rigid_motion_batch.comparison.study.reading import read_clips
+from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, KeysOfBody
+from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import Settings, pages, write_overview, write_report
 from rigid_motion_batch.report.colours import BACKGROUNDS, MODE_COLOURS, OTHER_COLOURS
 from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of

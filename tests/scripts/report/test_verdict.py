@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from rigid_motion_batch.comparison.study.choices import Budget, Choice, Tolerance, Uniform
-from rigid_motion_batch.comparison.study.needed import RATES, KeysNeeded
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded
 from rigid_motion_batch.report.numbers import ERROR, KEYS, MEASURES, Numbers
 from rigid_motion_batch.report.verdict import plain, verdict
 
