@@ -92,7 +92,7 @@ class Comparison:
     """What pages say of the run; None for a run without."""
 
     blender: str = ""
-    """The version of the Blender that films and reads; empty where there is none."""
+    """The version of the Blender that films, reads and decimates; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ class Study:
 
     @property
     def decimated(self) -> list[Choice]:
-        """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
+        """The choices that may be set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
         if self.samples * self.joints > MOST_DECIMATED:
             return []
         return [choice for choice in self.choices if self.joints and choice.decimation == "adaptive"]
@@ -219,7 +219,9 @@ class ComparisonPlan:
                 "--slow-motion"
             )
         adaptive = any(choice.decimation == "adaptive" for choice in study.choices)
-        if study.joints and adaptive and not study.decimated:
+        if study.joints and adaptive and not self.comparison.blender:
+            yield f"{study.name}: not compared with Blender's Decimate: there is no Blender"
+        elif study.joints and adaptive and not study.decimated:
             yield (
                 f"{study.name}: not compared with Blender's Decimate: {study.joints} joints with {study.samples} "
                 f"samples would take too long; cut it to {MOST_DECIMATED // study.joints}"
@@ -262,13 +264,14 @@ class ComparisonPlan:
     @property
     def tables(self) -> set[str]:
         """The tables that there will be; of others those of earlier runs are to be withdrawn."""
-        bodies = [study for study in self.studies if study.joints]
-        found = {METRICS} | ({KEYS_NEEDED} if self.comparison.count_keys else set())
-        return (
-            found
-            | ({JOINT_METRICS} if bodies else set())
-            | ({DECIMATED} if any(s.decimated for s in bodies) else set())
-        )
+        found = {METRICS: True, KEYS_NEEDED: self.comparison.count_keys}
+        found[JOINT_METRICS] = any(study.joints for study in self.studies)
+        found[DECIMATED] = any(map(self.decimated, self.studies))
+        return {table for table, there in found.items() if there}
+
+    def decimated(self, study: Study) -> list[Choice]:
+        """The choices that are set beside Blender's Decimate."""
+        return study.decimated if self.comparison.blender else []
 
     def filmed(self, study: Study) -> list[Choice]:
         """The choices that there are films of."""
@@ -299,7 +302,7 @@ class ComparisonPlan:
                 group=name,
             )
             yield METRICS, steps.ROWS, ("measure", name, choice.name), measuring
-            if choice in study.decimated:
+            if choice in self.decimated(study):
                 decimating = Task(
                     steps.decimate,
                     measuring.parameters,
@@ -397,7 +400,7 @@ class ComparisonPlan:
         shown, before, filmed = [], [], []
         for study in studies:
             name, of_films = study.name, [choice.name for choice in self.filmed(study)]
-            needed, decimated = keys.get(("needed", name)), [choice.name for choice in study.decimated]
+            needed, decimated = keys.get(("needed", name)), [choice.name for choice in self.decimated(study)]
             before += [study.reader, *([needed] if needed else [])]
             for choice in study.choices:
                 before.append(keys["measure", name, choice.name])
