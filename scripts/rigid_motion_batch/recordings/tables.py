@@ -195,9 +195,13 @@ class HeaderLine:
         separator = max(SEPARATORS, key=text.count) if any(mark in text for mark in SEPARATORS) else None
         return cls(number, separator, cells_of(path, number, text, separator))
 
+    def table(self, path: Path, columns: dict[str, int]) -> Table:
+        """Return the rows below with some of the columns."""
+        return Table(path, self.separator, columns, len(self.cells), self.number, self.vectors)
+
     def of_rows(self, path: Path) -> HeaderLine:
         """Return the header as the first row below it has it."""
-        rows = Table(path, self.separator, {}, 0, self.number).rows()
+        rows = self.table(path, {}).rows()
         names = expanded(self.cells, next(rows, (0, ""))[1], self.separator)
         return self if names is None else HeaderLine(self.number, self.separator, names, vectors=True)
 
