@@ -164,11 +164,12 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
     columns = (TaskProgressColumn(), BarColumn(24), Line(Column(ratio=1, no_wrap=True)))
     bar = Progress(
         *columns,
-        console=Console(file=stream, soft_wrap=True),
+        console=Console(file=stream, soft_wrap=True, highlight=False),
         transient=True,
         expand=True,
-        redirect_stdout=False,
-        redirect_stderr=False,
+        # What is printed meanwhile stands above the bar, unless it goes elsewhere.
+        redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
+        redirect_stderr=sys.stderr is stream,
     )
     bar.add_task("", total=1.0)
     return bar
