@@ -1,0 +1,246 @@
+"""What the viewer needs of a clip, small: whole numbers of a step, as differences in time, gzipped, as base64.
+
+An array of shape (rows, n) is described by `[offset, rows, n, step, width]`: where its bytes begin in the block, what a
+unit is worth, and how many bytes a number has. Each row holds the first number and then differences, modulo the width;
+the lowest bytes of all numbers come first, then the next, which gzip likes. `viewer/data.js` reads it.
+
+Metres, radians, seconds from the clip's first sample; z is up. Of a single body the deviations of a mode from the
+recording are a difference of positions and a rotation vector in the world; of a whole body the differences of all
+joints' positions. Where a clip is long, the view has fewer samples than the chart, and the chart the largest error of
+every few samples: the worst sample of each mode is in both.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from collections.abc import Callable
+from math import floor, log10
+from typing import Any
+
+import numpy as np
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import conjugate, multiply
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
+from rigid_motion_batch.recordings.figures import carrying, short_names
+
+from .mesh import Mesh
+
+MOST_SEEN = 4_000_000
+"""Bytes that the poses of all modes of a clip may take before they are thinned for the view."""
+
+FEWEST_SEEN = 300
+"""Samples that the view has at least."""
+
+MOST_CHARTED = 50_000
+"""Samples of an error over time; of longer ones the largest of every few are kept."""
+
+FACTORS = (1000, 500, 200, 100, 50, 30, 20, 10, 5, 3, 2, 1)
+"""By which deviations are magnified."""
+
+SEEN_AS = {True: 0.15, False: 0.34}
+"""How large the largest deviation may look, as a share of the size of a whole body, or else of the object."""
+
+Description = list[float]
+
+
+class Block:
+    """Numbers packed one array after the other."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._size = 0
+
+    def put(self, values: np.ndarray, width: int = 2, step: float | None = None) -> Description:
+        """Add an array of shape (rows, n) or (n,), rounded to steps; by default as fine as the width has room for."""
+        values = np.atleast_2d(np.asarray(values, dtype=float))
+        if step is None:
+            step = float(np.abs(values).max(initial=0.0)) / (2 ** (8 * width - 1) - 1) or 1.0
+        whole = np.rint(values / step).astype(np.int64)
+        differences = np.diff(whole, axis=1, prepend=0).astype(f"<i{width}" if width > 1 else "i1")
+        packed = np.ascontiguousarray(differences.reshape(-1, 1).view(np.uint8).T).tobytes()
+        self._parts.append(packed)
+        self._size += len(packed)
+        return [self._size - len(packed), *values.shape, step, width]
+
+    def text(self) -> str:
+        """All of it, the same for the same numbers."""
+        return base64.b64encode(gzip.compress(b"".join(self._parts), mtime=0)).decode("ascii")
+
+
+def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict[str, Any]:
+    """What the page has of a clip: names, warnings, and a block of numbers for the recording and for each choice.
+
+    `label` gives the name of a mode; the mesh is what a single rigid body moves.
+    """
+    block, body = Block(), clip.parents is not None
+    begin = float(clip.times[0])
+    seen = _seen(clip)
+    truth = _joints(clip.truth)[:, seen]
+    size = (_extent(truth) if body else mesh.size) or 1.0
+    cell = _nice(0.3 * size)
+    recording = {
+        "times": block.put(clip.times - begin, 4, 1e-6),
+        "seen": block.put(seen, 4, 1.0),
+        "places": block.put(truth.transpose(0, 2, 1).reshape(-1, len(seen)), 4, 1e-5),
+    }
+    if not body:
+        recording["turns"] = block.put(clip.truth.quaternions[seen].T)
+        if clip.truth.scales is not None:
+            recording["scales"] = block.put(clip.truth.scales[seen])
+    return {
+        "name": clip.facts.name,
+        "joints": short_names(clip.joint_names) if body else [],
+        "parents": _drawn_from(clip.parents) if body else [],
+        "size": size,
+        "cell": cell,
+        "grid": f"{1e3 * cell:g} mm" if cell < 0.01 else f"{100 * cell:g} cm" if cell < 1.0 else f"{cell:g} m",
+        "box": [truth.min(axis=(0, 1)).tolist(), truth.max(axis=(0, 1)).tolist()],
+        "warnings": [
+            {
+                "from": None if one.start_s is None else one.start_s - begin,
+                "to": None if one.end_s is None else one.end_s - begin,
+            }
+            for one in clip.warnings
+        ],
+        "recording": recording | {"block": block.text()},
+        "choices": [_choice_data(clip, result, seen, label, size) for result in clip.choices],
+    }
+
+
+def _choice_data(
+    clip: ClipResult, result: ChoiceResult, seen: np.ndarray, label: Callable[[str], str], size: float
+) -> dict[str, Any]:
+    block, first = Block(), result.first
+    count = result.motions[0].errors.shape[1]
+    every = -(-count // MOST_CHARTED)
+    within = seen[(seen >= first) & (seen < first + count)]
+    rows = [motion.metrics[0] for motion in result.motions]
+    body = clip.parents is not None
+    largest = max(float(motion.errors[0].max()) for motion in result.motions)
+    joints = [motion.joint_errors.max(axis=1) for motion in result.motions if motion.joint_errors is not None]
+    by_joint = np.max(joints, axis=0) if joints else np.array([largest])
+    keyed = len({row.keys for row in rows}) > 1 or rows[0].decimation != "uniform"
+    return {
+        "name": result.choice.name,
+        "title": result.choice.title,
+        "about": _about(result, keyed, every),
+        "first": first,
+        "count": count,
+        "every": every,
+        "seen": [int(np.searchsorted(seen, first)), len(within)],
+        "keyed": keyed,
+        "worst": largest,
+        "factor": next(factor for factor in FACTORS if factor * largest <= SEEN_AS[body] * size or factor == 1),
+        "joint": int(np.argmax(by_joint)),
+        "top": float(by_joint.max()),
+        "motions": [
+            {
+                "modes": list(motion.modes),
+                "name": label(motion.modes[0]),
+                "also": [label(mode) for mode in motion.modes[1:]],
+                "rms": [1e3 * row.rms_shell_m, 1e3 * row.rms_position_m, row.rms_rotation_deg],
+                "keys_per_s": row.keys_per_s if isinstance(result.choice, Tolerance) else None,
+                "errors": [block.put(row) for row in _peaks(motion.errors, every) * [[1e3], [1e3], [1.0]]],
+                "keys": block.put(motion.keys - first, 4, 1.0),
+                **_deviations(block, clip, motion, within, first),
+            }
+            for motion, row in zip(result.motions, rows, strict=True)
+        ],
+        "block": block.text(),
+    }
+
+
+def _deviations(
+    block: Block, clip: ClipResult, motion: Motion, within: np.ndarray, first: int
+) -> dict[str, Description]:
+    """How far a mode is from the recording at these samples of the clip."""
+    at = within - first
+    away = _joints(motion.poses)[:, at] - _joints(clip.truth)[:, within]
+    found = {"away": block.put(away.transpose(0, 2, 1).reshape(-1, len(at)))}
+    if clip.parents is not None:
+        return found | ({} if motion.joint_errors is None else {"by_joint": block.put(motion.joint_errors[:, at], 1)})
+    turn = multiply(motion.poses.quaternions[at], conjugate(clip.truth.quaternions[within]))
+    turn *= np.where(turn[:, :1] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, turn[:, :1])
+    found["turn"] = block.put((turn[:, 1:] * angle / np.maximum(sine, 1e-30)).T)
+    if motion.poses.scales is not None and clip.truth.scales is not None:
+        found["grown"] = block.put(np.log(motion.poses.scales[at] / clip.truth.scales[within]))
+    return found
+
+
+def mesh_data(mesh: Mesh) -> dict[str, Any]:
+    """A mesh as the viewer draws it."""
+    block = Block()
+    edges = mesh.edges()
+    none = np.zeros((1, edges.shape[1]))
+    return {
+        "corners": block.put(mesh.corners().T.ravel()),
+        "edges": block.put(np.concatenate((edges[:3], none, edges[3:], none)).T.ravel()),
+        "size": mesh.size,
+        "middle": mesh.middle.tolist(),
+        "block": block.text(),
+    }
+
+
+def json_in_page(content: Any) -> str:
+    """JSON that can stand in a script element, whatever the strings in it are."""
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _joints(poses: Poses) -> np.ndarray:
+    """Positions with the joints first, shape (joints, n, 3)."""
+    return poses.positions if poses.positions.ndim == 3 else poses.positions[None]
+
+
+def _seen(clip: ClipResult) -> np.ndarray:
+    """The samples of the clip that the view has."""
+    count, motions = len(clip.times), [motion for result in clip.choices for motion in result.motions]
+    a_sample = (7 if clip.parents is not None else 12) * len(_joints(clip.truth)) * max(len(motions), 1)
+    every = -(-count // max(MOST_SEEN // a_sample, FEWEST_SEEN))
+    if every == 1:
+        return np.arange(count)
+    kept = [np.arange(0, count, every)]
+    for result in clip.choices:
+        shell = [motion.errors[0] for motion in result.motions]
+        kept.append(result.first + np.array([0, len(shell[0]) - 1, *(int(errors.argmax()) for errors in shell)]))
+    return np.unique(np.concatenate(kept))
+
+
+def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
+    """The largest of every few samples, shape (3, about n / every)."""
+    return np.maximum.reduceat(errors, np.arange(0, errors.shape[1], every), axis=1) if every > 1 else errors
+
+
+def _drawn_from(parents: np.ndarray) -> list[int]:
+    """The parents to draw lines from: none from a root that only carries the body about."""
+    return np.where((parents >= 0) & carrying(parents)[parents], -1, parents).tolist()
+
+
+def _nice(length: float) -> float:
+    """1, 2 or 5 times a power of ten, at least this."""
+    power = 10.0 ** floor(log10(length))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= length)
+
+
+def _extent(places: np.ndarray) -> float:
+    """How large a body is, from joints (joints, n, 3): the median of its diagonal over time."""
+    return float(np.median(np.linalg.norm(np.ptp(places, axis=0), axis=1)))
+
+
+def _about(result: ChoiceResult, keyed: bool, every: int) -> str:
+    row = result.motions[0].metrics[0]
+    if keyed:
+        counts = sorted({motion.metrics[0].keys for motion in result.motions})
+        keys = f"{counts[0]} to {counts[-1]} keys" if len(counts) > 1 else f"{counts[0]} keys"
+        keys += ", where each mode needs them"
+    else:
+        keys = f"{row.key_frames} key poses" if row.joints else f"{row.keys} keys"
+    sent = "" if keyed else f", {row.bytes_per_s:.0f} bytes/s"
+    peaks = f"; in the chart the largest of every {every}" if every > 1 else ""
+    return f"{keys} in {row.duration_s:.2f} s{sent}, {row.samples} samples{peaks}"

@@ -1,0 +1,166 @@
+"""The numbers of a run as one array, gathered clip by clip: thousands of clips are a few megabytes.
+
+Values are in the units that the report shows: millimetres, degrees, keys and bytes a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from math import floor, isfinite, log10
+
+import numpy as np
+
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import NOTHING, Metrics, geometric_mean
+from rigid_motion_batch.analysis.modes import REFERENCE, label_of
+from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
+from rigid_motion_batch.analysis.results import ClipResult
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number that a clip has under one choice of keys and one mode."""
+
+    metric: str
+    """The field of `Metrics`."""
+
+    title: str
+    unit: str
+    factor: float = 1.0
+    """From the metric's unit to this one."""
+
+    def of(self, row: Metrics) -> float:
+        value = getattr(row, self.metric)
+        return float("nan") if value is None else value * self.factor
+
+
+MEASURES = (
+    Measure("rms_shell_m", "Shell error, RMS", "mm", 1e3),
+    Measure("p95_shell_m", "Shell error, 95th percentile", "mm", 1e3),
+    Measure("max_shell_m", "Shell error, largest", "mm", 1e3),
+    Measure("rms_position_m", "Position, RMS", "mm", 1e3),
+    Measure("rms_rotation_deg", "Rotation, RMS", "°"),
+    Measure("rms_velocity_m_s", "Velocity, RMS", "mm/s", 1e3),
+    Measure("keys_per_s", "Keys", "/s"),
+    Measure("bytes_per_s", "Size", "bytes/s"),
+    Measure("foot_slide_m", "Feet slide", "mm", 1e3),
+)
+NONE, MINUS = "\u2013", "\u2212"
+
+ERROR, LARGEST, KEYS = 0, 2, 6
+"""Places of measures. The RMS shell error decides, or the keys a second where a tolerance limits the error."""
+
+KINDS: tuple[type[Choice], ...] = (Uniform, Budget, Tolerance)
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """All numbers of a run."""
+
+    clips: tuple[str, ...]
+    choices: tuple[Choice, ...]
+    """By kind, and from the smallest amount to the largest."""
+
+    modes: tuple[str, ...]
+    values: np.ndarray
+    """Shape (measures, clips, choices, modes); NaN where a clip is too short for a choice."""
+
+    groupings: tuple[frozenset[Groups], ...]
+    """Of each clip, the modes that are one motion under each choice."""
+
+    names: dict[str, str] = field(default_factory=dict)
+    """Of modes that `MODES` does not have, such as somebody else's motion."""
+
+    @property
+    def reference(self) -> str | None:
+        """The mode that others are held against."""
+        return REFERENCE if REFERENCE in self.modes else None
+
+    def label(self, mode: str) -> str:
+        """The name of a mode, without its algebra."""
+        return self.names.get(mode) or label_of(mode).partition(" (")[0]
+
+    def full_label(self, mode: str) -> str:
+        """The name of a mode with its algebra."""
+        return self.names.get(mode) or label_of(mode)
+
+    def joined(self, modes: Iterable[str]) -> str:
+        """The names of modes that are one motion."""
+        return " = ".join(map(self.label, modes))
+
+    def groups(self, clip: int | None = None) -> Groups:
+        """The modes, those together that are one motion on a clip, or on all of them, under every choice."""
+        groupings = self.groupings if clip is None else self.groupings[clip : clip + 1]
+        return joint_groups(sorted({groups for some in groupings for groups in some}))
+
+    def mean(self, clip: int | None = None) -> np.ndarray:
+        """The numbers of a clip, or the geometric means over those that have them, shape (measures, choices, modes)."""
+        if clip is not None:
+            return self.values[:, clip]
+        return np.stack([geometric_mean(of_clips) for of_clips in self.values])
+
+    def deciding(self, choice: int) -> int:
+        """The measure that decides under a choice."""
+        return KEYS if isinstance(self.choices[choice], Tolerance) else ERROR
+
+
+class Gathering:
+    """Numbers while clips come in, one at a time."""
+
+    def __init__(self) -> None:
+        self._rows: list[dict[Choice, dict[str, np.ndarray]]] = []
+        self._clips: list[str] = []
+        self._groupings: list[frozenset[Groups]] = []
+        self._known: dict[frozenset[Groups], frozenset[Groups]] = {}
+
+    def add(self, clip: ClipResult) -> None:
+        """Take the numbers of a clip, and nothing that is as long as it."""
+        self._clips.append(clip.facts.name)
+        self._rows.append(
+            {
+                result.choice: {
+                    row.mode: np.array([measure.of(row) for measure in MEASURES])
+                    for motion in result.motions
+                    for row in motion.metrics
+                }
+                for result in clip.choices
+            }
+        )
+        groupings = frozenset(tuple(motion.modes for motion in result.motions) for result in clip.choices)
+        self._groupings.append(self._known.setdefault(groupings, groupings))
+
+    def numbers(self, names: dict[str, str] | None = None) -> Numbers:
+        """All of them. Raises ValueError where no clip had a result."""
+        found = dict.fromkeys(choice for rows in self._rows for choice in rows)
+        choices = tuple(sorted(found, key=lambda choice: (KINDS.index(type(choice)), choice.size)))
+        modes = tuple(dict.fromkeys(mode for rows in self._rows for by_mode in rows.values() for mode in by_mode))
+        if not choices:
+            raise ValueError("no reconstruction to report: every clip is too short for two keys")
+        values = np.full((len(MEASURES), len(self._clips), len(choices), len(modes)), np.nan)
+        columns = {choice: place for place, choice in enumerate(choices)}
+        for clip, rows in enumerate(self._rows):
+            for choice, by_mode in rows.items():
+                for mode, row in by_mode.items():
+                    values[:, clip, columns[choice], modes.index(mode)] = row
+        return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings), names or {})
+
+
+def digits(value: float | None, places: int = 3) -> str:
+    """A number with so many significant digits, as tables show it."""
+    if value is None or not isfinite(value):
+        return NONE
+    if abs(value) < NOTHING * 1e3:
+        return "0"
+    return f"{value:.{max(0, places - 1 - floor(log10(abs(value))))}f}"
+
+
+def percent(share: float) -> str:
+    """A share as prose has it: "64 %"."""
+    return f"{100 * share:.0f}\u00a0%"
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words as prose lists them: "5, 10 and 15"."""
+    words = list(words)
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))

@@ -1,0 +1,420 @@
+"""Pages: what the other modules made of a run, put into the templates, with the viewer and its data in the page itself.
+
+A content security policy forbids every request, and every script but the page's own; films, and data that would be too
+large for the page, are files beside it.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, field, fields
+from datetime import datetime
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+
+from rigid_motion_batch.analysis.choices import Choice
+from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.modes import description_of
+from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.analysis.results import ClipFacts, ClipResult
+from rigid_motion_batch.files import replacing, write_text
+from rigid_motion_batch.rows import line_of
+
+from . import charts, tables
+from .colours import ERROR_COLOURS, colours_of
+from .data import clip_data, json_in_page, mesh_data
+from .joints import Joints, joints_of
+from .mesh import Mesh, drill
+from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
+from .verdict import Verdict, verdict
+
+HERE = Path(__file__).parent
+
+SCRIPTS = ("data", "mathematics", "state", "pointers", "drawing", "view", "chart", "tables", "page")
+"""The modules of the viewer, each after those that it imports."""
+
+ON_ONE_PAGE = 24
+"""So many clips are one page; more have a page each."""
+
+IN_THE_PAGE = 5_000_000
+"""Bytes of data of all clips; where they are more, each clip has a file beside the page."""
+
+MOST_TABS = 8
+"""More clips are a list to choose from."""
+
+MOST_WARNINGS = 3
+"""More are folded."""
+
+Films = Mapping[tuple[str, str], Path | None]
+"""(clip name, name of the choice) to its film, which may not be there yet; None where it could not be made."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the reader needs to know of a run, beyond the numbers themselves."""
+
+    radius: float
+    """Of the shell of a rigid body, in metres."""
+
+    program: str
+    """Name and version."""
+
+    command: str
+    """The command line, as one would type it."""
+
+    date: datetime = field(default_factory=datetime.now)
+
+    joint_radius: float = JOINT
+    """Of the shell of a joint, in metres."""
+
+    details: Mapping[str, str] = field(default_factory=dict)
+    """Whatever else is worth a line, such as Blender's version: what it is, and its value."""
+
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Of modes that are not in `MODES`, such as somebody else's motion: id to name."""
+
+
+@dataclass(frozen=True)
+class Warned:
+    """A warning, and the address of its moment on the page."""
+
+    clip: str
+    text: str
+    way_out: str
+    address: str
+
+
+def write_report(
+    path: Path,
+    clips: Iterable[ClipResult],
+    settings: Settings,
+    films: Films | None = None,
+    *,
+    folder: Path | None = None,
+    mesh: Mesh | None = None,
+    overview: str = "",
+    advance: Callable[[], object] = lambda: None,
+) -> list[Path]:
+    """Write one page on some clips.
+
+    Parameters
+    ----------
+    path : Path
+        Of the page.
+    clips : iterable of ClipResult
+        Gone through once, and only one of them is in memory at a time.
+    settings : Settings
+    films : mapping, optional
+        Nothing where the run does without films.
+    folder : Path, optional
+        Where the page will be in the end: what links are relative to. That of `path` unless given.
+    mesh : Mesh, optional
+        Of the object that single rigid bodies move in the viewer; a drill unless given.
+    overview : str
+        The way to a page of more clips; empty where there is none.
+    advance : callable
+        Called once for every clip.
+
+    Returns
+    -------
+    list of Path
+        The page, and the files of data that were written beside it, in a folder named after it.
+
+    Raises
+    ------
+    ValueError
+        Where there is nothing to report.
+    """
+    folder = folder or path.parent
+    films, mesh = films or {}, mesh or drill()
+    gathering, page = Gathering(), _Clips(path, films, folder, mesh)
+    for clip in clips:
+        page.facts.append(clip.facts)
+        if clip.choices:
+            gathering.add(clip)
+            page.add(clip, settings.names)
+        advance()
+    numbers = gathering.numbers(dict(settings.names))
+    start = _start(numbers, page.choices)
+    context = _context(numbers, page.needed, settings) | {
+        "clips": page,
+        "overview": overview,
+        "script": script_of(SCRIPTS),
+        "start": start,
+        "warnings": page.warnings(start[1]),
+        "grids": [
+            grid
+            for clip in (None, *(range(len(numbers.clips)) if len(numbers.clips) > 1 else ()))
+            for grid in tables.grids(numbers, clip)
+        ],
+        "page": json_in_page(
+            {
+                "clips": page.places,
+                "modes": list(numbers.modes),
+                "mesh": mesh_data(mesh),
+                "shaders": _shaders(),
+                "ramp": ERROR_COLOURS,
+                "start": {"clip": start[0], "choice": start[1]},
+            }
+        ),
+    }
+    _write(path, "page.html.j2", context)
+    return [path, *page.files]
+
+
+def write_overview(
+    path: Path,
+    clips: Iterable[ClipResult],
+    settings: Settings,
+    pages: Mapping[str, str | None],
+    *,
+    advance: Callable[[], object] = lambda: None,
+) -> None:
+    """Write the page of many clips, those that matter first: with a warning, and then by the largest error.
+
+    Parameters
+    ----------
+    path, clips, settings, advance
+        As of `write_report`; of the clips the numbers alone are looked at.
+    pages : mapping
+        Clip name to the way from this page to the clip's; None where there is none.
+
+    Raises
+    ------
+    ValueError
+        Where there is nothing to report.
+    """
+    gathering = Gathering()
+    needed: list[KeysNeeded] = []
+    facts: list[ClipFacts] = []
+    warnings: list[int] = []
+    for clip in clips:
+        if clip.choices:
+            gathering.add(clip)
+            facts.append(clip.facts)
+            warnings.append(len(clip.warnings))
+        if clip.needed:
+            needed.append(clip.needed)
+        advance()
+    numbers = gathering.numbers(dict(settings.names))
+    context = _context(numbers, needed, settings) | {
+        "script": script_of(("tables",)),
+        "grids": tables.grids(numbers),
+        "rows": _overview_rows(numbers, facts, warnings, pages),
+        "count": len(facts),
+        "warned": sum(map(bool, warnings)),
+    }
+    _write(path, "overview.html.j2", context)
+
+
+# -- clips of a page --------------------------------------------------------------------------------------------------
+
+
+class _Clips:
+    """What a page has of its clips, gathered one after the other."""
+
+    def __init__(self, path: Path, films: Films, folder: Path, mesh: Mesh) -> None:
+        self.facts: list[ClipFacts] = []
+        self.needed: list[KeysNeeded] = []
+        self.choices: list[tuple[str, tuple[Choice, ...]]] = []
+        self.metrics: list[Metrics] = []
+        self.rows: list[Any] = []
+        self.joints: list[Joints] = []
+        self.decimated: list[Any] = []
+        self.segments: list[tuple[str, str, str]] = []
+        self.films: list[tuple[int, str, str | None]] = []
+        self.places: list[dict[str, Any]] = []
+        """What the script finds them by."""
+        self.inside: list[str] = []
+        """Their data, as JSON."""
+        self.files: list[Path] = []
+        self._warned: list[tuple[str, tuple[Any, ...], float]] = []
+        self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
+
+    def add(self, clip: ClipResult, names: Mapping[str, str]) -> None:
+        name, place = clip.facts.name, len(self.places)
+        numbers = Gathering()
+        numbers.add(clip)
+        own = numbers.numbers(dict(names))
+        self.choices.append((name, tuple(result.choice for result in clip.choices)))
+        self.rows += tables.every_row(clip)
+        self._warned.append((name, clip.warnings, float(clip.times[0])))
+        if clip.needed:
+            self.needed.append(clip.needed)
+        for result in clip.choices:
+            self.metrics += [row for motion in result.motions for row in motion.metrics]
+            if (name, result.choice.name) in self._films:
+                self.films.append((place, result.choice.name, self._link(self._films[name, result.choice.name])))
+            if joints := joints_of(place, clip, result, own):
+                self.joints.append(joints)
+            if rows := tables.decimated_rows(result):
+                self.decimated.append((name, result.choice, rows))
+            if said := tables.segments_of(result, own):
+                self.segments.append((name, result.choice.title, said))
+        self.places.append({"name": name, "data": ""})
+        self.inside.append(json_in_page(clip_data(clip, own.label, self._mesh)))
+        if self.files or sum(map(len, self.inside)) > IN_THE_PAGE:
+            self._move_out()
+
+    def _move_out(self) -> None:
+        """Have the data of all clips so far in files beside the page: script elements bring them, also from disks."""
+        beside = self._path.with_name(f"{self._path.stem}_data")
+        for place, data in enumerate(self.inside):
+            if data:
+                file = beside / f"{place + 1}.js"
+                write_text(file, f"rigidMotionClips[{place}]({data});\n")
+                self.files.append(file)
+                self.places[place]["data"] = f"{quote(beside.name)}/{file.name}"
+                self.inside[place] = ""
+
+    def _link(self, film: Path | None) -> str | None:
+        return None if film is None else quote(Path(os.path.relpath(film, self._folder)).as_posix())
+
+    def warnings(self, choice: str) -> list[Warned]:
+        """All warnings, with the addresses of their moments under a choice."""
+        return [
+            Warned(
+                name,
+                one.text,
+                one.way_out,
+                _address(name, choice, None if one.start_s is None else one.start_s - begin),
+            )
+            for name, warned, begin in self._warned
+            for one in warned
+        ]
+
+
+def _address(clip: str, choice: str, seconds: float | None = None) -> str:
+    """As the script's `addressOf` writes it."""
+    moment = "" if seconds is None else f",{max(seconds, 0.0):.3f}"
+    return f"#{quote(clip, safe='')},{quote(choice, safe='')}{moment}"
+
+
+def _start(numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]]) -> tuple[str, str]:
+    """What the page opens with: of the first kind of choices the middle one, and the clip with the largest error."""
+    kind = next(kind for kind in KINDS for choice in numbers.choices if type(choice) is kind)
+    places = [place for place, choice in enumerate(numbers.choices) if type(choice) is kind]
+    at = places[(len(places) - 1) // 2]
+    mode = numbers.modes.index(numbers.reference) if numbers.reference else 0
+    largest = numbers.values[LARGEST, :, at, mode]
+    clip = int(np.nanargmax(largest)) if np.isfinite(largest).any() else 0
+    choice = numbers.choices[at]
+    return numbers.clips[clip], choice.name if choice in choices[clip][1] else choices[clip][1][0].name
+
+
+# -- many clips -------------------------------------------------------------------------------------------------------
+
+
+def _overview_rows(
+    numbers: Numbers, facts: Sequence[ClipFacts], warnings: Sequence[int], pages: Mapping[str, str | None]
+) -> Iterator[dict[str, Any]]:
+    groups = [group[0] for group in numbers.groups()]
+    columns = [numbers.modes.index(mode) for mode in groups]
+    beside = numbers.modes.index(numbers.reference or numbers.modes[0])
+    shown = numbers.values[LARGEST]
+    largest = shown.max(axis=(1, 2), initial=0.0, where=np.isfinite(shown))
+    order = sorted(range(len(facts)), key=lambda place: (not warnings[place], -largest[place]))
+    for place in order:
+        cells = []
+        for choice in range(len(numbers.choices)):
+            own = numbers.values[numbers.deciding(choice), place, choice]
+            if not np.isfinite(own[columns]).any():
+                cells.append(tables.Cell("too short", value=-1.0))
+                continue
+            best = columns[int(np.nanargmin(own[columns]))]
+            share = own[best] / own[beside] - 1.0 if own[beside] > 0.0 else 0.0
+            name = numbers.label(numbers.modes[best])
+            gain = f"{name} {MINUS}{percent(-share)}" if share < -0.005 else ""
+            cells.append(tables.Cell(digits(own[beside]), gain, value=float(np.nan_to_num(own[beside]))))
+        page = pages.get(facts[place].name)
+        yield {
+            "facts": facts[place],
+            "page": quote(page) if page else "",
+            "warnings": warnings[place],
+            "largest": digits(largest[place]),
+            "cells": cells,
+        }
+
+
+# -- templates --------------------------------------------------------------------------------------------------------
+
+
+def _context(numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings) -> dict[str, Any]:
+    said: Verdict = verdict(numbers, needed)
+    return {
+        "numbers": numbers,
+        "verdict": said,
+        "settings": settings,
+        "needed": needed,
+        "measures": MEASURES,
+        "deciding": numbers.deciding(0),
+        "colours": [colours_of(mode) for mode in numbers.modes],
+        "descriptions": [description_of(mode) for mode in numbers.modes],
+        "style": Markup((HERE / "templates" / "page.css").read_text(encoding="utf-8")),
+        "most_tabs": MOST_TABS,
+        "most_warnings": MOST_WARNINGS,
+        "ramp": ERROR_COLOURS,
+    }
+
+
+@cache
+def _templates() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(HERE / "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.globals |= {
+        "chart": charts.chart,
+        "address": _address,
+        "every_head": tables.EVERY_HEAD,
+        "needed_rows": tables.needed_rows,
+        "csv": _csv,
+        "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
+    }
+    environment.filters |= {"digits": digits}
+    return environment
+
+
+def _write(path: Path, template: str, context: Mapping[str, Any]) -> None:
+    with replacing(path) as stream:
+        stream.writelines(_templates().get_template(template).generate(context))
+
+
+def _csv(rows: Sequence[Metrics]) -> str:
+    """Rows as the address of a table, as in metrics.csv."""
+    lines = (line_of(("" if cell is None else cell) for cell in astuple(row)) for row in rows)
+    text = "".join((line_of(column.name for column in fields(Metrics)), *lines))
+    return f"data:text/csv;base64,{base64.b64encode(text.encode()).decode('ascii')}"
+
+
+@cache
+def script_of(names: tuple[str, ...]) -> Markup:
+    """The modules as one: imports and exports are only there for each of them alone."""
+    texts = []
+    for name in names:
+        text = (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8")
+        text = re.sub(r"^import .*?;\n", "", text, flags=re.MULTILINE | re.DOTALL)
+        texts.append(re.sub(r"^export ", "", text, flags=re.MULTILINE))
+    return Markup("\n".join(texts))
+
+
+@cache
+def _shaders() -> dict[str, list[str]]:
+    """The sources of each program: of its vertices, and of its fragments."""
+    text = (HERE / "viewer" / "shaders.glsl").read_text(encoding="utf-8")
+    parts = re.split(r"^//// (\w+)\n", text, flags=re.MULTILINE)[1:]
+    return {name: sources.split("----\n") for name, sources in zip(parts[::2], parts[1::2], strict=True)}

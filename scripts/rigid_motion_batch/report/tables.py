@@ -1,0 +1,205 @@
+"""The tables of the report, as rows of text for the templates: lower is better in all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_motion_batch.analysis.body_decimated import DECIMATE
+from rigid_motion_batch.analysis.modes import BEST_OF
+from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
+from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
+
+from .numbers import MEASURES, MINUS, NONE, Numbers, digits, listed, percent
+
+SPACINGS = dict(zip(DECIMATIONS, ("evenly spaced", "where needed", "where needed, and fitted"), strict=True))
+
+
+@dataclass(frozen=True)
+class Cell:
+    text: str
+    small: str = ""
+    best: bool = False
+    value: float | None = None
+    """What it is sorted by, where that is not the text."""
+
+
+@dataclass(frozen=True)
+class Row:
+    modes: tuple[str, ...]
+    """Those that are one motion."""
+
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All modes under all choices of keys, by one measure."""
+
+    scope: str
+    """The place of a clip, or "all"."""
+
+    column: int
+    """The measure."""
+
+    caption: str
+    heads: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+
+def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
+    """A grid for each measure that a clip has, or that the mean over all clips has."""
+    values = numbers.mean(clip)
+    groups = numbers.groups(clip)
+    where = (
+        numbers.clips[clip]
+        if clip is not None
+        else f"geometric mean over {len(numbers.clips)} clips"
+        if len(numbers.clips) > 1
+        else numbers.clips[0]
+    )
+    columns = [numbers.modes.index(group[0]) for group in groups]
+    reference = numbers.modes.index(numbers.reference) if numbers.reference else None
+    found = []
+    for place, measure in enumerate(MEASURES):
+        own = values[place][:, columns]
+        if not np.isfinite(own).any():
+            continue
+        texts = [[digits(value) for value in row] for row in own.tolist()]
+        # What is as small as it is shown is as good: ties are ties.
+        least = [_least(row) for row in texts]
+        rows = tuple(
+            Row(
+                group,
+                tuple(
+                    Cell(
+                        texts[choice][column],
+                        _change(own[choice, column], reference, values[place, choice], group, numbers),
+                        len(groups) > 1 and texts[choice][column] == least[choice],
+                    )
+                    for choice in range(len(numbers.choices))
+                ),
+            )
+            for column, group in enumerate(groups)
+        )
+        caption = f"{measure.title}, {measure.unit}: {where}"
+        scope = "all" if clip is None else str(clip)
+        found.append(Grid(scope, place, caption, tuple(choice.title for choice in numbers.choices), rows))
+    return found
+
+
+def _least(texts: Iterable[str]) -> str:
+    return min((text for text in texts if text != NONE), key=float, default="")
+
+
+def _change(value: float, reference: int | None, row: np.ndarray, group: Sequence[str], numbers: Numbers) -> str:
+    """A value beside the reference's, in per cent."""
+    if reference is None or not np.isfinite(value):
+        return ""
+    if numbers.reference in group:
+        return "reference"
+    if not row[reference] > 0.0:
+        return ""
+    change = 100.0 * (value / row[reference] - 1.0)
+    shown = f"{abs(change):.1f}" if abs(change) < 9.95 else f"{abs(change):.0f}"
+    return "same" if shown == "0.0" else f"{'+' if change > 0 else MINUS}{shown}\u00a0%"
+
+
+def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[Cell, ...]]]:
+    """Clip, choice, modes and numbers: a row for each motion under each choice."""
+    found = []
+    for result in clip.choices:
+        lines = [
+            [str(row.keys), digits(row.keys_per_s)] + [digits(measure.of(row)) for measure in COUNTED]
+            for motion in result.motions
+            for row in motion.metrics[:1]
+        ]
+        least = [
+            min((text for text in column if text != NONE), key=float, default="") for column in zip(*lines, strict=True)
+        ]
+        found += [
+            (
+                clip.facts.name,
+                result.choice.title,
+                motion.modes,
+                tuple(Cell(text, best=len(lines) > 1 and text == best) for text, best in zip(line, least, strict=True)),
+            )
+            for motion, line in zip(result.motions, lines, strict=True)
+        ]
+    return found
+
+
+COUNTED = tuple(measure for measure in MEASURES if measure.metric != "keys_per_s")
+EVERY_HEAD = (
+    ("Keys", ""),
+    ("Keys", "/s"),
+    *((measure.title.replace(" error", ""), measure.unit) for measure in COUNTED),
+)
+
+
+def needed_rows(needed: Sequence[KeysNeeded]) -> tuple[list[str], list[tuple[tuple[str, ...], str, list[Cell]]]]:
+    """Heads, and for each motion and way to space keys the keys that are as good as the reference's at each rate."""
+    together = overall(needed)
+    asked = [at for at in range(len(together.rates)) if together.asked[at]]
+    single = needed[0] if len(needed) == 1 else None
+    finite = np.where(np.isfinite(together.shares), together.shares, np.inf)
+    rows = []
+    for group, modes in enumerate(together.groups):
+        for way in range(together.shares.shape[1]):
+            cells = []
+            for at in asked:
+                share, reached = together.shares[group, way, at], int(together.clips[group, way, at])
+                if not reached:
+                    cells.append(Cell("not reached", value=1e9))
+                    continue
+                number = (
+                    f"{single.keys[group, way, at]:.0f}"
+                    if single
+                    else f"{digits(together.keys_per_s[group, way, at])}/s"
+                )
+                partly = f" on {reached} of {together.asked[at]} clips" if reached < together.asked[at] else ""
+                best = bool(share <= finite[..., at].min() + 5e-3)
+                cells.append(Cell(number, percent(share) + partly, best, float(share)))
+            rows.append((modes, SPACINGS[DECIMATIONS[way]], cells))
+    return [f"{together.rates[at]}/s" for at in asked], rows
+
+
+def decimated_rows(result: ChoiceResult) -> list[tuple[tuple[str, ...] | None, list[Cell]]]:
+    """The keys of each motion of a body, and those of Blender's Decimate with no larger error, as multiples of them."""
+    ours = {row.mode: row for row in result.decimated if row.how != DECIMATE}
+    theirs = {row.mode: row for row in result.decimated if row.how == DECIMATE}
+    rows: list[tuple[tuple[str, ...] | None, list[Cell]]] = []
+    for motion in result.motions:
+        own, left = ours.get(motion.modes[0]), theirs.get(motion.modes[0])
+        if own is None:
+            continue
+        counts = [own.frames_with_keys, own.keys, own.numbers, 1e3 * own.max_shell_m]
+        cells = [Cell(digits(value) if isinstance(value, float) else str(value)) for value in counts]
+        for name in ("frames_with_keys", "numbers"):
+            count = getattr(own, name)
+            if left is None or not count:
+                cells.append(Cell("not reached" if count else "nothing moves"))
+            else:
+                cells.append(Cell(f"{getattr(left, name) / count:.2f}", f"{getattr(left, name)} of Decimate"))
+        rows.append((motion.modes, cells))
+    return rows
+
+
+def segments_of(result: ChoiceResult, numbers: Numbers) -> str:
+    """Which modes were best in how many segments, in a sentence; empty without `best_of`."""
+    found = result.segment_modes
+    if found is None:
+        return ""
+    errors = {row.mode: row.rms_shell_m for motion in result.motions for row in motion.metrics}
+    counts = sorted(found.counts.items(), key=lambda item: -item[1])
+    modes = listed(f"{numbers.label(mode)} in {count}" for mode, count in counts)
+    said = f"Of {sum(found.counts.values())} segments {modes}; the mode changes at {found.changes} keys."
+    if BEST_OF in errors and errors.get(found.best_single, 0.0) > 0.0:
+        less = 1.0 - errors[BEST_OF] / errors[found.best_single]
+        said += (
+            f" RMS shell error beside {numbers.label(found.best_single)}, the best single mode: {percent(abs(less))} "
+        )
+        said += "lower." if less > 0 else "higher."
+    return said

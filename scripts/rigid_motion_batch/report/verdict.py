@@ -1,0 +1,424 @@
+"""The verdict: one sentence with a number that answers "which mode", and up to three facts beside it.
+
+Everything is computed from the numbers of the run, and true for any outcome of it. Errors are RMS shell errors;
+several clips are averaged by the geometric mean, so that a large motion counts as much as a small one. Modes that are
+one motion throughout are one candidate, and the first of them names it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_motion.motion import MODES
+from rigid_motion_batch.analysis.choices import Budget, Tolerance
+from rigid_motion_batch.analysis.metrics import NOTHING, geometric_mean
+from rigid_motion_batch.analysis.modes import BEST_OF, REFERENCE
+from rigid_motion_batch.analysis.needed import DECIMATIONS, KeysNeeded, overall
+
+from .numbers import ERROR, KINDS, MINUS, Numbers, digits, listed, percent
+
+TIE = 0.005
+"""Ratios closer to 1 than this are no difference: they would be shown as 0 %."""
+
+ASKED = ("20", "15", "12", "30")
+"""The rate of the reference that the sentence on keys needed is about: the first that was possible."""
+
+SPACED = {
+    "uniform": "evenly spaced keys",
+    "adaptive": "keys where the motion needs them",
+    "fitted": "fitted keys",
+}
+
+SAMPLE_IS_KEY = "No mode is off by more than rounding: every sample is a key, or nothing moves."
+
+
+@dataclass(frozen=True)
+class Part:
+    """A stretch of text: plain, a number, the name of a mode, or a link to a clip under a choice."""
+
+    text: str
+    kind: str = ""
+    """"", "number", "mode" or "link"."""
+
+    target: str = ""
+    """The id of the mode; of a link the clip and the choice's name, with a comma."""
+
+
+Text = tuple[Part, ...]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a run comes to."""
+
+    sentence: Text
+    facts: tuple[Text, ...] = ()
+
+    def __str__(self) -> str:
+        return plain(self.sentence)
+
+
+def plain(text: Text) -> str:
+    """The words alone, as a terminal shows them."""
+    return "".join(part.text for part in text).replace("\u00a0", " ")
+
+
+@dataclass(frozen=True, eq=False)
+class _Contest:
+    """The candidates of a run under its choices of one kind."""
+
+    numbers: Numbers
+    places: tuple[int, ...]
+    """Of the choices among those of the run."""
+
+    groups: tuple[tuple[str, ...], ...]
+    values: np.ndarray
+    """What decides, shape (clips, choices, groups)."""
+
+    @property
+    def kind(self) -> type:
+        return type(self.numbers.choices[self.places[0]])
+
+    @property
+    def amounts(self) -> np.ndarray:
+        return np.array([self.numbers.choices[place].size for place in self.places])
+
+    @property
+    def reference(self) -> int | None:
+        """The group that the reference is in."""
+        return next((place for place, group in enumerate(self.groups) if REFERENCE in group), None)
+
+    @property
+    def told_apart(self) -> np.ndarray:
+        """Where all groups have a value and at least one of them has an error, shape (clips, choices)."""
+        least = NOTHING * 1e3 if self.kind is not Tolerance else 0.0
+        return np.isfinite(self.values).all(axis=2) & (self.values.max(axis=2) > least)
+
+    @property
+    def means(self) -> np.ndarray:
+        """Geometric means over the clips where groups can be told apart, shape (choices, groups)."""
+        return geometric_mean(np.where(self.told_apart[..., None], np.maximum(self.values, 1e-9), np.nan))
+
+    def phrase(self, choice: int) -> str:
+        return self.numbers.choices[self.places[choice]].phrase
+
+    def name(self, group: int) -> Part:
+        mode = self.groups[group][0]
+        return Part(self.numbers.label(mode), "mode", mode)
+
+
+def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
+    """What a run says, in one sentence and up to three facts.
+
+    Parameters
+    ----------
+    numbers : Numbers
+    needed : sequence of KeysNeeded
+        Of the clips, where that was looked for.
+    """
+    contests = list(_contests(numbers))
+    sentences = [_keys_needed(numbers, needed) if needed else None]
+    sentences += [tell(contest) for contest in contests for tell in (_fewer_keys, _within, _lower_error)]
+    said = [sentence for sentence in sentences if sentence]
+    if not said:
+        return Verdict((Part(SAMPLE_IS_KEY),))
+    facts: list[Text] = []
+    if contests:
+        first = contests[0]
+        gain = _gain(first)
+        if gain and gain != said[0] and said[0] != _lower_error(first):
+            facts.append(gain)
+        others = [_gain(contest) for contest in contests[1:]]
+        facts += [fact for fact in (_wins(first), *others, _best_of(numbers, first), _others(first)) if fact]
+    return Verdict(said[0], tuple(facts[:3]))
+
+
+def _contests(numbers: Numbers) -> Iterable[_Contest]:
+    """One for each kind of choices under which anything was off."""
+    groups = tuple(
+        own for group in numbers.groups() if (own := tuple(mode for mode in group if mode in MODES)) and own[0] in MODES
+    )
+    for kind in KINDS:
+        places = tuple(place for place, choice in enumerate(numbers.choices) if type(choice) is kind)
+        if not places or not groups:
+            continue
+        columns = [numbers.modes.index(group[0]) for group in groups]
+        measure = numbers.deciding(places[0])
+        values = numbers.values[measure][:, places][..., columns]
+        contest = _Contest(numbers, places, groups, values)
+        if contest.told_apart.any():
+            yield contest
+
+
+def _best(contest: _Contest) -> tuple[int, int, np.ndarray] | None:
+    """The best group, what it is held against, and the ratios of the two, shape (choices,); None without a winner.
+
+    Held against the reference, or the next best in a run without it.
+    """
+    if len(contest.groups) < 2:
+        return None
+    means = contest.means
+    known = np.isfinite(means).all(axis=1)
+    scores = np.log(means[known]).mean(axis=0)
+    ranked = np.argsort(scores, kind="stable")
+    best = int(ranked[0])
+    rival = contest.reference if contest.reference is not None else int(ranked[1])
+    if np.exp(scores[best] - scores[rival]) > 1.0 - TIE:
+        return None
+    return best, rival, means[:, best] / means[:, rival]
+
+
+# -- sentences --------------------------------------------------------------------------------------------------------
+
+
+def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
+    """How few keys are as good as those of the reference at a rate, of those that were looked for."""
+    together = overall(needed)
+    rate = next((rate for rate in ASKED if together.asked[together.rates.index(rate)]), None)
+    if rate is None:
+        return None
+    at = together.rates.index(rate)
+    whole = together.clips[..., at] == together.asked[at]
+    shares = np.where(whole, together.shares[..., at], np.inf)
+    group, way = np.unravel_index(int(shares.argmin()), shares.shape)
+    mode = together.groups[group][0]
+    reference = Part(numbers.label(REFERENCE), "mode", REFERENCE)
+    if shares[group, way] > 1.0 - TIE:
+        return Part("No mode needs fewer keys than "), reference, Part(" at "), Part(rate, "number"), Part(" a second.")
+    return (
+        Part(numbers.label(mode), "mode", mode),
+        Part(f", with {SPACED[DECIMATIONS[way]]}, does with "),
+        Part(f"{together.keys_per_s[group, way, at]:.3g}", "number"),
+        Part(" a second where "),
+        Part("it") if mode == REFERENCE else reference,
+        Part(" needs "),
+        Part(f"{together.reference_keys_per_s[at]:.3g}", "number"),
+        Part(f" evenly spaced: {percent(1.0 - shares[group, way])} fewer for the same error."),
+    )
+
+
+def _fewer_keys(contest: _Contest) -> Text | None:
+    """How far down the rate can go, until the error is that of the reference at a higher one.
+
+    None where the curves of this run do not tell: rates that do not cross, or an error that does not fall with them.
+    """
+    found = _best(contest)
+    if contest.kind is Tolerance or not found or contest.reference is None or len(contest.places) < 2:
+        return None
+    best, reference, _ = found
+    whole = contest.told_apart.all(axis=1)
+    if not whole.any():
+        return None
+    curves = np.log(np.maximum(contest.values[whole], 1e-9)).mean(axis=0)
+    own, theirs, rates = curves[:, best], curves[:, reference], contest.amounts
+    if np.any(np.diff(own) >= 0.0):
+        return None
+    for highest in range(len(rates) - 1, 0, -1):
+        if own[-1] <= theirs[highest] and own[highest] < theirs[highest]:
+            break
+    else:
+        return None
+    rate = float(np.exp(np.interp(-theirs[highest], -own, np.log(rates))))
+    at_most = theirs[highest] > own[0]
+    share = 1.0 - rate / rates[highest]
+    if share < TIE:
+        return None
+    placed = " on average" if contest.kind is Budget else ""
+    return (
+        contest.name(best),
+        Part(" needs at most " if at_most else " needs "),
+        Part(f"{rate:.3g}", "number"),
+        Part(f" keys a second{placed} where "),
+        contest.name(reference),
+        Part(" needs "),
+        Part(f"{rates[highest]:g}", "number"),
+        Part(f": {'at least ' if at_most else ''}{percent(share)} fewer keys for the same error."),
+    )
+
+
+def _within(contest: _Contest) -> Text | None:
+    """How many keys a mode needs within a tolerance."""
+    if contest.kind is not Tolerance:
+        return None
+    found = _best(contest)
+    if not found:
+        return _nobody(contest)
+    best, rival, ratios = found
+    at = int(np.nanargmin(ratios))
+    fewer = percent(1.0 - ratios[at])
+    phrase = contest.phrase(at)
+    return (
+        Part(f"{phrase[0].upper()}{phrase[1:]}, "),
+        contest.name(best),
+        Part(" needs "),
+        Part(f"{contest.means[at, best]:.3g}", "number"),
+        Part(" keys a second where "),
+        contest.name(rival),
+        Part(" needs "),
+        Part(f"{contest.means[at, rival]:.3g}", "number"),
+        Part(f": {fewer} fewer."),
+    )
+
+
+def _lower_error(contest: _Contest) -> Text | None:
+    """How much closer the best mode is with as many keys."""
+    if contest.kind is Tolerance:
+        return None
+    found = _best(contest)
+    if not found:
+        return _nobody(contest)
+    best, rival, ratios = found
+    at = int(np.nanargmin(ratios))
+    name = contest.numbers.choices[contest.places[at]].amount
+    return (
+        contest.name(best),
+        Part(" has "),
+        Part(percent(1.0 - ratios[at]), "number"),
+        Part(" less error than "),
+        contest.name(rival),
+        Part(" with the same "),
+        Part(name, "number"),
+        Part(f" keys a second{' on average' if contest.kind is Budget else ''}."),
+    )
+
+
+def _nobody(contest: _Contest) -> Text:
+    """Where no mode is better than the reference, or than all others; the choice with the most keys speaks."""
+    means, kind = contest.means, contest.kind
+    known = np.flatnonzero(np.isfinite(means).all(axis=1))
+    at = int(known[0] if kind is Tolerance else known[-1])
+    unit = "keys a second" if kind is Tolerance else "mm"
+    value = Part(f"{digits(means[at].min())}\u00a0{unit}", "number")
+    phrase = contest.phrase(at)
+    if len(contest.groups) == 1:
+        modes = contest.groups[0]
+        count = "Both" if len(modes) == 2 else f"All {len(modes)}"
+        alike = Part(f"{count} modes are one motion: ") if len(modes) > 1 else Part("")
+        does = " needs " if kind is Tolerance else " is "
+        off = "" if kind is Tolerance else " off (RMS)"
+        return tuple(
+            part for part in (alike, contest.name(0), Part(does), value, Part(f"{off} {phrase}.")) if part.text
+        )
+    scores = np.log(means[known]).mean(axis=0)
+    if np.ptp(scores) < TIE:
+        differ = "need as many keys" if kind is Tolerance else "are equally close"
+        return (
+            Part(f"The {len(contest.groups)} motions {differ}: "),
+            value,
+            Part(f"{'' if kind is Tolerance else ' off (RMS)'} {phrase}."),
+        )
+    if contest.reference is None:
+        ranked = np.argsort(scores, kind="stable")
+        first, second = contest.name(int(ranked[0])), contest.name(int(ranked[1]))
+        return first, Part(" and "), second, Part(" are the closest, and equally close: "), value, Part(f" {phrase}.")
+    reference = contest.reference
+    others = np.delete(scores, reference)
+    following = int(np.flatnonzero(scores == others.min())[0])
+    more = np.exp(scores[following] - scores[reference]) - 1.0
+    comes = "No mode needs fewer keys than " if kind is Tolerance else "No mode comes closer than "
+    much = "keys" if kind is Tolerance else "error"
+    beside = f"as many {much}" if kind is Tolerance else f"the same {much}"
+    next_best = f"{percent(more)} more {much}" if more >= TIE else beside
+    return (
+        Part(comes),
+        contest.name(reference),
+        Part(": "),
+        Part(f"{digits(means[at, reference])}\u00a0{unit}", "number"),
+        Part(f"{'' if kind is Tolerance else ' off (RMS)'} {phrase}. Next is "),
+        contest.name(following),
+        Part(f" with {next_best}."),
+    )
+
+
+# -- facts ------------------------------------------------------------------------------------------------------------
+
+
+def _gain(contest: _Contest) -> Text | None:
+    """The largest gain with as many keys, beside a sentence that says something else."""
+    found = _best(contest)
+    if not found:
+        return None
+    best, rival, ratios = found
+    at = int(np.nanargmin(ratios))
+    what = "fewer keys" if contest.kind is Tolerance else "lower error"
+    return (
+        Part(f"{percent(1.0 - ratios[at])} {what}", "number"),
+        Part(" from "),
+        contest.name(best),
+        Part(" than from "),
+        contest.name(rival),
+        Part(f" {contest.phrase(at)}"),
+    )
+
+
+def _wins(contest: _Contest) -> Text | None:
+    """In how many cases the best mode was, and where it was beaten by the most."""
+    found = _best(contest)
+    if not found or contest.told_apart.sum() < 2:
+        return None
+    best = found[0]
+    values = np.where(contest.told_apart[..., None], contest.values, np.nan)
+    least = np.where(contest.told_apart, np.nanmin(np.where(np.isnan(values), np.inf, values), axis=2), np.nan)
+    loss = 1.0 - least / values[..., best]
+    lost = contest.told_apart & (loss > TIE)
+    cases, won = int(contest.told_apart.sum()), int((contest.told_apart & ~lost).sum())
+    word = "Fewest keys" if contest.kind is Tolerance else "Closest"
+    beginning = (Part(f"{word} in {won} of {cases}", "number"), Part(" cases"))
+    if not lost.any():
+        return beginning
+    clip, choice = np.unravel_index(int(np.where(lost, loss, -1.0).argmax()), loss.shape)
+    winner = int(np.nanargmin(values[clip, choice]))
+    clip_name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
+    return (
+        *beginning,
+        Part("; not in " if lost.sum() == 1 else "; farthest from it in "),
+        Part(f"{clip_name} {at.phrase}", "link", f"{clip_name},{at.name}"),
+        Part(": there "),
+        contest.name(winner),
+        Part(f" is, by {percent(loss[clip, choice])}"),
+    )
+
+
+def _best_of(numbers: Numbers, contest: _Contest) -> Text | None:
+    """The best mode of each segment beside the best single one of each clip."""
+    if BEST_OF not in numbers.modes or contest.kind is Tolerance:
+        return None
+    own = numbers.values[ERROR][:, contest.places][..., numbers.modes.index(BEST_OF)]
+    single = contest.values.min(axis=2)
+    possible = contest.told_apart & (single > NOTHING * 1e3) & np.isfinite(own)
+    if not possible.any():
+        return None
+    ratio = float(np.exp(np.log(np.maximum(own[possible], 1e-9) / single[possible]).mean()))
+    said = f"{percent(1.0 - ratio)} lower error" if ratio < 1.0 - TIE else "No lower error"
+    return Part(said, "number"), Part(" from the best mode of each segment than from the best single one")
+
+
+def _others(contest: _Contest) -> Text | None:
+    """What did not pay: the modes that are neither the best nor the reference, beside the reference."""
+    found = _best(contest)
+    if not found or contest.reference is None:
+        return None
+    rest = [place for place in range(len(contest.groups)) if place not in (found[0], contest.reference)]
+    if not rest:
+        return None
+    ratios = (contest.means[:, rest] / contest.means[:, [contest.reference]]) - 1.0
+    low, high = float(np.nanmin(ratios)), float(np.nanmax(ratios))
+    what = "keys" if contest.kind is Tolerance else "error"
+    names = listed(contest.name(place).text for place in rest)
+    if abs(low) < TIE and abs(high) < TIE:
+        return Part(f"The same {what}", "number"), Part(f" from {names} as from "), contest.name(contest.reference)
+    if low >= 0.0 or high <= 0.0:
+        small, large = sorted((abs(low), abs(high)))
+        way = ("higher" if high > 0.0 else "lower") if what == "error" else ("more" if high > 0.0 else "fewer")
+        span = percent(large) if round(100 * small) == round(100 * large) else f"{100 * small:.0f} to {percent(large)}"
+        said = f"{span} {way} {what}"
+    else:
+        said = f"{_signed(low)} to {_signed(high)} {what}"
+    return Part(said, "number"), Part(f" from {names} beside "), contest.name(contest.reference)
+
+
+def _signed(share: float) -> str:
+    return f"{'+' if share > 0 else MINUS}{percent(abs(share))}"

@@ -1,0 +1,151 @@
+"""A headless Chromium, driven through its pipe for debugging: pages are opened, looked at and used as by hand."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+NAMES = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome")
+PROGRAM = next((path for name in NAMES if (path := shutil.which(name))), None)
+
+
+WITH_PIPE = """
+import fcntl, os, sys
+pipe = [fcntl.fcntl(int(one), fcntl.F_DUPFD, 10) for one in sys.argv[1:3]]
+os.dup2(pipe[0], 3)
+os.dup2(pipe[1], 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
+"""Becomes a program that has two files of ours as 3 and 4, which is where Chromium looks for its pipe."""
+
+
+class Browser:
+    """One page. `problems` has what its console complained of, `requests` the addresses that it asked for."""
+
+    def __init__(self, sent: Any, answers: Any) -> None:
+        self._sent, self._answers, self._number, self._session = sent, answers, 0, {}
+        self.problems: list[str] = []
+        self.requests: list[str] = []
+        self.loaded = False
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = {"sessionId": self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]}
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Have something done, and return what it gives."""
+        self._number += 1
+        number = self._number
+        message = {"id": number, "method": method, "params": parameters, **self._session}
+        self._sent.write(json.dumps(message).encode() + b"\0")
+        self._sent.flush()
+        while True:
+            answer = self._receive()
+            if answer.get("id") == number:
+                assert "error" not in answer, (method, answer["error"])
+                return answer["result"]
+
+    def _receive(self) -> dict[str, Any]:
+        line = bytearray()
+        while not line.endswith(b"\0"):
+            line += self._answers.read(1) or _ended()
+        message = json.loads(line[:-1])
+        event, details = message.get("method"), message.get("params", {})
+        if event == "Runtime.exceptionThrown":
+            self.problems.append(json.dumps(details["exceptionDetails"])[:600])
+        elif event == "Runtime.consoleAPICalled" and details["type"] in ("error", "warning", "assert"):
+            self.problems.append(str(details["args"])[:600])
+        elif event == "Log.entryAdded" and details["entry"]["level"] in ("error", "warning"):
+            self.problems.append(f"{details['entry']['text']} {details['entry'].get('url', '')}")
+        elif event == "Network.requestWillBeSent":
+            self.requests.append(details["request"]["url"])
+        elif event == "Page.loadEventFired":
+            self.loaded = True
+        return message
+
+    def open(
+        self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True
+    ) -> None:
+        """Open a page of so many pixels, and wait until it shows something."""
+        self.loaded = False
+        phone = width < 600
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        calm = {"name": "prefers-reduced-motion", "value": "reduce"}
+        self.call("Emulation.setEmulatedMedia", features=[scheme, calm])
+        self.call("Emulation.setScriptExecutionDisabled", value=not script)
+        # A page that differs in the fragment alone would not be loaded anew.
+        self.call("Page.navigate", url="about:blank")
+        self.call("Page.navigate", url=address)
+        while not self.loaded:
+            self._receive()
+
+    def run(self, expression: str) -> Any:
+        """The value of an expression of JavaScript, awaited."""
+        answer = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def settle(self) -> None:
+        """Wait until what was asked for is on the screen."""
+        self.run(
+            "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 450))"
+        )
+
+    def mouse(self, *moves: tuple[str, float, float]) -> None:
+        """Moves of the left button: ("pressed" | "moved" | "released", x, y), in pixels of the page."""
+        held = 0
+        for what, x, y in moves:
+            held = {"pressed": 1, "released": 0}.get(what, held)
+            details = {"button": "left", "clickCount": 1} if what != "moved" else {"button": "left" if held else "none"}
+            self.call("Input.dispatchMouseEvent", type=f"mouse{what.title()}", x=x, y=y, buttons=held, **details)
+
+    def press(self, key: str, *, shift: bool = False) -> None:
+        text = {"text": key} if len(key) == 1 else {}
+        for kind in ("keyDown", "keyUp"):
+            extra = text if kind == "keyDown" else {}
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, modifiers=8 * shift, **extra)
+
+    def picture(self, path: Path, *, whole: bool = False) -> None:
+        """Save what is on the screen, or the whole page."""
+        shot = self.call("Page.captureScreenshot", captureBeyondViewport=whole)
+        path.write_bytes(base64.b64decode(shot["data"]))
+
+
+def _ended() -> bytes:
+    raise AssertionError("Chromium ended")
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Start a Chromium, which ends with the block."""
+    (from_us, to_it), (from_it, to_us) = os.pipe(), os.pipe()
+    with TemporaryDirectory() as profile:
+        arguments = ["--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run", "--mute-audio",
+                     "--disable-dev-shm-usage", "--disable-background-networking", "--enable-unsafe-swiftshader",
+                     f"--user-data-dir={profile}"]  # fmt: skip
+        process = subprocess.Popen(
+            [sys.executable, "-c", WITH_PIPE, str(from_us), str(to_us), str(PROGRAM), *arguments],
+            pass_fds=(from_us, to_us),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(from_us)
+        os.close(to_us)
+        with os.fdopen(to_it, "wb") as sent, os.fdopen(from_it, "rb") as answers:
+            try:
+                page = Browser(sent, answers)
+                yield page
+                page.call("Browser.close") if not page._session else None
+            finally:
+                process.kill()
+                process.wait()

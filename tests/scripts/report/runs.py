@@ -1,0 +1,30 @@
+"""Results of a comparison for the tests of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rigid_motion.motion import KEYFRAME_MODES
+from rigid_motion_batch.analysis.choices import Choice, Uniform
+from rigid_motion_batch.analysis.needed import OfRigidBody, keys_needed
+from rigid_motion_batch.analysis.radii import EVERYWHERE, RIGID
+from rigid_motion_batch.analysis.results import ClipResult, clip_result, compare_clip
+from rigid_motion_batch.recordings.clips import Clip, ClipWarning
+
+MODES = tuple(KEYFRAME_MODES)
+RATES = tuple(map(Uniform, ("5", "10", "15", "20")))
+
+
+def result_of(
+    clip: Clip,
+    choices: Sequence[Choice] = RATES,
+    modes: Sequence[str] = MODES,
+    *,
+    warnings: Sequence[ClipWarning] = (),
+    needed: bool = False,
+) -> ClipResult:
+    """What the analysis finds of a clip under some choices of keys."""
+    found = [compare_clip(clip, choice, modes, EVERYWHERE, shared=False) for choice in choices]
+    counted = keys_needed(OfRigidBody(clip, RIGID), modes) if needed else None
+    return clip_result(replace(clip, warnings=(*clip.warnings, *warnings)), [one for one in found if one], counted)

@@ -1,0 +1,201 @@
+"""What Python packs is what the viewer reads, and the viewer's mathematics is that of the program."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion.motion.quaternions import rotate
+from rigid_motion_batch.analysis.choices import Uniform
+from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.report import data
+from rigid_motion_batch.report.data import Block, clip_data, json_in_page, mesh_data
+from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill
+from tests.scripts.comparison.bodies import swinging_body
+from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.report.javascript import value_of
+from tests.scripts.report.runs import result_of
+
+TEN = (Uniform("10"),)
+
+
+def read(clip: ClipResult, expression: str) -> Any:
+    """An expression of JavaScript in which `recording` and `choice` are those of a clip, as the viewer reads them."""
+    packed = json_in_page(clip_data(clip, str, drill()))
+    made = f"""(async (clip) => {{
+        const recording = await readRecording(clip.recording), choice = await readChoice(clip.choices[0], recording);
+        const plain = (some) => JSON.parse(JSON.stringify(some, (_, one) => ArrayBuffer.isView(one) ? [...one] : one));
+        return plain({expression});
+    }})({packed})"""
+    return value_of(made, "data", "mathematics")
+
+
+@pytest.mark.parametrize("width", [1, 2, 4])
+def test_packed_numbers_are_read_to_half_a_step(width: int) -> None:
+    random = np.random.default_rng(width)
+    values = np.cumsum(random.normal(size=(3, 500)), axis=1)
+    block = Block()
+    block.put(np.arange(7))
+    described = block.put(values, width)
+    found = value_of(
+        f"(async () => unpack(await inflate('{block.text()}'), {described}).map((row) => [...row]))()", "data"
+    )
+    # Differences wrap around where they are larger than the width has room for.
+    np.testing.assert_allclose(found, values, atol=0.51 * described[3], rtol=1e-6)
+
+
+def test_the_same_numbers_are_the_same_text() -> None:
+    texts = {json.dumps(clip_data(result_of(swinging_clip(), TEN), str, drill())) for _ in range(2)}
+    assert len(texts) == 1
+
+
+def test_times_errors_and_keys_of_a_clip_are_those_of_the_analysis() -> None:
+    clip = result_of(swinging_clip(), TEN)
+    (result,) = clip.choices
+    motion = result.motions[-1]
+    found = read(
+        clip, "{ times: choice.times, errors: choice.motions.at(-1).errors, keys: choice.motions.at(-1).keys }"
+    )
+    times = clip.times[result.first : result.first + motion.errors.shape[1]] - clip.times[0]
+    np.testing.assert_allclose(found["times"], times, atol=1e-6)
+    np.testing.assert_allclose(found["keys"], clip.times[motion.keys] - clip.times[0], atol=1e-6)
+    for row, factor in enumerate((1e3, 1e3, 1.0)):
+        largest = motion.errors[row].max()
+        np.testing.assert_allclose(found["errors"][row], motion.errors[row] * factor, atol=4e-5 * largest * factor)
+
+
+def test_the_view_has_a_body_where_its_mode_puts_it() -> None:
+    clip = result_of(swinging_clip(), TEN)
+    (result,) = clip.choices
+    sample = 137
+    moment = float(clip.times[result.first + sample] - clip.times[0])
+    point = np.array((0.03, -0.02, 0.1))
+    for place, motion in enumerate(result.motions):
+        given = f"poseAt(recording, choice, {moment!r}, choice.motions[{place}], 1)"
+        seen = read(clip, f"moved(matrixOf({given}), {point.tolist()})")
+        pose = motion.poses[sample]
+        np.testing.assert_allclose(seen, pose.positions + rotate(pose.quaternions, point), atol=2e-4)
+
+
+def test_a_magnified_body_is_so_many_times_as_far_off() -> None:
+    clip = result_of(swinging_clip(), TEN)
+    (result,) = clip.choices
+    motion, sample = result.motions[0], 137
+    moment = float(clip.times[result.first + sample] - clip.times[0])
+    seen = read(clip, f"poseAt(recording, choice, {moment!r}, choice.motions[0], 4)")
+    truth = clip.truth[result.first + sample]
+    away = np.array(seen["places"]) - truth.positions
+    np.testing.assert_allclose(away, 4 * (motion.poses.positions[sample] - truth.positions), atol=1e-4)
+    turned = 2.0 * np.degrees(np.arccos(abs(float(np.dot(seen["turn"], truth.quaternions)))))
+    assert turned == pytest.approx(4.0 * motion.errors[2, sample], rel=1e-2)
+
+
+def test_a_body_that_grows_is_as_large_as_it_is() -> None:
+    clip = result_of(swinging_clip(), TEN)
+    (result,) = clip.choices
+    motion = result.motions[0]
+    sizes = 1.0 + 0.1 * np.arange(len(clip.times)) / len(clip.times)
+    own = 1.3 * sizes[result.first : result.first + len(motion.poses)]
+    growing = replace(motion, poses=Poses(motion.poses.positions, motion.poses.quaternions, own))
+    truth = Poses(clip.truth.positions, clip.truth.quaternions, sizes)
+    clip = replace(clip, truth=truth, choices=(replace(result, motions=(growing,)),))
+    moment = float(clip.times[result.first + 50] - clip.times[0])
+    assert read(clip, f"poseAt(recording, choice, {moment!r}, choice.motions[0], 1).scale") == pytest.approx(
+        own[50], rel=1e-3
+    )
+
+
+def test_the_joints_of_a_whole_body_are_where_its_mode_puts_them() -> None:
+    clip = result_of(swinging_body(), TEN)
+    (result,) = clip.choices
+    motion, sample = result.motions[0], 17
+    moment = float(clip.times[result.first + sample] - clip.times[0])
+    seen = read(clip, f"poseAt(recording, choice, {moment!r}, choice.motions[0], 1)")
+    np.testing.assert_allclose(np.reshape(seen["places"], (-1, 3)), motion.poses.positions[:, sample], atol=1e-4)
+    largest = motion.joint_errors.max()
+    np.testing.assert_allclose(seen["errors"], motion.joint_errors[:, sample], atol=largest / 200)
+
+
+def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(data, "MOST_SEEN", 8000)
+    monkeypatch.setattr(data, "MOST_CHARTED", 100)
+    clip = result_of(swinging_clip(seconds=20.0), TEN)
+    found = read(
+        clip, "{ moments: choice.moments, times: choice.times, errors: choice.motions.map((m) => m.errors[0]) }"
+    )
+    (result,) = clip.choices
+    assert len(found["moments"]) < len(clip.times) / 4
+    assert len(found["times"]) == len(found["errors"][0]) <= 100
+    for motion, errors in zip(result.motions, found["errors"], strict=True):
+        worst = clip.times[result.first + motion.errors[0].argmax()] - clip.times[0]
+        assert np.abs(np.array(found["moments"]) - worst).min() < 1e-6
+        assert max(errors) == pytest.approx(1e3 * motion.errors[0].max(), rel=1e-4)
+
+
+def test_deviations_are_magnified_until_they_can_be_seen() -> None:
+    clip = result_of(swinging_clip(), (*TEN, Uniform("30")))
+    coarse, fine = clip_data(clip, str, drill())["choices"]
+    assert fine["factor"] > coarse["factor"] >= 1
+    for choice in (coarse, fine):
+        assert choice["factor"] == 1 or choice["factor"] * choice["worst"] < 0.34 * drill().size
+
+
+def test_a_curve_of_many_samples_keeps_its_extremes() -> None:
+    values = np.random.default_rng(1).random(1000).tolist()
+    points = value_of(f"polyline({values}, 100, 900, 60)", "data")
+    assert len(points) <= 62
+    assert points == sorted(points)
+    assert {max(values[100:901]), min(values[100:901])} <= {value for _, value in points}
+    assert value_of(f"polyline({values}, 3, 6, 60)", "data") == [[k, values[k]] for k in range(3, 7)]
+
+
+@pytest.mark.parametrize(("low", "high", "wanted", "texts"), [
+    (0.0, 9.0, 6, ["0", "2", "4", "6", "8"]),
+    (0.0, 0.6, 6, ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5", "0.6"]),
+    (12.0, 3600.0, 5, ["1000", "2000", "3000"]),
+])  # fmt: skip
+def test_ticks_are_round_numbers(low: float, high: float, wanted: int, texts: list[str]) -> None:
+    assert [text for _, text in value_of(f"ticks({low}, {high}, {wanted})", "data", "mathematics")] == texts
+
+
+@pytest.mark.parametrize("name", ["reach", "a,b#c", "100 %", "名前", "<script>"])
+def test_the_address_of_a_moment_leads_back_to_it(name: str) -> None:
+    found = value_of(f"fromAddress(addressOf({json.dumps(name)}, 'tolerance-5mm', 1.25))", "data", "mathematics")
+    assert found == {"clip": name, "choice": "tolerance-5mm", "t": 1.25}
+
+
+@pytest.mark.parametrize("hash", ["", "#", "#numbers", "#%E0%A4%A", "#a,b,c"])
+def test_any_other_address_has_no_moment(hash: str) -> None:
+    assert "t" not in value_of(f"fromAddress({json.dumps(hash)})", "data", "mathematics")
+
+
+def test_the_drill_is_closed_and_its_faces_look_outwards() -> None:
+    mesh = drill()
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0
+    assert 1e-4 < volume < 1e-3
+    corners = mesh.corners()
+    assert corners.shape == (7, 3 * len(mesh.triangles))
+    faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+    there = np.linalg.norm(faces, axis=1) > 1e-12
+    assert (np.einsum("ij,ij->i", faces, corners[3:6].T)[there] > 0.0).all()
+
+
+def test_a_cube_has_twelve_edges_and_flat_sides() -> None:
+    vertices = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+    mesh = Mesh(vertices, np.array([part for a, b, c, d in quads for part in ((a, b, c), (a, c, d))]))
+    assert mesh.edges().shape == (6, 12)
+    assert set(np.abs(mesh.corners()[3:6]).ravel().round(12)) == {0.0, 1.0}
+    assert mesh_data(mesh)["middle"] == [0.5, 0.5, 0.5]
+
+
+@pytest.mark.parametrize("count", [0, MOST_TRIANGLES + 1])
+def test_a_mesh_that_the_viewer_cannot_have_is_refused(count: int) -> None:
+    with pytest.raises(ValueError, match=f"{count} triangles; give the viewer 1 to {MOST_TRIANGLES}"):
+        Mesh(np.zeros((3, 3)), np.zeros((count, 3), dtype=int))

@@ -1,0 +1,318 @@
+"""The page is one file that needs no network, says all numbers without a script too, and trusts no name."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import tracemalloc
+from base64 import b64decode
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, KeysOfBody
+from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
+from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import ClipWarning
+from rigid_motion_batch.report import Settings, pages, write_overview, write_report
+from rigid_motion_batch.report.colours import BACKGROUNDS, MODE_COLOURS, OTHER_COLOURS
+from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of
+from tests.scripts.comparison.bodies import swinging_body
+from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.report.runs import MODES, result_of
+
+ASSETS = Path(__file__).resolve().parents[3] / "assets"
+SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare reach.csv")
+TEN = (Uniform("10"),)
+
+
+class Page(HTMLParser):
+    """What is in a page: texts by the element that they are in, and the attributes of all elements."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: dict[str, list[str]] = {}
+        self.words = ""
+        """All that is shown, in its order."""
+        self._open = [""]
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        self._open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        while self._open.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        self.texts.setdefault(self._open[-1], []).append(data)
+        if self._open[-1] not in ("script", "style"):
+            self.words += f" {data}"
+
+    def attributes(self, tag: str, name: str) -> list[str]:
+        return [found[name] or "" for kind, found in self.elements if kind == tag and name in found]
+
+
+def all_text(page: Page) -> str:
+    return re.sub(r"\s+", " ", page.words)
+
+
+def written(path: Path, *clips: ClipResult, **more: object) -> Page:
+    write_report(path, clips, replace(SETTINGS, **more))
+    return Page(path)
+
+
+def test_a_run_on_the_assets_is_one_small_file(tmp_path: Path) -> None:
+    clips, _ = read_clips([str(ASSETS / f"{name}.csv") for name in ("pivot", "reach", "screw", "throw")], None)
+    path = tmp_path / "report.html"
+    files = write_report(path, map(result_of, clips), SETTINGS)
+    assert files == [path]
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.stat().st_size < 1_500_000
+
+
+def test_the_page_asks_for_nothing(tmp_path: Path) -> None:
+    page = written(tmp_path / "report.html", result_of(swinging_clip()), result_of(swinging_body()))
+    for tag, found in page.elements:
+        for name in ("src", "href", "data", "action", "poster", "srcset"):
+            address = found.get(name) or ""
+            assert address.startswith(("#", "data:")) or not address, (tag, address)
+    style = "".join(page.texts["style"])
+    assert "url(" not in style
+    assert "@import" not in style
+
+
+def test_the_page_is_the_same_for_the_same_run(tmp_path: Path) -> None:
+    paths = [tmp_path / "a.html", tmp_path / "b.html"]
+    settings = replace(SETTINGS)
+    for path in paths:
+        write_report(path, [result_of(swinging_clip())], settings)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+HOSTILE = "</script><script>alert(1)</script><!-- \"'& {{ 7 * 7 }}\u2028"
+
+
+def test_no_name_gets_into_the_page_but_as_text(tmp_path: Path) -> None:
+    clip = result_of(swinging_clip(), TEN, warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
+    facts = replace(clip.facts, name=HOSTILE, source=HOSTILE, axes=HOSTILE, repairs=(HOSTILE,))
+    body = result_of(swinging_body(), TEN)
+    body = replace(body, joint_names=(HOSTILE, *body.joint_names[1:]))
+    path = tmp_path / "report.html"
+    page = written(path, replace(clip, facts=facts), body, program=HOSTILE, command=HOSTILE, details={HOSTILE: HOSTILE})
+    assert all_text(page).count("alert(1)") >= 8
+    assert "7 * 7" in all_text(page)
+    assert not [text for text in page.texts["script"] if "alert(1)</script>" in text]
+    types = [found.get("type") for tag, found in page.elements if tag == "script"]
+    assert types == ["application/json"] * 3 + ["module"]
+    (data, *_) = [json.loads(text) for text in page.texts["script"] if text.startswith('{"name"')]
+    assert data["name"] == HOSTILE
+
+
+def test_every_number_is_there_without_a_script(tmp_path: Path) -> None:
+    clips = [result_of(swinging_clip("one")), result_of(swinging_clip("two", seed=2))]
+    page = written(tmp_path / "report.html", *clips)
+    cells = page.texts["td"]
+    for clip in clips:
+        for result in clip.choices:
+            for motion in result.motions:
+                row = motion.metrics[0]
+                for value in (1e3 * row.rms_shell_m, 1e3 * row.max_shell_m, row.rms_rotation_deg):
+                    assert any(_same(text, value) for text in cells), value
+
+
+def _same(text: str, value: float) -> bool:
+    try:
+        return abs(float(text) - value) <= 5e-3 * value
+    except ValueError:
+        return False
+
+
+def test_the_table_to_take_along_is_that_of_all_modes(tmp_path: Path) -> None:
+    clip = result_of(swinging_clip())
+    page = written(tmp_path / "report.html", clip)
+    (address,) = [one for one in page.attributes("a", "href") if one.startswith("data:text/csv")]
+    rows = list(csv.DictReader(io.StringIO(b64decode(address.partition(",")[2]).decode())))
+    assert {row["mode"] for row in rows} == set(MODES)
+    assert len(rows) == len(MODES) * len(clip.choices)
+    first: Metrics = clip.choices[0].motions[0].metrics[0]
+    assert float(rows[0]["rms_shell_m"]) == first.rms_shell_m
+
+
+def test_a_warning_is_above_the_verdict_and_leads_to_its_moment(tmp_path: Path) -> None:
+    warning = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
+    page = written(tmp_path / "report.html", result_of(swinging_clip(), TEN, warnings=[warning]))
+    # The recording begins at 100 s, the page's time with it.
+    assert "#swing,10,1.250" in page.attributes("a", "href")
+    text = all_text(page)
+    assert (
+        text.index("One thing to check before you trust this")
+        < text.index("Record again.")
+        < text.index("keys a second")
+    )
+
+
+def test_films_are_beside_the_page_and_looked_for_from_where_it_will_be(tmp_path: Path) -> None:
+    film = tmp_path / "swing" / "10" / "comparison.mp4"
+    films = {("swing", "10"): film, ("swing", "20"): None}
+    path = tmp_path / "elsewhere" / "report.html"
+    write_report(path, [result_of(swinging_clip())], SETTINGS, films, folder=tmp_path)
+    page = Page(path)
+    assert page.attributes("video", "src") == ["swing/10/comparison.mp4"]
+    assert "The film could not be made." in all_text(page)
+
+
+def test_data_that_would_make_the_page_too_large_are_files_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pages, "IN_THE_PAGE", 150_000)
+    clips = [result_of(swinging_clip(name, seed=seed)) for seed, name in enumerate(("a", "b", "c"))]
+    path = tmp_path / "report.html"
+    files = write_report(path, clips, SETTINGS)
+    assert files == [path, *(tmp_path / "report_data" / f"{number}.js" for number in (1, 2, 3))]
+    settings = json.loads(Page(path).texts["script"][0])
+    assert [one["data"] for one in settings["clips"]] == [f"report_data/{number}.js" for number in (1, 2, 3)]
+    for number, file in enumerate(files[1:]):
+        text = file.read_text(encoding="utf-8")
+        assert text.startswith(f"rigidMotionClips[{number}](")
+        assert json.loads(text.partition("(")[2].removesuffix(");\n"))["name"] == "abc"[number]
+
+
+def test_modes_of_one_motion_have_one_row(tmp_path: Path) -> None:
+    clip = result_of(swinging_clip(), TEN)
+    page = written(tmp_path / "report.html", clip)
+    (data,) = [json.loads(text) for text in page.texts["script"] if text.startswith('{"name"')]
+    motions = data["choices"][0]["motions"]
+    assert [motion["modes"] for motion in motions] == [list(motion.modes) for motion in clip.choices[0].motions]
+    assert len(motions) < len(MODES)
+    assert sorted(mode for motion in motions for mode in motion["modes"]) == sorted(MODES)
+
+
+def test_joints_decimate_and_segments_are_folded_below(tmp_path: Path) -> None:
+    body = result_of(swinging_body(), TEN)
+    (result,) = body.choices
+    row = KeysOfBody("walk", "lerp_slerp", OWN, "10", 20, 160, 1200, 0.01, "uniform", None)
+    theirs = replace(row, how=DECIMATE, frames_with_keys=50, keys=900, numbers=5400)
+    body = replace(body, choices=(replace(result, decimated=(row, theirs)),))
+    swing = result_of(swinging_clip(), (Tolerance("20mm"),), (*MODES, "best_of"))
+    text = all_text(written(tmp_path / "report.html", body, swing))
+    assert "LeftHand" not in text
+    for wanted in ("Glove", "Joints of whole bodies", "Decimate, at the same largest error", "4.50", "Of ", "segments"):
+        assert wanted in text
+
+
+def test_a_picture_of_joints_has_a_row_for_each_and_the_worst_is_red() -> None:
+    from rigid_motion_batch.report.joints import heat_map, png
+
+    errors = np.zeros((3, 1000))
+    errors[1, 500] = 7.0
+    content = b64decode(heat_map(errors, 7.0).partition(",")[2])
+    assert content.startswith(b"\x89PNG")
+    assert int.from_bytes(content[16:20], "big") == 240
+    assert int.from_bytes(content[20:24], "big") == 3
+    assert content == png(np.pad(np.array([[0], [23], [0]], dtype=np.uint8), ((0, 0), (120, 119))), content[41:113])
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [TEN, (Tolerance("20mm"),), (Budget("5"), Budget("10")), (Uniform("5"), Budget("5"), Tolerance("1cm"))],
+    ids=["one rate", "a tolerance", "budgets", "all kinds"],
+)
+@pytest.mark.parametrize("modes", [MODES, ("motor_spline",)], ids=["all modes", "one mode"])
+def test_a_page_is_made_of_any_choices_and_modes(tmp_path: Path, choices, modes) -> None:
+    page = written(tmp_path / "report.html", result_of(swinging_clip(), choices, modes))
+    assert len(page.texts["h1"]) >= 1
+    assert len([one for one in page.attributes("input", "name") if one == "choice"]) == len(choices)
+
+
+def test_a_clip_too_short_for_a_choice_is_said_to_be(tmp_path: Path) -> None:
+    short = result_of(swinging_clip("short", seconds=0.15))
+    assert len(short.choices) < 4
+    nothing = replace(short, facts=replace(short.facts, name="nothing"), choices=())
+    text = all_text(written(tmp_path / "report.html", result_of(swinging_clip()), short, nothing))
+    assert "too short" in text
+
+
+def test_nothing_to_report_is_refused(tmp_path: Path) -> None:
+    clip = replace(result_of(swinging_clip(), TEN), choices=())
+    with pytest.raises(ValueError, match="every clip is too short for two keys"):
+        write_report(tmp_path / "report.html", [clip], SETTINGS)
+    assert not list(tmp_path.iterdir())
+
+
+# -- many clips -------------------------------------------------------------------------------------------------------
+
+
+def test_the_overview_has_what_matters_first_and_leads_to_every_page(tmp_path: Path) -> None:
+    quiet, loud = result_of(swinging_clip("quiet"), TEN), result_of(swinging_clip("loud"), TEN)
+    rows = loud.choices[0].motions
+    louder = tuple(replace(one, metrics=tuple(replace(row, max_shell_m=9.0) for row in one.metrics)) for one in rows)
+    loud = replace(loud, choices=(replace(loud.choices[0], motions=louder),))
+    doubtful = result_of(swinging_clip("doubtful", seed=3), TEN, warnings=[ClipWarning("Centimetres?", "Say so.")])
+    addresses = {"quiet": "quiet/page 1.html", "loud": None, "doubtful": "doubtful/report.html"}
+    write_overview(tmp_path / "report.html", [quiet, doubtful, loud], SETTINGS, addresses)
+    page = Page(tmp_path / "report.html")
+    text = all_text(page)
+    table = text[text.index("Sorted by what matters") :]
+    assert table.index("doubtful") < table.index("loud") < table.index("quiet")
+    assert "1 of 3 clips have something to check" in text
+    assert {"quiet/page%201.html", "doubtful/report.html"} <= set(page.attributes("a", "href"))
+
+
+def many(count: int) -> Iterator[ClipResult]:
+    """Clips that come one at a time."""
+    clip = result_of(swinging_clip(), TEN)
+    for number in range(count):
+        yield replace(clip, facts=replace(clip.facts, name=f"clip-{number:05}"), times=clip.times.copy())
+
+
+def test_an_overview_of_thousands_of_clips_takes_little_memory(tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    tracemalloc.start()
+    try:
+        write_overview(path, many(10_000), SETTINGS, {})
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 100e6
+    assert path.stat().st_size < 1000 * 10_000
+
+
+# -- sources ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_viewer_is_small_and_its_modules_are_one_script() -> None:
+    lines = [
+        line for name in SCRIPTS for line in (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8").splitlines()
+    ]
+    assert len(lines) <= 700
+    assert max(map(len, lines)) <= 120
+    script = script_of(SCRIPTS)
+    assert not re.search(r"^(import|export) ", script, re.MULTILINE)
+    assert {path.stem for path in (HERE / "viewer").glob("*.js")} == set(SCRIPTS)
+    for place, name in enumerate(SCRIPTS):
+        imported = re.findall(r'from "\./(\w+)\.js"', (HERE / "viewer" / f"{name}.js").read_text(encoding="utf-8"))
+        assert set(imported) <= set(SCRIPTS[:place]), name
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+def test_names_in_the_colours_of_modes_can_be_read(theme: int) -> None:
+    for colours in (*MODE_COLOURS.values(), *OTHER_COLOURS):
+        dark, light = sorted((luminance(colours[theme]), luminance(BACKGROUNDS[theme])))
+        assert (light + 0.05) / (dark + 0.05) >= 4.5, colours

@@ -1,0 +1,228 @@
+"""The verdict is one true sentence with a number, whatever a run comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded
+from rigid_motion_batch.report.numbers import ERROR, KEYS, MEASURES, Numbers
+from rigid_motion_batch.report.verdict import plain, verdict
+
+FIVE, TEN, TWENTY = map(Uniform, ("5", "10", "20"))
+
+
+def numbers(
+    choices: Sequence[Choice], *clips: Mapping[str, Sequence[float]], same: Sequence[tuple[str, ...]] = ()
+) -> Numbers:
+    """A run in which these clips have these errors, in mm (keys a second within a tolerance), under each choice."""
+    modes = tuple(clips[0])
+    values = np.full((len(MEASURES), len(clips), len(choices), len(modes)), np.nan)
+    for place, clip in enumerate(clips):
+        for column, mode in enumerate(modes):
+            for row, choice in enumerate(choices):
+                values[KEYS if isinstance(choice, Tolerance) else ERROR, place, row, column] = clip[mode][row]
+    together = [mode for group in same for mode in group]
+    groups = (*same, *((mode,) for mode in modes if mode not in together))
+    names = tuple(f"clip{number}" for number in range(1, len(clips) + 1))
+    return Numbers(names, tuple(choices), modes, values, (frozenset({groups}),) * len(clips), {"mine": "mine.csv"})
+
+
+def keys_needed(keys: Mapping[str, Sequence[float]], *, fitted: bool = False) -> KeysNeeded:
+    """A clip of 10 s on which modes need so many keys to be as good as the reference with 201: one for each spacing."""
+    groups = tuple((mode,) for mode in keys)
+    ways = 3 if fitted else 2
+    found = np.stack([np.repeat(np.array(keys[group[0]], float)[:, None], len(RATES), axis=1) for group in groups])
+    assert found.shape[1] == ways
+    asked = np.array([float(rate) for rate in RATES])
+    return KeysNeeded(
+        "clip1", groups, RATES, np.full(len(RATES), 10.0), 10.0 * asked + 1.0, np.full(len(RATES), 1e-3), found,
+        np.full(found.shape, 1e-3), np.full((len(groups), len(RATES)), 1e-3),
+    )  # fmt: skip
+
+
+REF, SCREW, SMOOTH = "lerp_slerp", "dq_sclerp", "motor_spline"
+
+CASES = {
+    "fewer keys, between the rates of the run": (
+        numbers((FIVE, TEN, TWENTY), {REF: (16, 4, 1), SMOOTH: (4, 1, 0.25)}),
+        "Smooth Screw needs 10 keys a second where Vector + Quaternion needs 20: 50 % fewer keys for the same error.",
+    ),
+    "better at the lowest rate than the reference at the highest": (
+        numbers((FIVE, TEN), {REF: (16, 4), SMOOTH: (3, 1)}),
+        "Smooth Screw needs at most 5 keys a second where Vector + Quaternion needs 10: "
+        "at least 50 % fewer keys for the same error.",
+    ),
+    "better on the whole, but not at the highest rate": (
+        numbers((FIVE, TEN, TWENTY), {REF: (16, 4, 1), SMOOTH: (4, 2, 1.1)}),
+        "Smooth Screw needs 5 keys a second where Vector + Quaternion needs 10: 50 % fewer keys for the same error.",
+    ),
+    "an error that does not fall with the rate": (
+        numbers((FIVE, TEN), {REF: (8, 9), SMOOTH: (4, 6)}),
+        "Smooth Screw has 50 % less error than Vector + Quaternion with the same 5 keys a second.",
+    ),
+    "one rate": (
+        numbers((TEN,), {REF: (4,), SCREW: (5,), SMOOTH: (1,)}),
+        "Smooth Screw has 75 % less error than Vector + Quaternion with the same 10 keys a second.",
+    ),
+    "the reference is the best": (
+        numbers((FIVE, TEN), {REF: (4, 1), SCREW: (5, 1.25), SMOOTH: (8, 2)}),
+        "No mode comes closer than Vector + Quaternion: 1.00 mm off (RMS) at 10 keys/s. "
+        "Next is Screw with 25 % more error.",
+    ),
+    "nobody is better": (
+        numbers((FIVE, TEN), {REF: (4, 1), SCREW: (4.001, 1), SMOOTH: (4, 1.001)}),
+        "The 3 motions are equally close: 1.00 mm off (RMS) at 10 keys/s.",
+    ),
+    "another is as good as the reference, the third is worse": (
+        numbers((TEN,), {REF: (4,), SCREW: (4.001,), SMOOTH: (8,)}),
+        "No mode comes closer than Vector + Quaternion: 4.00 mm off (RMS) at 10 keys/s. "
+        "Next is Screw with the same error.",
+    ),
+    "one mode": (
+        numbers((FIVE, TEN), {SMOOTH: (4, 1)}),
+        "Smooth Screw is 1.00 mm off (RMS) at 10 keys/s.",
+    ),
+    "several modes that are one motion": (
+        numbers((TEN,), {SCREW: (4,), "pga_slerp": (4,)}, same=[(SCREW, "pga_slerp")]),
+        "Both modes are one motion: Screw is 4.00 mm off (RMS) at 10 keys/s.",
+    ),
+    "a run without the reference": (
+        numbers((TEN,), {SCREW: (4,), SMOOTH: (1,), "pga_lerp": (5,)}),
+        "Smooth Screw has 75 % less error than Screw with the same 10 keys a second.",
+    ),
+    "a run without the reference, and two that are as good": (
+        numbers((TEN,), {SCREW: (4,), SMOOTH: (4,), "pga_lerp": (5,)}),
+        "Screw and Smooth Screw are the closest, and equally close: 4.00 mm at 10 keys/s.",
+    ),
+    "every sample is a key": (
+        numbers((TEN,), {REF: (0,), SMOOTH: (1e-9,)}),
+        "No mode is off by more than rounding: every sample is a key, or nothing moves.",
+    ),
+    "a clip too short for the higher rate": (
+        numbers((FIVE, TEN), {REF: (16, 4), SMOOTH: (4, 1)}, {REF: (2, np.nan), SMOOTH: (1, np.nan)}),
+        "Smooth Screw needs 5 keys a second where Vector + Quaternion needs 10: 50 % fewer keys for the same error.",
+    ),
+    "several clips": (
+        numbers((TEN,), {REF: (4,), SMOOTH: (1,)}, {REF: (400,), SMOOTH: (400,)}),
+        "Smooth Screw has 50 % less error than Vector + Quaternion with the same 10 keys a second.",
+    ),
+    "a tolerance": (
+        numbers((Tolerance("5mm"),), {REF: (8,), SMOOTH: (6,)}),
+        "Within 5 mm, Smooth Screw needs 6 keys a second where Vector + Quaternion needs 8: 25 % fewer.",
+    ),
+    "a tolerance, and the reference needs the fewest keys": (
+        numbers((Tolerance("5mm"), Tolerance("10mm")), {REF: (6, 4), SMOOTH: (8, 5)}),
+        "No mode needs fewer keys than Vector + Quaternion: 6.00 keys a second within 5 mm. "
+        "Next is Smooth Screw with 29 % more keys.",
+    ),
+    "a tolerance, and all need as many": (
+        numbers((Tolerance("5mm"),), {REF: (6,), SMOOTH: (6,)}),
+        "The 2 motions need as many keys: 6.00 keys a second within 5 mm.",
+    ),
+    "a tolerance and one mode": (
+        numbers((Tolerance("5mm"),), {REF: (6,)}),
+        "Vector + Quaternion needs 6.00 keys a second within 5 mm.",
+    ),
+    "a budget": (
+        numbers((Budget("10"),), {REF: (4,), SMOOTH: (1,)}),
+        "Smooth Screw has 75 % less error than Vector + Quaternion with the same 10 keys a second on average.",
+    ),
+    "budgets that cross": (
+        numbers((Budget("5"), Budget("10")), {REF: (16, 4), SMOOTH: (8, 2)}),
+        "Smooth Screw needs 7.07 keys a second on average where Vector + Quaternion needs 10: "
+        "29 % fewer keys for the same error.",
+    ),
+    "rates before budgets and tolerances": (
+        numbers((TEN, Budget("10"), Tolerance("5mm")), {REF: (4, 2, 8), SMOOTH: (1, 1, 2)}),
+        "Smooth Screw has 75 % less error than Vector + Quaternion with the same 10 keys a second.",
+    ),
+    "the best of each segment does not win, since it is chosen for it": (
+        numbers((TEN,), {REF: (4,), SMOOTH: (2,), "best_of": (1,)}),
+        "Smooth Screw has 50 % less error than Vector + Quaternion with the same 10 keys a second.",
+    ),
+    "somebody else's motion is no mode that wins": (
+        numbers((TEN,), {REF: (4,), SMOOTH: (2,), "mine": (0.1,)}),
+        "Smooth Screw has 50 % less error than Vector + Quaternion with the same 10 keys a second.",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_sentence_says_what_the_numbers_say(case: str) -> None:
+    run, expected = CASES[case]
+    assert str(verdict(run)) == expected
+
+
+TWO = numbers((TEN,), {REF: (4,), SMOOTH: (1,)})
+
+
+@pytest.mark.parametrize(
+    ("needed", "expected"),
+    [
+        (
+            keys_needed({REF: (201, 101), SMOOTH: (151, 51)}),
+            "Smooth Screw, with keys where the motion needs them, does with 5 a second where Vector + Quaternion needs "
+            "20 evenly spaced: 75 % fewer for the same error.",
+        ),
+        (
+            keys_needed({REF: (201, 101, 91), SMOOTH: (151, 51, 31)}, fitted=True),
+            "Smooth Screw, with fitted keys, does with 3 a second where Vector + Quaternion needs 20 evenly spaced: "
+            "85 % fewer for the same error.",
+        ),
+        (
+            keys_needed({REF: (201, 101), SMOOTH: (251, 151)}),
+            "Vector + Quaternion, with keys where the motion needs them, does with 10 a second where it needs 20 "
+            "evenly spaced: 50 % fewer for the same error.",
+        ),
+        (
+            keys_needed({REF: (201, np.inf), SMOOTH: (np.inf, np.inf)}),
+            "No mode needs fewer keys than Vector + Quaternion at 20 a second.",
+        ),
+    ],
+)
+def test_the_keys_needed_come_first_where_they_were_looked_for(needed: KeysNeeded, expected: str) -> None:
+    assert str(verdict(TWO, [needed])) == expected
+
+
+def test_without_any_rate_that_the_reference_had_keys_at_the_errors_speak() -> None:
+    nothing = keys_needed({REF: (np.nan, np.nan), SMOOTH: (np.nan, np.nan)})
+    assert str(verdict(TWO, [nothing])).startswith("Smooth Screw has 75 % less error")
+
+
+def facts(run: Numbers) -> list[str]:
+    return [plain(fact) for fact in verdict(run).facts]
+
+
+def test_facts_are_the_gain_the_wins_and_what_did_not_pay() -> None:
+    run = numbers(
+        (FIVE, TEN), {REF: (16, 4), SCREW: (17, 4.1), SMOOTH: (8, 1)}, {REF: (8, 4), SCREW: (8.5, 4.1), SMOOTH: (10, 2)}
+    )
+    assert facts(run) == [
+        "65 % lower error from Smooth Screw than from Vector + Quaternion at 10 keys/s",
+        "Closest in 3 of 4 cases; not in clip2 at 5 keys/s: there Vector + Quaternion is, by 20 %",
+        "2 to 6 % higher error from Screw beside Vector + Quaternion",
+    ]
+
+
+def test_the_exception_is_a_link_to_its_clip_and_choice() -> None:
+    run = numbers((TEN,), {REF: (4,), SMOOTH: (1,)}, {REF: (4,), SMOOTH: (5,)})
+    (link,) = [part for fact in verdict(run).facts for part in fact if part.kind == "link"]
+    assert (link.text, link.target) == ("clip2 at 10 keys/s", "clip2,10")
+
+
+def test_the_best_mode_of_each_segment_is_held_against_the_best_single_one() -> None:
+    run = numbers((TEN,), {REF: (4,), SMOOTH: (2,), "best_of": (1,)})
+    assert facts(run) == ["50 % lower error from the best mode of each segment than from the best single one"]
+
+
+def test_a_run_in_which_nothing_is_off_has_no_facts() -> None:
+    assert facts(numbers((TEN,), {REF: (0,), SMOOTH: (0,)})) == []
+
+
+def test_the_fewest_keys_within_a_tolerance_are_a_fact_beside_rates() -> None:
+    run = numbers((TEN, Tolerance("5mm")), {REF: (4, 8), SMOOTH: (1, 6)})
+    assert "25 % fewer keys from Smooth Screw than from Vector + Quaternion within 5 mm" in facts(run)
