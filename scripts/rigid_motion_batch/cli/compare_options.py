@@ -130,7 +130,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         default=output_folder("comparison"),
         help="folder to write to (renders/comparison)",
     )
-    parser.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
+    parser.add_argument(
+        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
+    )
     parser.add_argument(
         "--radius",
         type=_radii,
