@@ -18,7 +18,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rigid_motion_batch.cli.compare_options import ALL, parse as parse_comparison
+from rigid_motion_batch.cli.compare_options import ALL
+from rigid_motion_batch.cli.compare_options import parse as parse_comparison
 from rigid_motion_batch.command_line import as_typed, complain, parser_of, program_of
 from rigid_motion_batch.comparison import steps
 from rigid_motion_batch.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,6 +30,7 @@ from rigid_motion_batch.scenes.timeline import Timeline
 from . import comparison_steps as steps
 from . import values
 from .comparison_steps import About, ClipOf, ClipShown, Page, SourceFacts
+from .running import Outcome, Plan
 from .steps import Input, Step, Task
 from .store import Store
 
@@ -158,6 +159,22 @@ class ComparisonPlan:
         blender = comparison.blender if step is steps.read_in_blender else ""
         parameters = steps.Read(source, comparison.axes, comparison.reading, blender)
         return Task(step, parameters, f"read {source}", inputs=inputs, title=source, weight=0.3)
+
+    def read(self, run: Callable[[Plan], Outcome]) -> tuple[Outcome, list[str]]:
+        """Read the sources by a function that runs a plan, and see what is in them: see `look_into`.
+
+        What was read before and turns out to be damaged is read again.
+        """
+        outcome = run(self.reading)
+        try:
+            return outcome, self.look_into()
+        except Exception:
+            damaged = [task.key for task in self.reading() if not self.store.result(task.key, thoroughly=True)]
+            if not damaged:
+                raise
+            for key in damaged:
+                self.store.discard(key)
+        return run(self.reading), self.look_into()
 
     def look_into(self) -> list[str]:
         """See what clips there are in the recordings that were read, and return what the user should know of them."""
@@ -402,7 +419,7 @@ class ComparisonPlan:
             parameters,
             f"page {folder}" if folder else steps.PAGE,
             after=(*before, *(filmed if step is steps.page else pages)),
-            publish={steps.PAGE: f"{place}{steps.PAGE}", "report/": f"{place}report/"},
+            publish={name: place + name for name in (steps.PAGE, steps.PAGE_DATA)},
             title=f"{place}{steps.PAGE}",
             weight=0.02 * len(shown),
         )

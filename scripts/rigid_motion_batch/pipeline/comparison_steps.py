@@ -7,7 +7,7 @@ Blender load nothing but NumPy and bpy. Every step imports what it needs when it
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,8 @@ REPORT = (*ANALYSIS, "report", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
 PIECE = "piece.mkv"
+PAGE_DATA = "report_data/"
+"""The folder of what is too large for a page."""
 
 
 # -- recordings -------------------------------------------------------------------------------------------------------
@@ -290,7 +292,9 @@ class About:
 
     program: str
     command: str
-    details: Mapping[str, str]
+    details: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Of modes that `MODES` does not have."""
 
 
 @dataclass(frozen=True)
@@ -395,4 +399,11 @@ def _settings(parameters: Page) -> object:
     from rigid_motion_batch.report import Settings
 
     about, radii = parameters.about, parameters.radii
-    return Settings(radii.rigid, about.program, about.command, joint_radius=radii.joint, details=dict(about.details))
+    return Settings(
+        radii.rigid,
+        about.program,
+        about.command,
+        joint_radius=radii.joint,
+        details=dict(about.details),
+        names=dict(about.names),
+    )

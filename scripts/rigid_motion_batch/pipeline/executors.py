@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import queue
 import signal
+import sys
 import tempfile
 import time
 from collections import deque
@@ -158,6 +159,8 @@ def processors() -> int:
 def _begin(logs: str) -> None:
     """Begin a worker: it ends with its parent, and what libraries print in it goes into a file."""
     end_with_parent()
+    # Where Blender is loaded in the parent, its own modules hide what brings them.
+    sys.path[:] = [folder for folder in sys.path if not os.path.exists(os.path.join(folder, "addon_utils.py"))]
     log = os.open(Path(logs, f"{os.getpid()}"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
     for stream in (1, 2):
         os.dup2(log, stream)

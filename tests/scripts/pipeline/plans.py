@@ -40,6 +40,7 @@ class Listener(Progress):
         self.reached: list[tuple[float, str, Mapping[str, tuple[int, int]]]] = []
         self.notes: list[str] = []
         self.states: dict[str, str] = {}
+        self.done: set[str] = set()
 
     def begin(self, total: float) -> None:
         self.total = total
@@ -52,6 +53,7 @@ class Listener(Progress):
 
     def finish(self, task: Task, state: State, problem: str) -> None:
         self.states[task.name] = state.value
+        self.done |= {task.name} if state is State.DONE else set()
 
 
 def run_in(output: Path, *tasks: Task, executor: Executor | None = None, **options: object) -> Outcome:
