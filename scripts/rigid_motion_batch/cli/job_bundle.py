@@ -18,13 +18,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rigid_motion_batch.cli import compare
+from rigid_motion_batch.cli.compare_options import ALL
+from rigid_motion_batch.cli.compare_options import parse as parse_comparison
 from rigid_motion_batch.command_line import as_typed, complain, parser_of, program_of
 from rigid_motion_batch.comparison import steps
-from rigid_motion_batch.comparison.planning import comparison_tasks, look_into, plan_of, reading_tasks
-from rigid_motion_batch.comparison.version import program_version
+from rigid_motion_batch.comparison.planning import Wanted, comparison_tasks, look_into, plan_of, reading_tasks
+from rigid_motion_batch.comparison.report.pages import Settings
+from rigid_motion_batch.comparison.version import blender_version, program_version
 from rigid_motion_batch.files import write_text
-from rigid_motion_batch.places import PACKAGE, output_folder
+from rigid_motion_batch.places import PACKAGE, manifest, output_folder
 from rigid_motion_batch.progress import Progress
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.reading import split_source
@@ -90,9 +92,9 @@ def parse(arguments: list[str]) -> tuple[argparse.Namespace, argparse.Namespace]
         "--bundle", type=Path, default=output_folder("job_bundle"), help="folder to write (renders/job_bundle)"
     )
     own, rest = parser.parse_known_args(arguments)
-    options = compare.parse(rest)
-    if options.scheduler or options.force or options.explain:
-        parser.error("--scheduler, --force and --explain are for a run of compare.py itself; leave them out")
+    options = parse_comparison(rest)
+    if options.scheduler or options.only or options.explain:
+        parser.error("--scheduler, --only and --explain are for a run of compare.py itself; leave them out")
     return own, options
 
 
@@ -101,10 +103,12 @@ def main(arguments: list[str]) -> int:
     own, options = parse(arguments)
     command = as_typed(PROGRAM, arguments, options.inputs)
     try:
-        if options.stage and not options.no_video:
-            compare.require_subject(options.object)
+        if options.stage:
+            from rigid_motion_batch.scenes.subject import load_subject
+
+            load_subject(options.object)
         inputs = gather(options)
-        own.bundle, options.output = own.bundle.absolute(), options.output.absolute()
+        own.bundle, options.output = own.bundle.absolute(), (options.output or output_folder("comparison")).absolute()
         os.chdir(inputs)
         plan, unread = make_plan(options, command)
         if plan is None:
@@ -187,7 +191,7 @@ def make_plan(options: argparse.Namespace, command: str) -> tuple[Plan | None, i
     if not found.studies:
         print(f"{PROGRAM}: no clip is left to compare; see above", file=sys.stderr)
         return None, len(read.failures)
-    tasks = comparison_tasks(found.studies, there, compare.wanted(options, command))
+    tasks = comparison_tasks(found.studies, there, _wanted(options, command))
     return plan_of(tasks, version), len(read.failures)
 
 
@@ -322,3 +326,32 @@ def _path(name: str, description: str, flow: str) -> dict[str, Any]:
 
 def _json(content: Any) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def _wanted(options: argparse.Namespace, command: str) -> Wanted:
+    """What is wanted of every clip, by these options of that command."""
+    stage = options.stage
+    settings = Settings(
+        radius=options.radius.rigid,
+        joint_radius=options.radius.joint,
+        program=f"{manifest()['name']} {manifest()['version']}",
+        blender=blender_version(),
+        command=command,
+        details={}
+        if options.no_video
+        else {
+            "Videos": f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s",
+            "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
+        },
+    )
+    return Wanted(
+        choices=tuple(options.choices),
+        modes=options.modes.names,
+        radii=options.radius,
+        settings=settings,
+        stage=None if options.no_video else stage,
+        every_film=options.films == ALL,
+        count_keys=options.decimate == "adaptive",
+        fit=options.fit,
+        shared=options.shared,
+    )
