@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +51,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
     if not motions:
         return None
     errors = [1e3 * motion.joint_errors for motion in motions]
-    top = max(float(np.quantile(some, NEARLY_ALL)) for some in errors) or 1.0
+    top = 1e3 * full_colour(motion.joint_errors for motion in motions)
     pictures = [
         (numbers.joined(motion.modes), heat_map(some, top)) for motion, some in zip(motions, errors, strict=True)
     ]
@@ -61,6 +62,11 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
     ]
     names = short_names(clip.joint_names)
     return Joints(place, clip.facts.name, result.choice.name, result.choice.title, names, digits(top), pictures, rows)
+
+
+def full_colour(errors: Iterable[np.ndarray]) -> float:
+    """The error that colours reach up to, one scale for all of these (joints, n): nearly the largest."""
+    return max(float(np.quantile(some, NEARLY_ALL)) for some in errors) or 1.0
 
 
 def heat_map(errors: np.ndarray, top: float) -> str:

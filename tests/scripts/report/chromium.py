@@ -72,6 +72,11 @@ class Browser:
             self.loaded = True
         return message
 
+    def close(self) -> None:
+        """Have the browser end, all of its processes."""
+        self._session = {}
+        self.call("Browser.close")
+
     def open(
         self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True
     ) -> None:
@@ -129,7 +134,7 @@ def _ended() -> bytes:
 def browser() -> Iterator[Browser]:
     """Start a Chromium, which ends with the block."""
     (from_us, to_it), (from_it, to_us) = os.pipe(), os.pipe()
-    with TemporaryDirectory() as profile:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         arguments = ["--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run", "--mute-audio",
                      "--disable-dev-shm-usage", "--disable-background-networking", "--enable-unsafe-swiftshader",
                      f"--user-data-dir={profile}"]  # fmt: skip
@@ -145,7 +150,8 @@ def browser() -> Iterator[Browser]:
             try:
                 page = Browser(sent, answers)
                 yield page
-                page.call("Browser.close") if not page._session else None
+                page.close()
+                process.wait(timeout=20)
             finally:
                 process.kill()
                 process.wait()
