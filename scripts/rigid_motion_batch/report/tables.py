@@ -118,9 +118,7 @@ def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[C
             for motion in result.motions
             for row in motion.metrics[:1]
         ]
-        least = [
-            min((text for text in column if text != NONE), key=float, default="") for column in zip(*lines, strict=True)
-        ]
+        least = [_least(column) for column in zip(*lines, strict=True)]
         found += [
             (
                 clip.facts.name,
