@@ -1,7 +1,8 @@
 """Set up everything that Rigid Motion needs in a folder of its own, then run a command. Needs Python and pip only.
 
     python scripts/bootstrap.py compare                     compare the modes, on the recordings in assets/
-    python scripts/bootstrap.py compare hand.csv --axes unity --output renders/hand
+    python scripts/bootstrap.py compare hand.csv --axes unity
+    python scripts/bootstrap.py inspect hand.csv            say what is in a recording, and what looks wrong
     python scripts/bootstrap.py paper                       reproduce the paper's figures and its table
     python scripts/bootstrap.py test                        run the tests
     python scripts/bootstrap.py test --blender 4.5.15       run the tests on another Blender
@@ -16,20 +17,23 @@
     python scripts/bootstrap.py benchmark                   measure how fast the modes are
     python scripts/bootstrap.py build                       build the extension, dist/rigid_motion-VERSION.zip
     python scripts/bootstrap.py docs                        build the documentation as a site, dist/site
+    python scripts/bootstrap.py environment [DIR]           set up all but Blender, for compare.py inside a Blender
+    python scripts/bootstrap.py completion bash             print what has a shell complete `rigid-motion`
 
-The packages go into .venv/ of this checkout; the first run downloads about 400 MB. All arguments after the command are
-passed on to it: `python scripts/bootstrap.py compare --help` shows the options of compare.
+The packages go into .venv/ of this checkout; the first run downloads about 500 MB, of which Blender is 400. Where there
+is no Blender for a Python, the commands run that need none: compare --no-video, inspect, stream, tasks. All arguments
+after the command are passed on to it: `python scripts/bootstrap.py compare --help` shows the options of compare.
 """
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import json
 import os
 import shutil
 import subprocess
 import sys
-import venv
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -38,6 +42,7 @@ PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
 
 COMMANDS = {
     "compare": ([ROOT / "scripts" / "compare.py"], ()),
+    "inspect": (["-m", "rigid_motion_batch", "inspect"], ()),
     "paper": ([ROOT / "scripts" / "research", "paper"], ()),
     "test": (["-m", "pytest"], ("test", "farm", "docs")),
     "benchmark": ([ROOT / "scripts" / "research", "benchmark"], ("benchmark",)),
@@ -51,8 +56,19 @@ COMMANDS = {
     "examples": ([ROOT / "examples" / "make_examples.py"], ()),
     "build": ([ROOT / "scripts" / "build_extension.py"], ()),
     "docs": ([ROOT / "scripts" / "build_site.py"], ("benchmark", "docs")),
+    "completion": (["-m", "rigid_motion_batch", "completion"], ()),
 }
 """Command to what Python runs for it, and the extras of pyproject.toml that it needs."""
+
+ENVIRONMENT = "environment"
+"""Sets up all but Blender, and prints the folder."""
+
+WITHOUT_BLENDER = ("inspect", "stream", "tasks", "dask", "openjd", "completion")
+"""Need no Blender."""
+
+FILMING = ("compare", "bundle")
+NOT_FILMING = {"--no-video", "--blender", "--help", "-h"}
+"""Commands that need none with one of these options."""
 
 
 def main(arguments: list[str]) -> int:
@@ -61,29 +77,39 @@ def main(arguments: list[str]) -> int:
         print(__doc__.strip())
         return 0
     command, *rest = arguments
-    if command not in COMMANDS:
-        return _fail(f"there is no command {command!r}; the commands are {', '.join(COMMANDS)}")
+    if command not in (*COMMANDS, ENVIRONMENT):
+        near = difflib.get_close_matches(command, (*COMMANDS, ENVIRONMENT), n=1)
+        meant = f": did you mean {near[0]}?" if near else ""
+        return _fail(f"there is no command {command!r}{meant}\nThe commands are {', '.join(COMMANDS)}.")
     if sys.version_info < (3, 11):  # noqa: UP036 - whoever starts it with another Python is to read why
         return _fail(f"Python {PYTHON} is too old: run this with Python 3.11 or 3.13")
     project = _project()
+    if command == ENVIRONMENT:
+        python = install(None, _requirements(project, None, ()), Path(rest[0]) if rest else None)
+        print(*([python.parents[1]] if python else []), sep="\n")
+        return int(python is None)
     known = project["tool"]["rigid-motion"]["blender"]
-    if PYTHON not in known:
-        return _fail(f"Blender has no wheel for Python {PYTHON}: run this with Python {' or '.join(known)}")
-    blender = known[PYTHON][0]
-    if "--blender" in rest:
+    here = known.get(PYTHON, [])
+    blender = here[0] if here else None
+    if "--blender" in rest and not (command in FILMING and _is_program(rest)):
         place = rest.index("--blender")
         blender = rest[place + 1] if place + 1 < len(rest) else ""
         del rest[place : place + 2]
-        if blender not in known[PYTHON]:
-            return _fail(f"--blender takes one of {', '.join(known[PYTHON])} with Python {PYTHON}")
+        if blender not in here:
+            return _fail(f"--blender takes one of {', '.join(here)} with Python {PYTHON}")
+    needed = command not in WITHOUT_BLENDER and not (command in FILMING and NOT_FILMING & {*rest})
+    if needed and blender is None:
+        without = "; or add --no-video, for the numbers and the report" if command in FILMING else ""
+        fitting = " or ".join(known)
+        return _fail(f"Blender has no wheel for Python {PYTHON}: run this with Python {fitting}{without}")
     run, extras = COMMANDS[command]
     python = install(blender, _requirements(project, blender, extras))
-    if python is None or not _blender_starts(python):
+    if python is None or (needed and not _blender_starts(python)):
         return 1
     # Paths that a user gives count from where the user is; those of pytest from where its configuration is.
     folder = ROOT if command == "test" else None
     variables = environment(os.environ)
-    if command in ("dask", "tasks"):
+    if run[0] == "-m" and command != "test":
         variables["PYTHONPATH"] = os.pathsep.join([str(ROOT / "scripts"), *filter(None, [variables.get("PYTHONPATH")])])
     return _become([python, *run, *rest], folder, variables)
 
@@ -107,21 +133,43 @@ def environment(environ: Mapping[str, str]) -> dict[str, str]:
     return ours
 
 
-def install(blender: str, requirements: list[str]) -> Path | None:
-    """The Python of an environment with these requirements, made or completed where it has to be; None on failure."""
-    folder = ROOT / ".venv" / f"blender-{blender}-python-{PYTHON}"
+def _is_program(arguments: list[str]) -> bool:
+    """Whether --blender names a program to film with, and no version."""
+    named = arguments[arguments.index("--blender") + 1 :][:1]
+    return bool(named) and not named[0].replace(".", "").isdecimal()
+
+
+def install(blender: str | None, requirements: list[str], folder: Path | None = None) -> Path | None:
+    """The Python of an environment with these requirements, made or completed where it has to be; None on failure.
+
+    It is in `.venv/` unless a folder is given.
+    """
+    name = f"blender-{blender}-python-{PYTHON}" if blender else f"python-{PYTHON}"
+    folder = folder.absolute() if folder else ROOT / ".venv" / name
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / "installed.json"
     wanted = hashlib.sha256("\n".join([sys.version, *requirements]).encode()).hexdigest()
     installed = json.loads(stamp.read_text()) if stamp.is_file() and python.exists() else []
     if wanted in installed:
         return python
-    print(f"Setting up Blender {blender} for Python {PYTHON} in {folder} ...", file=sys.stderr, flush=True)
+    what = f"Blender {blender}" if blender else "what is needed without Blender"
+    print(f"Setting up {what} for Python {PYTHON} in {folder} ...", file=sys.stderr, flush=True)
     if not python.exists():
+        if folder.exists() and not (folder / "pyvenv.cfg").exists() and any(folder.iterdir()):
+            _fail(f"{folder} is there, and no environment: choose another folder")
+            return None
         shutil.rmtree(folder, ignore_errors=True)
-        venv.create(folder, with_pip=True)
+        try:
+            import ensurepip  # noqa: F401 - Debian has it in a package of its own
+            import venv
+
+            venv.create(folder, with_pip=True)
+        except (ImportError, subprocess.CalledProcessError) as error:
+            _fail(f"this Python cannot make an environment ({error}): install its modules venv and ensurepip")
+            return None
+    # Standard output is for what the command prints.
     pip = [str(python), "-m", "pip", "install", "--disable-pip-version-check", *requirements]
-    if subprocess.call(pip, cwd=ROOT) != 0:
+    if subprocess.call(pip, cwd=ROOT, stdout=sys.stderr) != 0:
         _fail("the packages above could not be installed; with the network back, the same command goes on")
         return None
     stamp.write_text(json.dumps([*installed, wanted]))
@@ -135,9 +183,11 @@ def _project() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-def _requirements(project: dict, blender: str, extras: tuple[str, ...]) -> list[str]:
+def _requirements(project: dict, blender: str | None, extras: tuple[str, ...]) -> list[str]:
     """The pinned packages of pyproject.toml, with this Blender."""
-    listed = [f"bpy=={blender}", f"numpy=={project['tool']['rigid-motion']['numpy'][PYTHON]}"]
+    pins = project["tool"]["rigid-motion"]
+    numpy = pins["numpy"].get(PYTHON) or [*pins["numpy"].values()][-1]
+    listed = [*([f"bpy=={blender}"] if blender else []), f"numpy=={numpy}", *pins["libraries"]]
     for extra in extras:
         listed += project["project"]["optional-dependencies"][extra]
     return listed

@@ -16,6 +16,8 @@ import pytest
 from hatchling.metadata.core import ProjectMetadata
 from hatchling.plugin.manager import PluginManager
 
+import rigid_motion
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "addon" / "rigid_motion"
 SOURCES = sorted(path for folder in ("addon", "assets", "scripts") for path in (ROOT / folder).rglob("*.py"))
@@ -59,6 +61,7 @@ def test_the_extension_is_valid_for_blender(tmp_path):
 def test_one_version_everywhere():
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     assert ProjectMetadata(str(ROOT), PluginManager()).version == manifest["version"]
+    assert rigid_motion.__version__ == manifest["version"]
     assert f"## {manifest['version']}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 

@@ -5,6 +5,20 @@
 """
 
 
+def __getattr__(name: str) -> str:
+    """Read `__version__` from the manifest, which lies in this folder, or at the top of a checkout."""
+    if name != "__version__":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import tomllib
+    from pathlib import Path
+
+    package = Path(__file__).resolve().parent
+    for folder in (package, package.parents[1]):
+        if (manifest := folder / "blender_manifest.toml").is_file():
+            return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
+    raise AttributeError(f"{package} has no blender_manifest.toml, which tells the version: install it again")
+
+
 def glTF2ExportUserExtension() -> object:
     """Return what tells which clips to leave out: the glTF exporter of Blender looks for this name in add-ons."""
     from .animation.gltf_export import LeaveOut

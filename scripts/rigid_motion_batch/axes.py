@@ -19,6 +19,8 @@ AXES: dict[str, np.ndarray] = {
     "unity": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))),
     # Right-handed, z up, x forward (REP 103).
     "ros": np.array(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+    # Left-handed, z up, x forward, y right; its lengths are centimetres.
+    "unreal": np.array(((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
 }
 
 

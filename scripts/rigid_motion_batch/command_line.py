@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import json
 import math
 import os
 import shlex
 import sys
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -49,10 +50,45 @@ def as_called(text: str, script: str) -> str:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, whatever was typed."""
+    """A parser whose complaints are two lines, whatever was typed, and say what may have been meant."""
 
     def error(self, message: str) -> NoReturn:
-        super().error(printable(message))
+        names = [self._get_formatter()._format_args(one, one.dest.upper()) for one in self._get_positional_actions()]
+        usage = " ".join([self.prog, *names, "[options]"])
+        error = f"{self.prog}: error: {printable(message)}"
+        self.exit(2, f"usage: {usage}   (--help lists the options)\n{error}\n")
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:
+        options, unknown = self.parse_known_args(args, namespace)
+        if unknown:
+            name = next((word for word in unknown if word.startswith("-")), unknown[0]).partition("=")[0]
+            self.error(f"unrecognized arguments: {name}{did_you_mean(name, self._all_options())}")
+        return options
+
+    def _all_options(self) -> list[str]:
+        """The options of this parser, and of its commands."""
+        below = [one.choices.values() for one in self._actions if isinstance(one, argparse._SubParsersAction)]
+        return [*self._option_string_actions, *(name for ones in below for one in ones for name in one._all_options())]
+
+    def _get_value(self, action: argparse.Action, text: str) -> Any:
+        value = super()._get_value(action, text)
+        if action.choices is None or isinstance(action, argparse._SubParsersAction) or not isinstance(value, str):
+            return value
+        fitting = (one for one in action.choices if str(one).lower() == value.lower())
+        return value if value in action.choices else next(fitting, value)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            known = list(map(str, action.choices))
+            meant = did_you_mean(str(value), known)
+            raise argparse.ArgumentError(action, f"invalid choice: {value!r}{meant} (choose from {', '.join(known)})")
+
+
+def did_you_mean(word: str, words: Iterable[str]) -> str:
+    """What may have been meant by a word, as the end of a complaint; empty where none of these is near."""
+    plain = {name.lower().lstrip("-"): name for name in words}
+    near = difflib.get_close_matches(word.lower().lstrip("-"), plain, n=1, cutoff=0.7)
+    return f": did you mean {plain[near[0]]}?" if near else ""
 
 
 def parser_of(script: str, description: str, epilog: str = "", **options: Any) -> Parser:

@@ -1,8 +1,6 @@
-"""A progress bar of the standard library alone, since Blender's own Python has no packages.
+"""How far a command is: on a terminal a bar, drawn by rich; elsewhere, as in a log, a plain line now and then.
 
-On a terminal it is one line that is written over; elsewhere (a log) it is a plain line now and then. Work is a tree:
-a stage that is opened inside another is one step of it, so that the bar and the time that is left are always those of
-the whole. Seconds throughout.
+Blender's own Python has no rich, and shows plain lines on a terminal, too. Seconds throughout.
 """
 
 from __future__ import annotations
@@ -10,32 +8,33 @@ from __future__ import annotations
 import os
 import sys
 import time
-import unicodedata
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Self, TextIO
+from typing import Any, Self, TextIO
 
 from rigid_motion_batch.command_line import printable
 
-BAR_COLUMNS = 24
-TERMINAL_INTERVAL = 0.1
-LOG_INTERVAL = 10.0
+INTERVAL = 10.0
+"""Seconds between two plain lines."""
 
 
 class Stage:
     """A part of the work, of `total` steps. Made by `Progress.stage`."""
 
     def __init__(self, title: str, total: float, redraw: Callable[[], None]) -> None:
-        self.title = title
+        self.title, self.total = title, total
         self.doing = ""
-        self.total = total
         self.done = 0.0
         self._redraw = redraw
 
+    @property
+    def fraction(self) -> float:
+        """How much is done, 0 to 1."""
+        return min(self.done / self.total, 1.0) if self.total else 1.0
+
     def advance(self, steps: float = 1.0, doing: str | None = None) -> None:
         """Count steps as done, and say what comes next."""
-        self.done = min(self.done + steps, self.total)
-        self.say(self.doing if doing is None else doing)
+        self.reach(self.done + steps, doing)
 
     def reach(self, done: float, doing: str | None = None) -> None:
         """Count so many steps as done in all, also fewer than before: work was lost, and is done again."""
@@ -51,168 +50,131 @@ class Stage:
 class Progress:
     """The bar, as a context: `with Progress() as progress, progress.stage("Rendering", 120) as stage: ...`.
 
+    It goes when a stage ends, so that what is said at the end stands alone; after Ctrl-C it stays as it was.
+
     Parameters
     ----------
     stream : text stream, optional
         The standard error unless given. Where Python has none, as in a windowed program, nothing is shown.
+    quiet : bool
+        Whether to show notes alone.
     clock : callable
         Seconds that never run backwards.
-    environ : mapping
-        Of it, NO_COLOR (https://no-color.org), TERM and COLUMNS are heeded.
     """
 
     def __init__(
-        self,
-        stream: TextIO | None = None,
-        *,
-        clock: Callable[[], float] = time.monotonic,
-        environ: Mapping[str, str] = os.environ,
+        self, stream: TextIO | None = None, *, quiet: bool = False, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._stream = sys.stderr if stream is None else stream
+        self._quiet = quiet or self._stream is None
         self._clock = clock
-        self._environ = environ
-        self._live = self._stream is not None and self._stream.isatty() and environ.get("TERM") != "dumb"
-        self._coloured = self._live and not environ.get("NO_COLOR") and (os.name != "nt" or "WT_SESSION" in environ)
-        self._blocks = _encodes(self._stream, "▕█▉▊▋▌▍▎▏")
-        self._stages: list[tuple[Stage, float]] = []
-        self._started = self._stage_started = self._clock()
-        self._shown_at: float | None = None
-        self._shown_columns = 0
+        self._stage: Stage | None = None
+        self._bar: Any = None
+        self._started = self._shown_at = 0.0
 
     def __enter__(self) -> Self:
-        self._started = self._clock()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        # After Ctrl-C or an error the line stays as it was, so that one sees how far the work had come.
-        if self._live and self._shown_columns:
-            self._write("\n")
-            self._shown_columns = 0
+    def __exit__(self, *_: object) -> None:
+        pass
 
     @contextmanager
-    def stage(self, title: str, total: float, *, weight: float = 1.0) -> Iterator[Stage]:
-        """Open a stage of `total` steps. Inside another stage it makes up `weight` of that one's steps."""
-        stage = Stage(title, total, self._redraw)
-        if not self._stages:
-            self._stage_started = self._clock()
-        self._stages.append((stage, weight))
-        if total:
-            self._redraw(now=len(self._stages) == 1)
+    def stage(self, title: str, total: float) -> Iterator[Stage]:
+        """Open a stage of `total` steps."""
+        self._started = self._clock()
+        self._stage = stage = Stage(title, total, self._redraw)
+        if total and not self._quiet:
+            self._bar = _bar(self._stream, self._line)
+            if self._bar:
+                self._bar.start()
+            self._redraw(now=True)
         try:
             yield stage
-            stage.done = total
-            if len(self._stages) == 1:
-                stage.doing = ""
+            stage.done, stage.doing = total, ""
+            if total:
                 self._redraw(now=True)
+        except KeyboardInterrupt:
+            if self._bar:
+                self._bar.live.transient = False
+            raise
         finally:
-            self._stages.pop()
-        if self._stages:
-            self._stages[-1][0].advance(weight, "")
+            if self._bar:
+                self._bar.stop()
+            self._bar = self._stage = None
 
     def note(self, text: str) -> None:
         """Write a line of its own, above the bar."""
-        self._clear()
-        self._write(_fitting(text, self._stream) + "\n")
-        if self._live and self._stages:
-            self._redraw(now=True)
-
-    @property
-    def fraction(self) -> float:
-        """How much of the outermost stage is done, 0 to 1."""
-        fraction, share = 0.0, 0.0
-        for stage, weight in reversed(self._stages):
-            fraction = min((stage.done + share) / stage.total, 1.0) if stage.total else 1.0
-            share = fraction * weight
-        return fraction
-
-    def _redraw(self, now: bool = False) -> None:
-        interval = TERMINAL_INTERVAL if self._live else LOG_INTERVAL
-        if not now and self._shown_at is not None and self._clock() - self._shown_at < interval:
-            return
-        self._shown_at = self._clock()
-        if self._live:
-            self._draw_line()
-        else:
-            self._write(f"{self.fraction:4.0%}  {self._times()}  {self._doing()}\n")
-
-    def _draw_line(self) -> None:
-        columns = self._terminal_columns() - 1  # A Windows console wraps after its last column.
-        head, tail = f"{self.fraction:4.0%} ", f"  {self._times()}  {self._doing()}"
-        bar = _bar(self.fraction, min(BAR_COLUMNS, max(columns // 4, 4)), self._blocks)
-        tail = _cut(tail, columns - len(head) - len(bar))
-        width = len(head) + len(bar) + _columns_of(tail)
-        shown = f"\x1b[36m{bar}\x1b[0m" if self._coloured else bar
-        self._write(f"\r{head}{shown}{tail}" + " " * (self._shown_columns - width))
-        self._shown_columns = width
-
-    def _terminal_columns(self) -> int:
-        if self._environ.get("COLUMNS", "").isdecimal():
-            return int(self._environ["COLUMNS"])
-        try:
-            return os.get_terminal_size(self._stream.fileno()).columns
-        except OSError:
-            return 80
-
-    def _times(self) -> str:
-        now, fraction = self._clock(), self.fraction
-        elapsed, in_stage = now - self._started, now - self._stage_started
-        if fraction >= 1.0:
-            return f"done in {_duration(elapsed)}"
-        if fraction <= 0.0:
-            return _duration(elapsed)
-        return f"{_duration(elapsed)}, {_duration(in_stage / fraction - in_stage)} left"
-
-    def _doing(self) -> str:
-        words = [word for stage, _ in self._stages for word in (stage.title, stage.doing) if word]
-        return _fitting(", ".join(words), self._stream)
-
-    def _clear(self) -> None:
-        if self._live and self._shown_columns:
-            self._write("\r" + " " * self._shown_columns + "\r")
-            self._shown_columns = 0
-
-    def _write(self, text: str) -> None:
-        if self._stream is not None:
-            self._stream.write(text)
+        if self._bar:
+            self._bar.console.print(_fitting(text, self._stream), markup=False, highlight=False, soft_wrap=True)
+        elif self._stream is not None:
+            self._stream.write(_fitting(text, self._stream) + "\n")
             self._stream.flush()
 
+    def _redraw(self, now: bool = False) -> None:
+        if self._bar:
+            self._bar.update(self._bar.task_ids[0], completed=self._stage.fraction)
+        elif not self._quiet and (now or self._clock() - self._shown_at >= INTERVAL):
+            self._shown_at = self._clock()
+            self._stream.write(f"{self._stage.fraction:4.0%}  {self._line()}\n")
+            self._stream.flush()
 
-def _bar(fraction: float, columns: int, blocks: bool) -> str:
-    if not blocks:
-        full = int(fraction * columns)
-        return "[" + "#" * full + "-" * (columns - full) + "]"
-    eighths = int(fraction * columns * 8)
-    bar = "█" * (eighths // 8) + " ▏▎▍▌▋▊▉"[eighths % 8]
-    return "▕" + bar[:columns].ljust(columns) + "▏"
+    def _line(self) -> str:
+        """How long it has taken and will take, and what is being done."""
+        stage = self._stage
+        if stage is None:
+            return ""
+        elapsed, fraction = self._clock() - self._started, stage.fraction
+        words = ", ".join(filter(None, (stage.title, stage.doing)))
+        if fraction >= 1.0:
+            times = f"done in {duration(elapsed)}"
+        elif fraction <= 0.0:
+            times = duration(elapsed)
+        else:
+            times = f"{duration(elapsed)}, {duration(elapsed / fraction - elapsed)} left"
+        return f"{times}  {_fitting(words, self._stream)}"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """A time as clocks show it: "1:05" for a minute and five seconds."""
     minutes, seconds = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
 
 
-def _encodes(stream: TextIO | None, text: str) -> bool:
+def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
+    """A bar of rich with a line behind it, where the stream is a terminal that can show one; otherwise None."""
+    if not stream.isatty() or os.environ.get("TERM") == "dumb":
+        return None
     try:
-        text.encode(getattr(stream, "encoding", None) or "ascii")
-    except (UnicodeEncodeError, LookupError):
-        return False
-    return True
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, ProgressColumn, TaskProgressColumn
+        from rich.table import Column
+        from rich.text import Text
+    except ImportError:
+        return None
+
+    class Line(ProgressColumn):
+        """Made anew whenever it is drawn, so that the clock goes on."""
+
+        max_refresh = 0.5
+
+        def render(self, task: object) -> Text:
+            return Text(line(), overflow="crop", no_wrap=True)
+
+    columns = (TaskProgressColumn(), BarColumn(24), Line(Column(ratio=1, no_wrap=True)))
+    bar = Progress(
+        *columns,
+        console=Console(file=stream, soft_wrap=True),
+        transient=True,
+        expand=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    bar.add_task("", total=1.0)
+    return bar
 
 
-def _fitting(text: str, stream: TextIO | None) -> str:
+def _fitting(text: str, stream: TextIO) -> str:
     """The text in one line, with what a terminal must not get or cannot show escaped."""
     encoding = getattr(stream, "encoding", None) or "ascii"
     return printable(text).encode(encoding, "backslashreplace").decode(encoding)
-
-
-def _columns_of(text: str) -> int:
-    return sum(2 if unicodedata.east_asian_width(c) in "WF" else not unicodedata.combining(c) for c in text)
-
-
-def _cut(text: str, columns: int) -> str:
-    if _columns_of(text) <= columns:
-        return text
-    while text and _columns_of(text) > columns - 2:
-        text = text[:-1]
-    return text + ".." if columns >= 2 else ""

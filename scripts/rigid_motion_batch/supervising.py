@@ -46,6 +46,9 @@ LOOK = 0.1
 STOPPED = "Stopped. What was written by then is complete."
 """What is said where the child had nothing better to say."""
 
+SHOW_CURSOR = "\x1b[?25h"
+"""What has a terminal show its cursor."""
+
 PR_SET_PDEATHSIG = 1
 """See prctl(2)."""
 
@@ -227,8 +230,8 @@ class _Journal:
         if self.ended:
             return
         errors = _writable(sys.stderr)
-        if errors and self.at and sys.stderr.isatty():
-            print(file=sys.stderr, flush=True)  # The cursor is behind the progress bar.
+        if errors and sys.stderr.isatty():
+            print(SHOW_CURSOR, file=sys.stderr, flush=True)  # It is behind the progress bar, which has hidden it.
         if _writable(sys.stdout):
             for path in self.written:
                 print(path_line(path), flush=True)

@@ -17,6 +17,8 @@ DEBIAN = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libice6 li
 FEDORA = "libX11 libXrender libXfixes libXi libxkbcommon libSM libICE mesa-libGL mesa-libEGL mesa-dri-drivers"
 """Packages of Fedora and its relatives."""
 
+BLENDER_PYTHONS = ("3.11", "3.13")
+"""The versions of Python that there are wheels of Blender for."""
 
 LOADED_LATE = ("libEGL.so.1", "libGL.so.1")
 """What Blender loads only when it renders. It aborts the whole process where it cannot."""
@@ -53,12 +55,16 @@ def way_out(error: str, script: str = "compare.py") -> str:
             f"  Debian, Ubuntu:  apt-get install -y {DEBIAN}\n"
             f"  Fedora, RHEL:    dnf install -y {FEDORA}"
         )
+    module = re.search(r"No module named '([\w.]+)'", error)
+    if module and module[1] != "bpy":
+        brings = "pip install rigid-motion" if CHECKOUT is None else "python scripts/bootstrap.py, as in the README,"
+        return f"{brings} brings it. A Blender that lacks it can run compare.py, which looks for it elsewhere."
+    here = ".".join(map(str, sys.version_info[:2]))
+    fitting = f"Python {' or '.join(BLENDER_PYTHONS)}"
+    lines = [f"Blender has no wheel for Python {here}: use {fitting}."] if here not in BLENDER_PYTHONS else []
     if CHECKOUT is None:
-        return (
-            "Blender's Python module bpy is not here. For Python 3.11 and 3.13,\n"
-            "`pip install 'rigid-motion[blender]'` brings it."
-        )
-    return (
-        "Blender's Python module bpy is not here. Run this through `python scripts/bootstrap.py`, which installs it,\n"
-        f"or inside Blender: blender --background --python scripts/{script} -- INPUT"
-    )
+        lines.append(f"`pip install 'rigid-motion[blender]'` brings it, with {fitting}.")
+    else:
+        lines.append("Run this by `python scripts/bootstrap.py`, which installs it,")
+        lines.append(f"or inside Blender: blender --background --python scripts/{script} -- INPUT")
+    return "\n".join(lines)

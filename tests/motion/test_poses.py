@@ -102,3 +102,68 @@ def test_a_slice_is_a_view_and_a_list_of_numbers_is_a_copy():
     poses[1:].positions[0] = -1.0
     poses[[2]].positions[0] = -1.0
     assert poses.positions.tolist() == [[0, 1, 2], [-1, -1, -1], [6, 7, 8], [9, 10, 11]]
+
+
+def test_matrices_of_poses_give_these_poses_back():
+    random = np.random.default_rng(2)
+    positions, quaternions = random.normal(size=(3, 50, 3)), random_quaternions(random, 3, 50)
+    scales = random.uniform(0.01, 100.0, size=(3, 50))
+    matrices = np.zeros((3, 50, 4, 4))
+    matrices[..., :3, :3] = (
+        Rotation.from_quat(quaternions.reshape(-1, 4), scalar_first=True).as_matrix().reshape(3, 50, 3, 3)
+    )
+    rigid = Poses.from_matrices(_with_positions(matrices, positions))
+    assert rigid.scales is None
+    assert angle_between(rigid.quaternions, quaternions).max() < 1e-14
+    matrices[..., :3, :3] *= scales[..., None, None]
+    scaled = Poses.from_matrices(_with_positions(matrices, positions))
+    assert scaled.scales == pytest.approx(scales, rel=1e-12)
+    assert np.array_equal(scaled.positions, positions)
+    assert angle_between(scaled.quaternions, quaternions).max() < 1e-14
+
+
+def _with_positions(matrices, positions):
+    matrices[..., :3, 3], matrices[..., 3, 3] = positions, 1.0
+    return matrices
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0.6, 0, -0.8)])
+def test_half_turns_have_a_quaternion_too(axis):
+    turn = Rotation.from_rotvec(np.pi * np.array(axis) / np.linalg.norm(axis))
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn.as_matrix()
+    quaternion = Poses.from_matrices(matrix).quaternions
+    assert abs(quaternion @ turn.as_quat(scalar_first=True)) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("diagonal", "fault"),
+    [((1, 1, -1), "mirrors"), ((1, 1, 1.01), "unevenly"), ((0, 0, 0), "no scale")],
+)
+def test_a_matrix_that_is_no_pose_is_named(diagonal, fault):
+    matrices = np.tile(np.eye(4), (4, 1, 1))
+    matrices[2, :3, :3] = np.diag(diagonal)
+    with pytest.raises(ValueError, match=f"matrix at 2 .*{fault}"):
+        Poses.from_matrices(matrices)
+
+
+def test_a_matrix_that_was_not_tracked_is_a_pose_of_nan():
+    matrices = np.tile(np.eye(4), (2, 1, 1))
+    matrices[1] = np.nan
+    poses = Poses.from_matrices(matrices)
+    assert np.isnan(poses.positions[1]).all()
+    assert np.isnan(poses.quaternions[1]).all()
+    assert poses.scales is None
+
+
+@pytest.mark.parametrize("make", [Poses.from_matrices, lambda wrong: Poses.from_xyzw(np.zeros((2, 3)), wrong)])
+def test_other_shapes_are_refused_with_the_one_that_is_needed(make):
+    with pytest.raises(ValueError, match=r"need the shape \(\.\.\., 4"):
+        make(np.zeros((2, 3)))
+
+
+def test_quaternions_with_w_last_become_those_with_w_first():
+    q = random_quaternions(np.random.default_rng(3), 2, 7)
+    poses = Poses.from_xyzw(np.zeros((2, 7, 3)), np.roll(q, -1, axis=-1), np.ones((2, 7)))
+    assert np.array_equal(poses.quaternions, q)
+    assert poses.scales is not None

@@ -45,6 +45,7 @@ def test_every_point_of_the_body_moves_along(poses: Poses, axes: str) -> None:
         ("opengl", (0, 1, 0), (0, 0, -1), (1, 0, 0)),
         ("unity", (0, 1, 0), (0, 0, 1), (1, 0, 0)),
         ("ros", (0, 0, 1), (1, 0, 0), (0, -1, 0)),
+        ("unreal", (0, 0, 1), (1, 0, 0), (0, 1, 0)),
     ],
 )
 def test_up_is_z_forward_is_y_and_right_is_x(axes: str, up: tuple, forward: tuple, right: tuple) -> None:
@@ -60,6 +61,13 @@ def test_a_turn_to_the_right_in_unity_is_one_to_the_right_in_blender() -> None:
     np.testing.assert_allclose(Rotation.from_quat(turn[[1, 2, 3, 0]]).apply((0, 1, 0)), (1, 0, 0), atol=1e-15)
 
 
+def test_a_yaw_to_the_right_in_unreal_is_one_to_the_right_in_blender() -> None:
+    """Unreal's yaw of +90 degrees, FQuat(0, 0, 0.707, 0.707), takes forward (x) to the right (y)."""
+    half = np.sqrt(0.5)
+    (turn,) = to_blender(Poses.from_xyzw([[0, 0, 0]], [[0, 0, half, half]]), "unreal").quaternions
+    np.testing.assert_allclose(Rotation.from_quat(turn[[1, 2, 3, 0]]).apply((0, 1, 0)), (1, 0, 0), atol=1e-15)
+
+
 @pytest.mark.parametrize("axes", AXES)
 def test_what_was_recorded_stays_as_it_was(poses: Poses, axes: str) -> None:
     before = poses.positions.copy(), poses.quaternions.copy()
@@ -69,5 +77,5 @@ def test_what_was_recorded_stays_as_it_was(poses: Poses, axes: str) -> None:
 
 
 def test_unknown_axes_are_answered_with_the_known_ones(poses: Poses) -> None:
-    with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros"):
+    with pytest.raises(ValueError, match="'maya'; known are blender, opengl, unity, ros, unreal"):
         to_blender(poses, "maya")

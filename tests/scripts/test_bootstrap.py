@@ -29,9 +29,10 @@ def test_help_shows_the_commands(arguments):
 
 
 def test_an_unknown_command_is_refused_with_the_known_ones():
-    done = run("render")
+    done = run("compair")
     assert done.returncode == 2
-    assert "compare, paper, test, benchmark" in done.stderr
+    assert "did you mean compare?" in done.stderr
+    assert all(command in done.stderr for command in bootstrap.COMMANDS)
 
 
 def test_every_script_is_found_from_whatever_folder():

@@ -101,6 +101,9 @@ class ActionMotion(bpy.types.PropertyGroup):
         description="Whether samples lie outside of the keys that they are for, within those of others or not",
         options={"HIDDEN"},
     )
+    is_draft: BoolProperty(
+        description="Whether in-betweens of bones have one sample a frame, until more are needed", options={"HIDDEN"}
+    )
 
 
 class ChangedAction(bpy.types.PropertyGroup):

@@ -15,10 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
 
-from .quaternions import components, conjugate, multiply, rotate, vectors
+from .quaternions import components, conjugate, from_matrices, multiply, rotate, vectors
 
 LIMIT = 1e40
 """A number beyond this is damage, not a measurement, and more than Blender can hold. Powers of it are still floats."""
+
+UNEVEN = 1e-3
+"""By what part of the scale the axes of a matrix may differ from three of one length at right angles to one another."""
+
+UNSCALED = 1e-6
+"""A scale that differs less from 1 is 1: single precision has no better."""
 
 SHORTEST = 1e-30
 """Between two moments, for the same reason: what happens in less has a speed that is no float."""
@@ -114,6 +120,65 @@ class Poses:
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "quaternions", quaternions)
         object.__setattr__(self, "scales", scales)
+
+    @classmethod
+    def from_xyzw(cls, positions: ArrayLike, quaternions: ArrayLike, scales: ArrayLike | None = None) -> Poses:
+        """Poses whose quaternions are x, y, z, w, as ROS, Unity, Unreal, glTF and SciPy have them.
+
+        Examples
+        --------
+        >>> from rigid_motion.motion import Poses
+        >>> Poses.from_xyzw([[0, 0, 0]], [[0, 0, 0, 1]]).quaternions.tolist()
+        [[1.0, 0.0, 0.0, 0.0]]
+        """
+        quaternions = numbers(quaternions, "quaternions")
+        if quaternions.shape[-1:] != (4,):
+            raise ValueError(f"quaternions need the shape (..., 4), not {quaternions.shape}")
+        return cls(positions, quaternions[..., [3, 0, 1, 2]], scales)
+
+    @classmethod
+    def from_matrices(cls, matrices: ArrayLike) -> Poses:
+        """Poses of matrices (..., 4, 4) that multiply columns, as NumPy, Blender and OpenCV have them.
+
+        Raises
+        ------
+        ValueError
+            Where a matrix mirrors, shears or scales unevenly: no pose does. The message names the first.
+
+        Notes
+        -----
+        Quaternions have successive signs only after `repair`. Scales are None where all are 1. A matrix with NaN is a
+        pose of NaN.
+
+        Examples
+        --------
+        >>> from rigid_motion.motion import Poses
+        >>> poses = Poses.from_matrices([[[0, -2, 0, 5], [2, 0, 0, 6], [0, 0, 2, 7], [0, 0, 0, 1]]])
+        >>> poses.positions.tolist(), poses.scales.round(3).tolist()
+        ([[5.0, 6.0, 7.0]], [2.0])
+        >>> poses.quaternions.round(3).tolist()
+        [[0.707, 0.0, 0.0, 0.707]]
+        """
+        matrices = numbers(matrices, "matrices")
+        if matrices.shape[-2:] != (4, 4):
+            raise ValueError(f"matrices need the shape (..., 4, 4), not {matrices.shape}")
+        axes = matrices[..., :3, :3]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            scales = np.cbrt(np.linalg.det(axes))
+            rotations = axes / scales[..., None, None]
+            uneven = np.abs(np.einsum("...ij,...ik->...jk", rotations, rotations) - np.eye(3)).max(axis=(-2, -1))
+            wrong = (scales <= 0.0) | (uneven > UNEVEN)
+            if wrong.any():
+                place = tuple(map(int, np.argwhere(wrong)[0]))
+                if scales[place] < 0.0:
+                    fault = "mirrors"
+                elif scales[place] == 0.0:
+                    fault = "has no scale"
+                else:
+                    fault = "shears or scales unevenly"
+                raise ValueError(f"the matrix at {place[0] if len(place) == 1 else place} {fault}, which no pose does")
+            scaled = (np.abs(scales - 1.0) > UNSCALED).any()
+            return cls(matrices[..., :3, 3], from_matrices(rotations), scales if scaled else None)
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -70,6 +70,25 @@ def matrices(q: np.ndarray) -> np.ndarray:
     return 2.0 * np.array(halves)
 
 
+def from_matrices(rotations: np.ndarray) -> np.ndarray:
+    """Unit quaternions (..., 4) of rotation matrices (..., 3, 3), of either sign.
+
+    Each of four formulas divides by one component of the quaternion: that of the largest is taken.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = (np.moveaxis(rotations[..., row, :], -1, 0) for row in range(3))
+    candidates = np.stack(
+        [
+            np.stack([1.0 + a + e + i, h - f, c - g, d - b], axis=-1),
+            np.stack([h - f, 1.0 + a - e - i, b + d, c + g], axis=-1),
+            np.stack([c - g, b + d, 1.0 - a + e - i, f + h], axis=-1),
+            np.stack([d - b, c + g, f + h, 1.0 - a - e + i], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.einsum("...ii->...i", candidates), axis=-1)
+    return normalise(np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :])
+
+
 def cross(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
     """The vector product of vectors (3, ...), components first."""
     product = np.empty((3, *np.broadcast(a[0], b[0]).shape))

@@ -27,6 +27,7 @@ from rigid_motion_batch.analysis.radii import JOINT
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.options import ReadingOptions
 from rigid_motion_batch.recordings.reading import FORMATS, files_of
 
 from .bows import SCREW
@@ -58,6 +59,9 @@ SEARCHED = 10.0
 JUMP = 3.0
 """A first sample is no motion from which the body gets away so many times faster than it ever moves afterwards: files
 of motion capture may begin with a pose to calibrate by."""
+
+WHOLE = ReadingOptions(start=0.0)
+"""A first sample that is no motion is looked for here, in all bodies alike."""
 
 MAY_HOLD_BODIES = ("BVH", "FBX", "glTF", "Blender file")
 """Formats that are looked at for a whole body among the recordings."""
@@ -232,7 +236,7 @@ def read_body(source: str, name: str) -> tuple[Body, Clip | None]:
     """Read and repair the first whole body of a file; no clip where there is none, or nothing of it moves."""
     file = Path(source).name
     try:
-        clips, _ = read_clips([source], None)
+        clips, _ = read_clips([source], None, WHOLE)
     except TrajectoryError as error:
         return Body(name, file, left_out=str(error).replace(source, file)), None
     whole = [clip for clip in clips if clip.figure is not None]

@@ -16,7 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rigid_motion.motion import decimate, reduce_keys, reduce_skeleton_keys
+from rigid_motion.motion import decimate, reduce_keys, reduce_skeleton_keys, shell_error
 from rigid_motion_batch.recordings.clips import Clip
 
 MILLIMETRES = {"mm": 1, "cm": 10, "m": 1000}
@@ -205,6 +205,27 @@ class Tolerance(Choice):
         number, unit = self._parts()
         return float(number) * (METRES[unit] if unit else per_unit)
 
+    def require_within(self, clip: Clip, radius: float) -> None:
+        """Raise ValueError with the way out where a clip does not move as far as the tolerance: "5" for "5mm".
+
+        The radius of the shell is in metres; of a body the places of its joints count.
+        """
+        if clip.figure is None:
+            poses = clip.in_metres(clip.poses)
+            size = float(shell_error(poses, poses[:1], radius).max())
+        else:
+            places = clip.in_metres(clip.figure.skeleton.in_root_space(clip.poses)).positions
+            size = float(np.linalg.norm(places - places[:, :1], axis=-1).max())
+        allowed = self.tolerance(clip)
+        if 0.0 < size < allowed:
+            written, unit = self._parts()
+            way_out = "give a smaller one" if unit else f"give it with its unit, as in {written}mm"
+            here = "" if unit == "m" else f", {allowed:.3g} m"
+            raise ValueError(
+                f"a tolerance of {self.amount}{here}, is more than the whole motion, which is {size:.3g} m large: "
+                f"{way_out}"
+            )
+
     @property
     def is_length(self) -> bool:
         """Whether it says its unit, and does not go by that of the recording."""
@@ -214,7 +235,7 @@ class Tolerance(Choice):
         """Another length, in metres, written in the unit that this one is in."""
         _, unit = self._parts()
         length = round(metres / (METRES[unit] if unit else per_unit), 4)
-        return f"{length:.3g} {unit}".strip()
+        return f"{length:.3g} {unit or 'units'}"
 
     @property
     def size(self) -> float:

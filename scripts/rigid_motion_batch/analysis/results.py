@@ -124,8 +124,9 @@ class ChoiceResult:
 
     @property
     def rows(self) -> list[Metrics]:
-        """The rows of all modes."""
-        return [row for motion in self.motions for row in motion.metrics]
+        """The rows of all modes, in the order of these."""
+        rows = {row.mode: row for motion in self.motions for row in motion.metrics}
+        return [rows[mode] for mode in self.keys]
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,9 +175,9 @@ def compare_clip(
     """
     if clip.figure is None:
         made = reconstruct(clip, choice, modes, radii.rigid)
-        return None if made is None else _of_rigid_body(made)
+        return None if made is None else of_rigid_body(made)
     body = reconstruct_body(clip, choice, modes, of_joints := radii.of(clip.figure.joints), shared=shared)
-    return None if body is None else _of_body(body, of_joints)
+    return None if body is None else of_body(body, of_joints)
 
 
 def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:
@@ -198,7 +199,8 @@ def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded 
     )
 
 
-def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
+def of_rigid_body(made: Reconstruction) -> ChoiceResult:
+    """Measure what was made of a rigid body."""
     rows = {row.mode: row for row in measure_reconstruction(made)}
     motions = []
     for group in identical_modes([made]):
@@ -223,7 +225,8 @@ def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
     )
 
 
-def _of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
+def of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
+    """Measure what was made of a whole body, whose joints have balls of these radii, shape (joints,), in metres."""
     ground = Ground.of(made)
     rows: dict[str, Metrics] = {}
     joints: list[JointMetrics] = []

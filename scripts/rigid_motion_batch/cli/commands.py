@@ -10,9 +10,12 @@ from importlib import import_module
 from pathlib import Path
 
 from rigid_motion_batch import standard_streams
-from rigid_motion_batch.command_line import INSTALLED, own_arguments, program_of
+from rigid_motion_batch.command_line import INSTALLED, did_you_mean, own_arguments, printable, program_of
 from rigid_motion_batch.places import NAMED, manifest
 from rigid_motion_batch.supervising import begin_child, ended_at_once, stop_signals, supervise
+from rigid_motion_batch.system_libraries import way_out
+
+from .in_blender import NoEnvironment, become, blender_program, elsewhere
 
 
 @dataclass(frozen=True)
@@ -23,9 +26,6 @@ class Command:
     """In this package; it has `main(arguments)`, which returns the exit code. Its script has the same name."""
 
     about: str
-
-    extra: str = "blender"
-    """Of the distribution: what brings the packages that it needs."""
 
 
 RESEARCH = {
@@ -41,13 +41,20 @@ RESEARCH = {
 
 COMMANDS = {
     "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
-    "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
+    "inspect": Command("inspect", "say what is in a recording, and what looks wrong"),
     "reduce": Command("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
+    "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
     "tasks": Command(".workplan.__main__", "list or run single tasks of a comparison"),
+    "examples": Command("examples", "make small complete cases to begin with (in a checkout)"),
     "build": Command("build_extension", "build the zip that Blender installs"),
+    "completion": Command("completion", "have a shell complete commands and options"),
 }
+
+
+ON_LIBRARIES = ("compare.py", "job_bundle.py")
+"""Scripts that need packages which Blender's own Python has not."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,8 +72,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def launch(script: str) -> None:
     """Run the command of a script, given its `__file__`, and end with its exit code."""
-    name = Path(script).name
-    sys.exit(_as_program(program_of(name), lambda: _run(f".{Path(script).stem}", own_arguments(script))))
+    name, arguments = Path(script).name, own_arguments(script)
+    if name in ON_LIBRARIES and blender_program():
+        try:
+            if command := elsewhere(script, arguments):
+                sys.exit(become(command))
+        except NoEnvironment as error:
+            print(f"{name}: {error}", file=sys.stderr)
+            sys.exit(2)
+    sys.exit(_as_program(program_of(name), lambda: _run(f".{Path(script).stem}", arguments)))
 
 
 def launch_research(arguments: Sequence[str]) -> None:
@@ -76,7 +90,8 @@ def launch_research(arguments: Sequence[str]) -> None:
         print("usage: python scripts/research NAME ...\n\n" + "\n".join(f"  {name}" for name in RESEARCH))
         sys.exit(0)
     if name not in RESEARCH:
-        print(f"research: there is no {name!r}; there are {', '.join(RESEARCH)}", file=sys.stderr)
+        near = did_you_mean(name, RESEARCH) or "; there are " + ", ".join(RESEARCH)
+        print(f"research: there is no {name!r}{near}", file=sys.stderr)
         sys.exit(2)
     sys.exit(_as_program(f"research {name}", lambda: _run(f"research.{RESEARCH[name]}", rest)))
 
@@ -90,7 +105,8 @@ def _main(arguments: list[str]) -> int:
         print(f"{INSTALLED} {manifest()['version']}")
         return 0
     if name not in COMMANDS:
-        print(f"{INSTALLED}: there is no command {name!r}; the commands are {', '.join(COMMANDS)}", file=sys.stderr)
+        near = did_you_mean(name, COMMANDS) or "; the commands are " + ", ".join(COMMANDS)
+        print(f"{INSTALLED}: there is no command {printable(repr(name))}{near}", file=sys.stderr)
         return 2
     sys.argv = [f"{INSTALLED} {name}", *rest]
     try:
@@ -98,8 +114,7 @@ def _main(arguments: list[str]) -> int:
     except ModuleNotFoundError as error:
         if not error.name or error.name.partition(".")[0] in NAMED:
             raise
-        way_out = f"pip install 'rigid-motion[{COMMANDS[name].extra}]'"
-        print(f"{sys.argv[0]}: {error.name} is not here; {way_out} brings it", file=sys.stderr)
+        print(f"{sys.argv[0]}: {error}\n{way_out(str(error))}", file=sys.stderr)
         return 2
 
 
@@ -144,6 +159,7 @@ Rigid-motion interpolation for keyframes, measured, baked, streamed and rendered
 examples:
   {INSTALLED} compare                                  the motions that come with the program
   {INSTALLED} compare hand.csv --axes unity
-  {INSTALLED} compare take.csv --decimate adaptive --tolerance 5mm --no-video
+  {INSTALLED} compare take.csv --tolerance 5mm --no-video
+  {INSTALLED} inspect take.csv
   {INSTALLED} bake shot.blend
   {INSTALLED} reduce shot.blend --tolerance 5mm"""

@@ -12,7 +12,7 @@ from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Unifo
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.command_line import folder_path, number, parser_of
+from rigid_motion_batch.command_line import did_you_mean, folder_path, number, parser_of
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.places import ASSETS, from_here, output_folder
 from rigid_motion_batch.recordings import files_of
@@ -60,24 +60,24 @@ examples:
   python scripts/compare.py take.csv --rates 7.5,15 --modes lerp_slerp,dq_sclerp --slow-motion 4
   python scripts/compare.py dance.bvh walk.fbx fox.glb shot.blend:Rig
   python scripts/compare.py dances/ --no-video
-  python scripts/compare.py dance.bvh --decimate adaptive --tolerance 1cm --shared
+  python scripts/compare.py dance.bvh --tolerance 1cm --shared
   python scripts/compare.py dance.bvh:LeftHand --object controller
   python scripts/compare.py shot.blend:Camera --no-video
   python scripts/compare.py shot.blend:Rig/Hand --no-video
   python scripts/compare.py hand_left.csv --modes all,best_of
-  python scripts/compare.py take.csv --decimate adaptive --tolerance 5mm
-  python scripts/compare.py take.csv --decimate adaptive --budget 5,10 --rates 10
+  python scripts/compare.py take.csv --tolerance 5mm
+  python scripts/compare.py take.csv --budget 5,10 --rates 10
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 choosing keys:
-  --decimate uniform keeps --rates keys a second, evenly spaced in time and the same for every mode. --decimate adaptive
-  chooses keys for each mode among the recorded samples: with --tolerance, the fewest that keep its shell error within
-  that length everywhere; with --budget, so many keys a second on average over the clip, placed so that its RMS shell
-  error is small. Without either, --rates are the budgets; if you give --rates as well, evenly spaced keys at these
-  rates are added for comparison. With adaptive keys, the report also shows error over number of keys, and how many keys
-  each mode needs to be as good as lerp_slerp at 30, 20, 15 and 12 keys a second; this takes up to a second for every
-  100 samples. --fit also counts keys that are not recorded poses, but moved to where the motion follows the recording
-  best; it takes two to three times as long.
+  Without more, --rates keys a second are kept, evenly spaced in time and the same for every mode. --tolerance,
+  --budget or --decimate adaptive choose keys for each mode among the recorded samples: with --tolerance, the fewest
+  that keep its shell error within that length everywhere; with --budget, so many keys a second on average over the
+  clip, placed so that its RMS shell error is small. With --decimate adaptive alone, --rates are the budgets; if you
+  give --rates beside a tolerance or budget, evenly spaced keys at these rates are added for comparison. With adaptive
+  keys, the report also shows error over number of keys, and how many keys each mode needs to be as good as lerp_slerp
+  at 30, 20, 15 and 12 keys a second; this takes up to a second for every 100 samples. --fit also counts keys that are
+  not recorded poses, but moved to where the motion follows the recording best; it takes two to three times as long.
 
 choosing modes:
   best_of takes, in each segment from key to key, the one of the other modes named that comes closest to the recording
@@ -130,7 +130,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         default=output_folder("comparison"),
         help="folder to write to (renders/comparison)",
     )
-    parser.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
+    parser.add_argument(
+        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
+    )
     parser.add_argument(
         "--radius",
         type=_radii,
@@ -158,8 +160,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     keys.add_argument(
         "--decimate",
         choices=("uniform", "adaptive"),
-        default="uniform",
-        help="keep keys evenly spaced in time, or where each mode needs them (%(default)s)",
+        help="keep keys evenly spaced in time, or where each mode needs them (uniform; adaptive with --tolerance or "
+        "--budget)",
     )
     keys.add_argument(
         "--tolerance",
@@ -242,11 +244,17 @@ def parse(arguments: list[str]) -> argparse.Namespace:
 def _choices(options: argparse.Namespace) -> list[Choice]:
     """All choices of keys of the run. Raises ValueError for options that do not go together."""
     rates, tolerance, budget, shared = options.rates, options.tolerance, options.budget, options.shared
+    options.decimate = options.decimate or ("adaptive" if tolerance or budget else "uniform")
     if options.decimate == "uniform":
-        by_motion = (("--tolerance", tolerance), ("--budget", budget), ("--fit", options.fit), ("--shared", shared))
-        for option, given in by_motion:
+        for option, given in (("--tolerance", tolerance), ("--budget", budget)):
             if given:
-                raise ValueError(f"{option} is for keys that are chosen by the motion: add --decimate adaptive")
+                raise ValueError(f"{option} is for keys that are chosen by the motion: leave out --decimate uniform")
+        for option, given in (("--fit", options.fit), ("--shared", shared)):
+            if given:
+                raise ValueError(
+                    f"{option} is for keys that are chosen by the motion: add --tolerance, --budget or --decimate "
+                    "adaptive"
+                )
         return rates or _amounts(Uniform)(RATES)
     if tolerance and budget:
         raise ValueError(
@@ -285,9 +293,9 @@ def _modes(text: str) -> Modes:
     modes = single_modes(named)
     wrong = [mode for mode in modes if mode not in MODES]
     if wrong or not named:
-        raise argparse.ArgumentTypeError(
-            f"there is no mode {wrong[0] if wrong else text!r}; there are {', '.join((*MODES, DISTINCT, ALL, BEST_OF))}"
-        )
+        known, name = (*MODES, DISTINCT, ALL, BEST_OF), wrong[0] if wrong else text
+        near = did_you_mean(name, known) or f"; there are {', '.join(known)}"
+        raise argparse.ArgumentTypeError(f"there is no mode {name!r}{near}")
     share = DISTINCT in written
     if BEST_OF not in named:
         return Modes(tuple(modes), share)

@@ -135,7 +135,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     recordings.add_argument(
         "--fps", type=_fps, metavar="N", help="frames a second of .blend files (the rate of the recording)"
     )
-    recordings.add_argument("--axes", choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)")
+    recordings.add_argument(
+        "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
+    )
     add_reading_options(parser)
     add_file_options(parser)
     options = parser.parse_args(arguments)

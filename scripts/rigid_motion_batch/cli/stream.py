@@ -499,7 +499,7 @@ def _add_bind(parser: argparse.ArgumentParser, of: str) -> None:
 
 
 def _add_axes(parser: argparse.ArgumentParser, of: str) -> None:
-    parser.add_argument("--axes", choices=AXES, help=f"axes {of} (opengl for BVH, blender for others)")
+    parser.add_argument("--axes", type=str.lower, choices=AXES, help=f"axes {of} (opengl for BVH, blender for others)")
 
 
 def _bounded(what: str, least: float, most: float, above: bool = False) -> Callable[[str], float]:

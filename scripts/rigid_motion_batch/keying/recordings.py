@@ -18,6 +18,7 @@ from rigid_motion_batch.analysis.radii import RIGID
 from rigid_motion_batch.analysis.reconstructions import fill_in
 from rigid_motion_batch.keying.blend_files import (
     FileProblem,
+    Unreadable,
     refuse_came_meanwhile,
     refuse_read_only,
     refuse_to_replace,
@@ -132,6 +133,7 @@ class RecordingRun:
                 raise
             except FileProblem as problem:
                 outcome.failed = True
+                outcome.unreadable = isinstance(problem, Unreadable) and not outcome.written
                 self._note(f"{title}: {problem}")
             except Exception as error:
                 outcome.failed = True
@@ -141,6 +143,11 @@ class RecordingRun:
     def _do_clip(self, title: str, clip: Clip, file: Path, name: str, outcome: Outcome) -> None:
         for repair in clip.repairs:
             self._note(f"{title}: {repair}")
+        if self.wishes.tolerance and self.wishes.count is None:
+            try:
+                self.wishes.tolerance.require_within(clip, self.wishes.radius or RIGID)
+            except ValueError as error:
+                raise Unreadable(str(error)) from None
         begin = (self.writing.folder or file.parent) / f"{name}{SUFFIX}"
         if clip.figure is not None:
             self._do_body(title, clip, file, name, begin.with_name(f"{begin.name}.blend"), outcome)

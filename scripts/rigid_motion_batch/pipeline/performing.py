@@ -51,6 +51,9 @@ class Order:
     blender: str = ""
     """The program that does it, if that is not to be this one."""
 
+    here: str = ""
+    """The folder that relative inputs start from, where that is not the current one."""
+
 
 @dataclass(frozen=True)
 class Told:
@@ -114,7 +117,7 @@ class ExecutorError(Exception):
     """Why nothing can be done by these means, and the way out, in one line."""
 
 
-def perform(order: Order, tell: Callable[[float, str], object] | None = None) -> Made | Failed:
+def perform(order: Order, tell: Callable[[float, str], object] | None = None) -> Made | Failed | Lost:
     """Do a task. Its folder is there afterwards if it was made, and only then.
 
     Parameters
@@ -130,8 +133,10 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         tell or _writing(order),
     )
     started = time.perf_counter()
-    done: Made | Failed | None = None
+    done: Made | Failed | Lost | None = None
     try:
+        if order.here and os.path.isdir(order.here):
+            os.chdir(order.here)
         for one in order.inputs:
             if os.path.exists(one.path) and not os.path.isfile(one.path):
                 raise TaskError(f"{one.path}: this is no file, but a folder, pipe or device; give a file")
@@ -143,12 +148,14 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
         files = {path.relative_to(job.folder).as_posix(): path for path in sorted(job.folder.rglob("*"))}
         files = {name: _state_of(path) for name, path in files.items() if not path.is_dir()}
         for name, shown in order.wanted.items():
-            if name not in files:
+            if not name.endswith("/") and name not in files:
                 raise TaskError(f"{shown}: this was to be made, and was not")
         index = {"files": files, "seconds": time.perf_counter() - started, "facts": dict(facts or {})}
         done = Made(order.folder, index, job.notes)
     except TaskError as error:
         done = Failed(str(error), notes=job.notes)
+    except ChildProcessError as error:
+        done = Lost(str(error))
     except OSError as error:
         where = f"{_shown(error.filename, order)}: " if error.filename else ""
         own = str(error.filename or "").startswith(order.output)
@@ -164,6 +171,12 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     if isinstance(done, Failed) and not done.hopeless and _is_full(order.output):
         return Failed(f"{os.strerror(errno.ENOSPC)} ({done.message})", done.details, True, done.notes)
     return done
+
+
+def write_progress(order: Order, share: float, doing: str) -> None:
+    """Say how far an order is to whoever asks `progress_of`."""
+    with suppress(OSError):
+        Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
 
 
 def progress_of(order: Order) -> tuple[float, str] | None:
@@ -191,8 +204,7 @@ def _writing(order: Order) -> Callable[[float, str], None]:
         nonlocal said_at
         if time.monotonic() - said_at >= INTERVAL:
             said_at = time.monotonic()
-            with suppress(OSError):
-                Path(f"{order.folder}.progress").write_text(json.dumps([share, doing]), encoding="utf-8")
+            write_progress(order, share, doing)
 
     return tell
 

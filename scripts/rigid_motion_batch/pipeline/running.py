@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import enum
 import heapq
-import json
 import os
 import shutil
 import time
@@ -19,8 +18,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-
-from rigid_motion_batch.files import write_text
 
 from .performing import FULL_OR_FORBIDDEN, Executor, Failed, Lost, Made, Order, Told, perform
 from .steps import Task
@@ -572,4 +569,4 @@ class _Run:
             name: {"message": said, "details": self.details[name]} for name, said in self.outcome.failures.items()
         }
         with suppress(OSError):
-            write_text(path, json.dumps(failures, indent=2)) if failures else path.unlink(missing_ok=True)
+            self.store.note(path.name, failures) if failures else path.unlink(missing_ok=True)

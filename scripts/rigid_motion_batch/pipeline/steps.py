@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -159,7 +159,7 @@ class Task:
     inputs: tuple[Input, ...] = ()
 
     publish: Mapping[str, str] = field(default_factory=dict)
-    """Files of the result to where they go in the output folder, with slashes."""
+    """Files of the result to where they go in the output folder, with slashes; "FOLDER/" stands for all files below."""
 
     title: str = ""
     weight: float = 1.0
@@ -176,13 +176,21 @@ class Task:
 
     def __post_init__(self) -> None:
         for path in self.publish.values():
-            require_inside(path)
+            require_inside(path.removesuffix("/"))
         object.__setattr__(self, "key", self.key_after(self.after))
 
     def key_after(self, after: Iterable[str | None]) -> str:
         """Its key where the tasks before it had these keys; None for one that failed."""
         inputs = [one.sha256 for one in self.inputs]
         return _digest([self.step.digest, to_plain(self.parameters), list(after), inputs])[:DIGITS]
+
+    def published(self, files: Iterable[str] = ()) -> Iterator[tuple[str, str]]:
+        """Each file that is published and where it goes, of a result with these files."""
+        for name, path in self.publish.items():
+            if name.endswith("/"):
+                yield from ((one, path + one.removeprefix(name)) for one in files if one.startswith(name))
+            else:
+                yield name, path
 
     @property
     def shown(self) -> str:

@@ -111,7 +111,7 @@ class Store:
                     "another"
                 ) from None
             holder = {"process": os.getpid(), "host": socket.gethostname(), "since": time.strftime("%Y-%m-%d %H:%M")}
-            write_text(self.own / "holder.json", json.dumps(holder))
+            self.note("holder.json", holder)
         self._clear_dead_sessions()
         while self._session is None:
             session = FileLock(self._scratch / f"{uuid.uuid4().hex[:8]}.lock")
@@ -125,7 +125,7 @@ class Store:
         shutil.rmtree(self.scratch, ignore_errors=True)
         if self._identities:
             with suppress(OSError):
-                write_text(self.own / "inputs.json", json.dumps(self._cache))
+                self.note("inputs.json", self._cache)
         lock = self._session.lock_file
         self._session.release()
         Path(lock).unlink(missing_ok=True)
@@ -151,6 +151,11 @@ class Store:
         self._number += 1
         return self.scratch / str(self._number)
 
+    def note(self, name: str, content: Any) -> None:
+        """Write a file of the store's own, of JSON."""
+        _clear(self.own / name)
+        write_text(self.own / name, json.dumps(content, indent=1))
+
     def _clear_dead_sessions(self) -> None:
         for path in self._scratch.glob("*.lock"):
             lock = FileLock(path, blocking=False)
@@ -160,7 +165,7 @@ class Store:
 
     def _holder(self) -> str:
         try:
-            holder = json.loads((self.own / "holder.json").read_text(encoding="utf-8"))
+            holder = json.loads(_read(self.own / "holder.json"))
             return f" (process {holder['process']} on {holder['host']}, since {holder['since']})"
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return ""
@@ -220,8 +225,7 @@ class Store:
         """
         folder = f"{self._results}/{key}"
         try:
-            with open(f"{folder}/{INDEX}", "rb") as stream:
-                index = json.loads(stream.read())
+            index = json.loads(_read(f"{folder}/{INDEX}"))
             for name, (size, mtime, digest) in index["files"].items():
                 found = os.lstat(f"{folder}/{name}")
                 if not stat.S_ISREG(found.st_mode) or found.st_size != size:
@@ -285,7 +289,8 @@ class Store:
 
     def is_published(self, task: Task, result: Result) -> bool:
         """Whether all files that a task publishes are in place, and are those of this result."""
-        return all(self._is_same(f"{result.folder}/{name}", path) for name, path in task.publish.items())
+        files = task.published(result.index["files"])
+        return all(self._is_same(f"{result.folder}/{name}", path) for name, path in files)
 
     def strangers(self, task: Task, result: Result | None) -> list[str]:
         """The paths where a task would replace a file that this program has not written, or that was edited since.
@@ -297,7 +302,7 @@ class Store:
         """
         return [
             path
-            for name, path in task.publish.items()
+            for name, path in task.published(result.index["files"] if result else ())
             if not (result and self._is_same(f"{result.folder}/{name}", path)) and not self._is_ours(path)
         ]
 
@@ -312,7 +317,7 @@ class Store:
         """
         if not self.overwrite and (found := self.strangers(task, result)):
             raise OutputError(not_written([os.fspath(self.output / path) for path in found]))
-        for name, path in task.publish.items():
+        for name, path in task.published(result.index["files"]):
             original, target = result.folder / name, self.output / path
             if self._is_same(os.fspath(original), path):
                 continue
@@ -397,6 +402,7 @@ class Store:
         """Add lines to a file at once: of two who do so at the same time each line stays whole."""
         text = "".join(f"{json.dumps(line)}\n" for line in lines)
         path.parent.mkdir(exist_ok=True)
+        _clear(path)
         opened = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
         try:
             os.write(opened, f"\n{text}".encode())  # A line that was cut off ends here.
@@ -421,7 +427,7 @@ def inputs_known(output: Path) -> dict[str, str]:
 
 def _inputs_known(output: Path) -> dict[str, list[Any]]:
     try:
-        content = json.loads((output / OWN / "inputs.json").read_text(encoding="utf-8"))
+        content = json.loads(_read(output / OWN / "inputs.json"))
         return {path: seen for path, seen in content.items() if len(seen) == 5 and isinstance(seen[-1], str)}
     except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         return {}
@@ -430,15 +436,29 @@ def _inputs_known(output: Path) -> dict[str, list[Any]]:
 def _lines(path: Path) -> Iterator[dict[str, Any]]:
     """The objects of a file with a line of JSON for each; lines that are damaged are left out."""
     try:
-        if not stat.S_ISREG(os.lstat(path).st_mode):
-            return
-        text = path.read_bytes()
+        text = _read(path)
     except OSError:
         return
     for line in text.splitlines():
         with suppress(ValueError, RecursionError):
             if isinstance(content := json.loads(line), dict):
                 yield content
+
+
+def _read(path: Path | str) -> bytes:
+    """The content of a file; OSError for pipes and devices, which may never end."""
+    if not stat.S_ISREG(os.lstat(path).st_mode):
+        raise OSError(errno.EINVAL, "no file", os.fspath(path))
+    with open(path, "rb") as stream:
+        return stream.read()
+
+
+def _clear(path: Path) -> None:
+    """Take away what is no file, or leads elsewhere, where the store keeps a file of its own."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    elif os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+        path.unlink()
 
 
 def _remove_if_empty(folder: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 
 from rigid_motion_batch.command_line import number
 
@@ -20,6 +21,12 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="columns of CSVs by name: t, x, y, z, qx, qy, qz, qw, rx, ry, rz (Euler angles), scale, device",
     )
     group.add_argument("--time-unit", choices=TICKS, help="unit of the times, whatever the file says")
+    group.add_argument(
+        "--frame-rate",
+        type=_frame_rate,
+        metavar="HZ",
+        help="frames a second, where a column counts frames, not seconds",
+    )
     group.add_argument("--scale", type=_scale, metavar="M", help="metres in a unit of length: 0.01 for centimetres")
     group.add_argument(
         "--euler",
@@ -30,13 +37,20 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--degrees", action="store_true", help="the Euler angles are in degrees (as the columns' names say, or radians)"
     )
+    group.add_argument(
+        "--start",
+        type=_start,
+        metavar="S",
+        help="begin so many seconds after the first sample; 0 keeps a T-pose that would be left out",
+    )
+    group.add_argument("--end", type=_end, metavar="S", help="end so many seconds after the first sample")
 
 
 def reading_options(options: argparse.Namespace) -> ReadingOptions:
     """What the options of that group say. Raises ValueError for some that do not go together."""
     if options.degrees and not options.euler:
         raise ValueError("--degrees is for Euler angles: add their order, such as --euler YXZ")
-    return ReadingOptions(options.columns, options.time_unit, options.scale, options.euler, options.degrees)
+    return ReadingOptions(**{field.name: getattr(options, field.name) for field in fields(ReadingOptions)})
 
 
 def _columns(text: str) -> tuple[tuple[str, str], ...]:
@@ -49,6 +63,18 @@ def _columns(text: str) -> tuple[tuple[str, str], ...]:
 
 def _scale(text: str) -> float | None:
     return _checked(scale=number(text)).scale
+
+
+def _frame_rate(text: str) -> float | None:
+    return _checked(frame_rate=number(text)).frame_rate
+
+
+def _start(text: str) -> float | None:
+    return _checked(start=number(text)).start
+
+
+def _end(text: str) -> float | None:
+    return _checked(end=number(text)).end
 
 
 def _order(text: str) -> str | None:

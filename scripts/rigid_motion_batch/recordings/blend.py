@@ -82,6 +82,7 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
             bodies = {name: Body(obj) for name, obj in objects.items()}
             animated = [name for name, body in bodies.items() if body.frames_of_keys() is not None]
             still = [name for name in objects if name not in animated]
+            selection.match([*objects, *_bones_of(objects)])
             wanted = selection.wanted or ""
             if wanted not in bodies and (body := _bone_called(path, wanted, objects)):
                 selection.of(animated, unlisted=[wanted])
@@ -101,6 +102,13 @@ def read(path: Path, selection: Selection, options: ReadingOptions = AS_THE_FILE
     except (UnicodeDecodeError, SystemError):
         # Blender takes names as they are, and Python fails where it is handed one: with a SystemError on some ways.
         raise TrajectoryError(path, "a name in this file is no text", "save it again from Blender") from None
+
+
+def _bones_of(objects: dict[str, bpy.types.Object]) -> Iterator[str]:
+    """The bones of all armatures, as OBJECT/BONE."""
+    for name, obj in objects.items():
+        if obj.type == "ARMATURE":
+            yield from (f"{name}/{bone}" for bone in obj.data.bones.keys())  # noqa: SIM118 - it runs over bones
 
 
 def _bone_called(path: Path, wanted: str, objects: dict[str, bpy.types.Object]) -> Body | None:

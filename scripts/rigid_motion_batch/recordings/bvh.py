@@ -23,11 +23,13 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import placed
 from rigid_motion.motion.quaternions import align_signs
-from rigid_motion_batch.recordings.figures import Figure
 
+from .clips import ClipWarning
 from .euler import quaternions_from_intrinsic_eulers
+from .figures import Figure
 from .recordings import Selection, Trajectory, TrajectoryError, shown, unique
 from .tables import lines_of, parse_rows
+from .vector_cells import is_number
 
 CHANNELS = {f"{axis}{kind}": (axis.upper(), kind) for kind in ("position", "rotation") for axis in "xyz"}
 
@@ -273,7 +275,7 @@ def _read_channels(words: _Words) -> list[tuple[str, str]]:
     return channels
 
 
-def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[str, ...]]:
+def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarray, float, tuple[ClipWarning, ...]]:
     """What is behind the line `motion`.
 
     Returns
@@ -281,7 +283,7 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
     values : array, shape (frames, channels)
     frame_time : float
         Seconds between frames.
-    warnings : tuple of str
+    warnings : tuple of ClipWarning
         Where there are more or fewer frames than the file says.
     """
     cut: list[tuple[int, str]] = []
@@ -303,10 +305,11 @@ def _read_motion(path: Path, motion: int, joints: list[Joint]) -> tuple[np.ndarr
             lost = len(values) + 1 < count
             values = values if lost else np.concatenate((values, last))
         if lost:
-            warnings.append(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out")
+            warnings.append(ClipWarning(f"{path.name}:{cut[0][0]}: the file is cut off in this row, which is left out"))
     if count != len(values):
         told = f"Frames: says {count:g} and {len(values)} whole rows follow, which are read"
-        warnings.append(f"{path.name}:{settings[0][0]}: {told}; export the BVH again if that is not all")
+        way_out = "export the BVH again if that is not all"
+        warnings.append(ClipWarning(f"{path.name}:{settings[0][0]}: {told}", way_out))
     return values, frame_time, tuple(warnings)
 
 
@@ -324,15 +327,7 @@ def _finished(lines: Iterable[tuple[int, str]], unfinished: list[tuple[int, str]
 def _is_cut_off(row: str, width: int) -> bool:
     """Whether a row lacks numbers at its end, or a part of the last one, and is sound as far as it goes."""
     *cells, last = row.split()
-    return all(map(_is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not _is_number(last))
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+    return all(map(is_number, cells)) and len(cells) < width and (len(cells) < width - 1 or not is_number(last))
 
 
 def _read_setting(path: Path, row: list[tuple[int, str]], name: str, motion: int) -> float:

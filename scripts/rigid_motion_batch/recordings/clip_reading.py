@@ -1,21 +1,25 @@
-"""From recordings to clips, and from clips to what each mode makes of a few keys a second of them."""
+"""From recordings to clips: repaired, cut to the part that is wanted, and named."""
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from rigid_motion.motion import repair
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_trajectories
-from rigid_motion_batch.recordings.figures import repaired
-from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS
-from rigid_motion_batch.recordings.recordings import shown
 
-from .clips import Clip
+from .breaks import breaks, calibration_pose
+from .clips import Clip, ClipWarning
+from .figures import repaired
+from .options import AS_THE_FILE_SAYS, ReadingOptions
+from .reading import read_trajectories
+from .recordings import Trajectory, TrajectoryError, shown
 
 LONGEST_NAME = 80
 """Characters of a clip's name: folders below folders have to fit what file systems allow."""
@@ -35,7 +39,7 @@ DEVICES = {"con", "prn", "aux", "nul"} | {
 
 
 def read_clips(
-    sources: Iterable[str], axes: str | None, options: ReadingOptions = AS_THE_FILE_SAYS
+    sources: Iterable[str], axes: str | None = None, options: ReadingOptions = AS_THE_FILE_SAYS
 ) -> tuple[list[Clip], list[str]]:
     """Read, repair and name the clips of all sources.
 
@@ -43,10 +47,10 @@ def read_clips(
     ----------
     sources : iterable of str
         As `rigid_motion_batch.recordings.read_trajectories` takes them.
-    axes : str or None
+    axes : str, optional
         A name in `rigid_motion_batch.axes.AXES`; None for those of each format.
-    options : ReadingOptions
-        What the files do not say of themselves.
+    options : ReadingOptions, optional
+        What the files do not say of themselves, and which part of them to take.
 
     Returns
     -------
@@ -79,8 +83,11 @@ def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_
     for trajectory in recording.trajectories:
         name = f"{stem}-{trajectory.name}" if several else stem
         try:
-            clip = make_clip(trajectory, source, name, axes or recording.axes)
+            clip = make_clip(trajectory, source, name, axes or recording.axes, options, measured=recording.measured)
             clips.append(replace(clip, body=recording.body))
+            if clip.calibration:
+                frames = "first frame" if clip.calibration == 1 else f"first {clip.calibration} frames"
+                notes.append(f"{shown(clip.name)} without its {frames}, a pose before the motion; --start 0 keeps it")
         except TrajectoryError as error:
             if not several:
                 raise
@@ -90,17 +97,63 @@ def read_source(source: str, axes: str | None, options: ReadingOptions = AS_THE_
     return clips, "; ".join(notes)
 
 
-def make_clip(trajectory: Trajectory, source: str, name: str, axes: str) -> Clip:
-    """A trajectory, repaired. Raises TrajectoryError where fewer than two poses are left of it."""
+def make_clip(
+    trajectory: Trajectory,
+    source: str,
+    name: str,
+    axes: str,
+    options: ReadingOptions = AS_THE_FILE_SAYS,
+    *,
+    measured: bool = True,
+) -> Clip:
+    """A trajectory, repaired and cut. Raises TrajectoryError where fewer than two poses are left of it.
+
+    `measured` is whether devices recorded it: gaps and jumps of an animation are meant.
+    """
     times, poses, repairs = repair(trajectory.times, trajectory.poses, trajectory.rate)
     if len(times) < 2:
         found = "; ".join(map(str, repairs))
         raise TrajectoryError(source, f"{len(times)} usable poses are left: {found}", "record at least 2")
     figure, drawn = repaired(trajectory.figure) if trajectory.figure else (None, ())
-    notes = (*trajectory.warnings, *map(str, repairs), *map(printable, drawn))
+    metres = trajectory.metres_per_unit
+    warnings, calibration, begin = list(trajectory.warnings), 0, float(times[0])
+    if axes == "unreal" and options.scale is None and metres == 1.0 and figure is None:
+        warnings.append(ClipWarning("its lengths are read as metres, and Unreal has centimetres", "add --scale 0.01"))
+    part = _part(source, times - begin, options)
+    if figure is not None and options.start is None:
+        calibration, warning = calibration_pose(times, poses, figure, metres)
+        part = slice(max(part.start, calibration), part.stop)
+        warnings += [warning] if warning else []
+    times, poses = times[part], poses[..., part]
+    if measured:
+        warnings += breaks(times, poses, figure, metres, begin)
+    notes = (*map(str, warnings), *map(str, repairs), *map(printable, drawn))
     return Clip(
-        name, source, axes, times, poses, notes, trajectory.metres_per_unit, figure=figure, rate=trajectory.rate
+        name,
+        source,
+        axes,
+        times,
+        poses,
+        notes,
+        metres,
+        figure=figure,
+        rate=trajectory.rate,
+        warnings=tuple(warnings),
+        calibration=calibration,
     )
+
+
+def _part(source: str, seconds: np.ndarray, options: ReadingOptions) -> slice:
+    """The samples from start to end, of times in seconds since the first. Raises TrajectoryError for fewer than two."""
+    first, last = options.start or 0.0, math.inf if options.end is None else options.end
+    part = slice(int(np.searchsorted(seconds, first)), int(np.searchsorted(seconds, last, "right")))
+    if part.stop - part.start < 2:
+        until = f"{last:g} s" if options.end is not None else "its end"
+        problem = (
+            f"{max(part.stop - part.start, 0)} samples from {first:g} s to {until}, and it lasts {seconds[-1]:.3g} s"
+        )
+        raise TrajectoryError(source, problem, "give another --start or --end")
+    return part
 
 
 def clip_names(wanted: Sequence[tuple[str, str]]) -> list[str]:

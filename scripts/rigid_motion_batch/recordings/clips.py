@@ -16,14 +16,17 @@ from rigid_motion_batch.recordings.figures import Figure
 
 @dataclass(frozen=True)
 class ClipWarning:
-    """What changes the meaning of the numbers, and what to do about it."""
+    """What changes the meaning of the numbers, and what to do about it. As a string it is a sentence."""
 
     text: str
-    way_out: str
+    way_out: str = ""
     start_s: float | None = None
     """Where in the recording that is, in seconds of its times; None where it is everywhere."""
 
     end_s: float | None = None
+
+    def __str__(self) -> str:
+        return f"{self.text}; {self.way_out}" if self.way_out else self.text
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,10 @@ class Clip:
     """Samples a second, where there may be more between these."""
 
     warnings: tuple[ClipWarning, ...] = ()
+    """Those of the repairs that change the meaning of the numbers, with the way out."""
+
+    calibration: int = 0
+    """Samples of a T-pose or the like before the motion, which are left out."""
 
     @property
     def samples_a_second(self) -> float:

@@ -58,6 +58,8 @@ _WORDS = {
     "beside time": "since start startup begin beginning launch recording session game app unity unreal system sys host "
     "unix epoch utc posix absolute relative rel abs total sample capture log header field rosbag from of in at the "
     "real level load unscaled scaled date iso",
+    "frames": "frame frames sample samples",
+    "beside frames": "index idx number num no nr count counter id",
     "devices": "device tracker controller body object node joint bone hand side role name id",
     "beside devices": "label serial xr tracked rigid game",
     "without meaning": "m local world global pose transform tf field data value component",
@@ -68,6 +70,11 @@ TIME = frozenset(_WORDS["time"].split())
 
 WITH_TIME = TIME | frozenset(_WORDS["beside time"].split())
 """And those that may stand with them, and change nothing. `delta` and `frame` do."""
+
+FRAMES = frozenset(_WORDS["frames"].split())
+"""Words for a count of frames."""
+
+WITH_FRAMES = FRAMES.union(_WORDS["beside frames"].split())
 
 DATES = {"date", "datetime", "iso"}
 """Words that tell of a time that it is a date."""
@@ -92,7 +99,7 @@ class ColumnName:
     """What a name says."""
 
     kind: str
-    """"time", "scale", "device", or one of `KINDS`."""
+    """"time", "frame", "scale", "device", or one of `KINDS`."""
 
     axis: str = ""
     """x, y, z, w, or one of `TURNS`; of a device the word for it; "date" of a time that is called so."""
@@ -112,6 +119,8 @@ def column_name(text: str) -> ColumnName | None:
     text, unit = _without_brackets(text)
     spans = [match.span() for match in WORD.finditer(text)]
     words = [text[start:end].lower() for start, end in spans]
+    if not FRAMES.isdisjoint(words) and WITH_FRAMES.issuperset(words):
+        return ColumnName("frame")
     return _time(words, unit) or _device(words) or _scale(text, words, spans) or _pose(text, words, spans, unit)
 
 

@@ -87,13 +87,17 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     times = [explicit["t"]] if "t" in explicit else [index for index in times if index not in explicit.values()]
     # A date beside a count of seconds says the same again.
     times = [index for index in times if names[index] is None or names[index].axis != "date"] or times
+    frames = [index for index, name in enumerate(names) if name and name.kind == "frame"]
+    if options.frame_rate and "t" not in explicit:
+        times = [index for index in frames if index not in explicit.values()] or times
     whole = {
-        key: found
-        for key, found in bodies.items()
-        if times and all(one in found.columns or one in explicit for one in needed)
+        key: found for key, found in bodies.items() if all(one in found.columns or one in explicit for one in needed)
     }
     if explicit.keys() >= set(needed):
         whole = {"": _Found()}
+    if whole and frames and not times:
+        problem = f"no column of time, only one that counts frames ({shown(cells[frames[0]])})"
+        raise ColumnProblem(problem, "say how many frames a second it has: --frame-rate 90", known)
     if not times or not whole:
         raise _missing(cells, names, bodies, bool(times), needed, explicit, known)
     where = {found.label: _columns_of(found, cells, (*needed, "scale"), explicit, known) for found in whole.values()}
@@ -125,7 +129,7 @@ def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str,
     bodies: dict[str, _Found] = {"": _Found()}
     with_w = {name.body.lower() for name in names if name and name.kind == "rotation" and name.axis == "w"}
     for index, name in enumerate(names):
-        if name is None or name.kind in ("time", "device") or index in explicit:
+        if name is None or name.kind in ("time", "frame", "device") or index in explicit:
             continue
         body = bodies.setdefault(name.body.lower(), _Found(name.body))
         if name.kind == "scale":
@@ -184,6 +188,12 @@ def _missing(
     missing = [one for one in ("t", *needed) if one not in explicit and one not in nearest.columns]
     if timed:
         missing.remove("t")
+    turns = {*QUATERNION, *EULER, *TURNS}
+    positions_only = not any(turns & body.columns.keys() for body in bodies.values()) and turns.isdisjoint(explicit)
+    if timed and positions_only and set(missing) == set(needed) - set(POSITION):
+        problem = f"positions only, and rotations are needed (found {columns_found(cells)})"
+        named = ",".join(f"{one}=NAME" for one in missing)
+        return ColumnProblem(problem, f"record them as qx, qy, qz, qw, or name them: --columns {named}", known)
     angles = [one for one in (*EULER, *TURNS) if one in nearest.columns]
     if set(QUATERNION) <= set(missing) and set(needed) - set(missing) >= set(POSITION) and angles:
         shown_angles = ", ".join(cells[nearest.columns[one][0]] for one in angles[:3])

@@ -129,6 +129,9 @@ def _read(
     if not moving:
         problem = "no skeleton that moves" if rigs else "no skeleton"
         raise TrajectoryError(path, f"{problem} in this file", "export the armature together with its animation")
+    bones = {name: rig.data.bones.keys() for name, rig in rigs.items()}
+    selection.match([*rigs, *(bone for own in bones.values() for bone in own)])
+    selection.match(f"{name}/{bone}" for name, own in bones.items() for bone in own)
     name, bone = _wanted(rigs, moving, selection.wanted)
     rig, fps = rigs[name], scene.render.fps / scene.render.fps_base
     first, last = moving.get(name) or next(iter(moving.values()))

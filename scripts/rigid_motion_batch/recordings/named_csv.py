@@ -18,6 +18,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 
+from .clips import ClipWarning
 from .columns import EULER, POSITION, ColumnProblem, Layout, columns_found, layout_of, metres_of, require_time_unit
 from .dates import kind_of_times, seconds_of_dates
 from .euler import quaternions_from_intrinsic_eulers
@@ -64,14 +65,15 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     taken = set(selection.of([body.name for body in bodies]))
     wanted = [body for body in bodies if body.name in taken]
     columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
-    table = Table(path, header.separator, columns, width, line)
+    table = Table(path, header.separator, columns, width, line, header.vectors)
     kind = kind_of_times(table)
-    if kind and options.time_unit:
-        problem = f"--time-unit {options.time_unit} is for times that are numbers, and these have {kind}"
+    if kind and (options.time_unit or options.frame_rate):
+        given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
+        problem = f"{given} is for times that are numbers, and these have {kind}"
         raise TrajectoryError(path, problem, "leave it out", line)
     parsed = [name for name in columns if name != "t" or kind is None]
     numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
-    times = seconds_of_dates(table, kind) if kind else _seconds(table, numbers["t"], wanted, layout)
+    times = seconds_of_dates(table, kind) if kind else _seconds(table, numbers["t"], wanted, layout, options)
     trajectories = []
     for body in wanted:
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
@@ -85,8 +87,12 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     return trajectories
 
 
-def _seconds(table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: Layout) -> np.ndarray:
+def _seconds(
+    table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: Layout, options: ReadingOptions
+) -> np.ndarray:
     """Times that are numbers, shape (n,), as seconds, where that of all bodies can be."""
+    if options.frame_rate:
+        return ticks / options.frame_rate
     try:
         require_time_unit(layout)
     except ColumnProblem as problem:
@@ -102,7 +108,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
     Where none does, TrajectoryError says what the nearest lacks.
     """
     problems: list[tuple[ColumnProblem, int]] = []
-    for line in header_lines(path):
+    for line in (line.of_rows(path) for line in header_lines(path)):
         try:
             return line, layout_of(line.cells, options)
         except ColumnProblem as problem:
@@ -128,7 +134,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
 def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
     """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
     columns = {f"device {index}": index for index in layout.devices}
-    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number), named)
+    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number, header.vectors), named)
     bodies = [
         (f"{device} {prefix}".strip() or path.stem, prefix, columns, rows)
         for device, rows in groups.items()
@@ -165,7 +171,7 @@ def _trajectory(
     positions = np.column_stack([held[axis] for axis in POSITION])
     if len(set(metres)) > 1:
         positions, metres = positions * metres, [1.0]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ClipWarning, ...] = ()
     if options.euler:
         angles = np.column_stack([held[f"r{axis.lower()}"] for axis in options.intrinsic_order])
         angles, warnings = _radians(angles, [layout.units.get(body.columns[one], "") for one in EULER], options)
@@ -178,12 +184,16 @@ def _trajectory(
     return Trajectory(body.name, times, Poses(positions, quaternions, scales), metres[0], warnings=warnings)
 
 
-def _radians(angles: np.ndarray, units: Sequence[str], options: ReadingOptions) -> tuple[np.ndarray, tuple[str, ...]]:
+def _radians(
+    angles: np.ndarray, units: Sequence[str], options: ReadingOptions
+) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
     """Angles of shape (n, 3) as radians, and what is hard to believe of them."""
     largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
     if options.degrees or "deg" in units:
         if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
-            return np.radians(angles), (f"its angles are all within {largest:.3g} degrees; radians need no --degrees",)
+            return np.radians(angles), (
+                ClipWarning(f"its angles are all within {largest:.3g} degrees", "radians need no --degrees"),
+            )
         return np.radians(angles), ()
     if "rad" not in units and largest > LARGEST_RADIANS:
         raise ColumnProblem(

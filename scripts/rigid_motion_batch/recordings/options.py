@@ -1,4 +1,4 @@
-"""What a user knows of a recording and its file does not say: names of columns, units, the order of Euler angles.
+"""What a user says of a recording: names of columns, units, the order of Euler angles, and which part of it to take.
 
 Everything is plain data, so that it travels with a task as JSON.
 """
@@ -35,6 +35,15 @@ class ReadingOptions:
     degrees: bool = False
     """Whether angles are degrees, whatever their names say. Otherwise those are radians whose names do not say."""
 
+    frame_rate: float | None = None
+    """Frames a second, where the file counts frames instead of seconds."""
+
+    start: float | None = None
+    """Seconds after the first sample: those before are left out. With any, a T-pose in front is taken for motion."""
+
+    end: float | None = None
+    """Seconds after the first sample: those behind are left out."""
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "columns", tuple((meaning, column) for meaning, column in self.columns))
         meanings = [meaning for meaning, _ in self.columns]
@@ -53,10 +62,20 @@ class ReadingOptions:
                 "turns about the moved axes, in small letters (zxy) about those of the world"
             )
 
+        if self.frame_rate is not None and not 0.0 < self.frame_rate < math.inf:
+            raise ValueError(f"there cannot be {self.frame_rate} frames a second; give a number such as 90")
+        if self.frame_rate is not None and self.time_unit is not None:
+            raise ValueError("--time-unit and --frame-rate exclude one another: times are counted in one of them")
+        for name, seconds in (("start", self.start), ("end", self.end)):
+            if seconds is not None and not 0.0 <= seconds < math.inf:
+                raise ValueError(f"--{name} cannot be {seconds}: give seconds after the first sample, such as 2.5")
+        if self.end is not None and self.end <= (self.start or 0.0):
+            raise ValueError(f"--end {self.end:g} leaves nothing: it has to be later than --start {self.start or 0:g}")
+
     @property
     def given(self) -> tuple[str, ...]:
         """The names of the fields that say anything."""
-        return tuple(name for name, value in vars(self).items() if value not in ((), None, False))
+        return tuple(name for name, value in vars(self).items() if not (value is None or value is False or value == ()))
 
     @property
     def intrinsic_order(self) -> str:

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from rigid_motion.motion.repair import LARGEST
-from rigid_motion_batch.recordings.figures import BELIEVED, NOTHING, size_of, sureness, unit_of
 
 from . import aframe, blend, bvh, euroc, fbx, gltf, motive, named_csv, tum
+from .clips import ClipWarning
+from .figures import BELIEVED, NOTHING, size_of, sureness, unit_of
 from .options import AS_THE_FILE_SAYS, ReadingOptions
 from .recordings import Recording, Selection, Trajectory, TrajectoryError, shown
 from .sense import doubts
@@ -40,10 +41,11 @@ class Format:
     """Given the first lines. None where the extension is enough."""
 
     honours: tuple[str, ...] = ()
-    """The options that it takes: for what its files do not say themselves. The scale is applied to all formats."""
+    """The options that it takes: for what its files do not say themselves. The scale is applied to all formats, and
+    the part to take when clips are made."""
 
-    doubted: bool = True
-    """Whether it holds what people recorded, and not what they animated, which may go at any speed."""
+    measured: bool = True
+    """Whether it holds what devices measured, and not what was animated, which may go at any speed."""
 
     axes: str = "blender"
     """The convention of its files, where nobody says otherwise: a name in `axes.AXES`."""
@@ -51,24 +53,28 @@ class Format:
     in_metres: bool = True
     """Whether its files say, or are bound, how long the unit of a body is. It may be wrong nevertheless."""
 
+    says_unit: bool = True
+    """Whether it has a unit for lengths, or its files always say theirs."""
+
 
 # Of the formats that share an extension the first that recognises the content reads it. The last one needs not: it
 # takes the rest, and says what is wrong with it.
 FORMATS = (
     Format("Motive CSV", (".csv",), motive.read, motive.recognises),
     Format("EuRoC CSV", (".csv",), euroc.read, euroc.recognises),
-    Format("TUM", (".csv", ".txt", ".tum"), tum.read, tum.recognises, ("time_unit",)),
+    Format("TUM", (".csv", ".txt", ".tum"), tum.read, tum.recognises, ("time_unit", "frame_rate")),
     Format(
         "CSV with named columns",
         (".csv", ".tsv", ".txt"),
         named_csv.read,
-        honours=("columns", "time_unit", "euler", "degrees"),
+        honours=("columns", "time_unit", "frame_rate", "euler", "degrees"),
+        says_unit=False,
     ),
     Format("A-Frame recording", (".json",), aframe.read),
     Format("BVH", (".bvh",), bvh.read, axes="opengl", in_metres=False),
-    Format("FBX", (".fbx",), fbx.read, honours=("scale",), doubted=False),
-    Format("glTF", (".glb", ".gltf"), gltf.read, honours=("scale",), doubted=False),
-    Format("Blender file", (".blend",), blend.read, honours=("scale",), doubted=False),
+    Format("FBX", (".fbx",), fbx.read, honours=("scale",), measured=False),
+    Format("glTF", (".glb", ".gltf"), gltf.read, honours=("scale",), measured=False),
+    Format("Blender file", (".blend",), blend.read, honours=("scale",), measured=False),
 )
 
 
@@ -104,7 +110,7 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     path, body = split_source(source)
     selection = Selection(path, body)
     try:
-        found = _format_of(path)
+        found = format_of(path)
         trajectories = _read(found, path, selection, options)
     except OSError as error:
         problem = f"this file cannot be read ({error.strerror})"
@@ -112,12 +118,12 @@ def read_trajectories(source: str, options: ReadingOptions = AS_THE_FILE_SAYS) -
     if all(len(trajectory.times) < 2 for trajectory in trajectories):
         problem = ", ".join(f"{shown(one.name)} has {len(one.times)} samples" for one in trajectories[:3])
         raise TrajectoryError(path, problem, "a trajectory needs at least 2")
-    return replace(selection.recording(trajectories), axes=found.axes)
+    return replace(selection.recording(trajectories), axes=found.axes, measured=found.measured)
 
 
 def _read(found: Format, path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     for name in options.given:
-        if name != "scale" and name not in found.honours:
+        if name not in ("scale", "start", "end") and name not in found.honours:
             labels = " and ".join(known.label for known in FORMATS if name in known.honours)
             problem = f"--{name.replace('_', '-')} is for {labels}, and this is {found.label}"
             raise TrajectoryError(path, problem, "leave it out; its files say that themselves")
@@ -126,7 +132,7 @@ def _read(found: Format, path: Path, selection: Selection, options: ReadingOptio
         trajectories = [replace(trajectory, metres_per_unit=options.scale) for trajectory in trajectories]
     else:
         trajectories = [_sized(path, trajectory, told=found.in_metres) for trajectory in trajectories]
-    if found.doubted:
+    if found.measured:
         trajectories = [_doubted(trajectory, "time_unit" in found.honours) for trajectory in trajectories]
     return trajectories
 
@@ -150,7 +156,7 @@ def _sized(path: Path, trajectory: Trajectory, *, told: bool) -> Trajectory:
         remark = "; ".join(filter(None, (taken, remark)))
     if not BELIEVED[0] <= metres <= BELIEVED[1]:
         doubt = f"it is {metres:.3g} m large if its unit, which the file does not tell, is that of {unit}"
-        warnings += (f"{doubt}; if not, say how long it is: --scale METRES",)
+        warnings += (ClipWarning(doubt, "if not, say how long it is: --scale METRES"),)
     return replace(trajectory, metres_per_unit=trajectory.metres_per_unit * length, remark=remark, warnings=warnings)
 
 
@@ -227,7 +233,8 @@ def _what_is_no_file(path: str) -> tuple[str, str] | None:
     return next((told for is_kind, told in kinds.items() if is_kind(mode)), None)
 
 
-def _format_of(path: Path) -> Format:
+def format_of(path: Path) -> Format:
+    """The format that reads a file, by its name and, where several share that, by how it begins."""
     candidates = [known for known in FORMATS if path.suffix.lower() in known.extensions]
     if not candidates:
         extensions = dict.fromkeys(extension for known in FORMATS for extension in known.extensions)

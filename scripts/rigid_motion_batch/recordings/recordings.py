@@ -5,7 +5,7 @@ Times are seconds; positions are in the unit of the file; quaternions are w, x, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,9 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.command_line import printable
-from rigid_motion_batch.recordings.figures import Figure
+
+from .clips import ClipWarning
+from .figures import Figure
 
 ALL = "*"
 """Asks for every body of a file."""
@@ -40,8 +42,8 @@ class Trajectory:
     remark: str = ""
     """What whoever asked for this body should know of it."""
 
-    warnings: tuple[str, ...] = ()
-    """What is hard to believe of this recording, a sentence each with the way out."""
+    warnings: tuple[ClipWarning, ...] = ()
+    """What is hard to believe of this recording."""
 
     dated: bool = False
     """Whether its times were dates or clock times, whose unit nobody can mistake."""
@@ -80,6 +82,9 @@ class Recording:
     axes: str = "blender"
     """The convention of its format: a name in `axes.AXES`."""
 
+    measured: bool = True
+    """Whether its format holds what devices measured, and not what was animated."""
+
 
 class TrajectoryError(ValueError):
     """Why a recording cannot be read, in one line: `FILE:LINE: what is wrong; way out`."""
@@ -113,7 +118,7 @@ class Selection:
         Raises
         ------
         TrajectoryError
-            Where the file has no body of that name, or none at all.
+            Where the file has no body of that name, whatever its case, or several, or none at all.
         """
         self.names = tuple(names)
         if self.wanted in (None, ALL):
@@ -125,10 +130,28 @@ class Selection:
                 )
                 raise TrajectoryError(self.path, "no moving body in this file", way_out)
             return list(names) if self.wanted == ALL else [names[0]]
+        self.match([*names, *unlisted])
         if self.wanted not in names and self.wanted not in unlisted:
             way_out = f"it holds {listed([*names, *unlisted], more=more)}"
             raise TrajectoryError(self.path, f"no body named {shown(self.wanted)}", way_out)
         return [self.wanted]
+
+    def match(self, names: Iterable[str]) -> None:
+        """Take the name in the file for the one that is wanted, where they differ in their case alone.
+
+        Raises
+        ------
+        TrajectoryError
+            Where several names in the file do.
+        """
+        wanted, names = self.wanted or ALL, tuple(names)
+        if wanted == ALL or wanted in names:
+            return
+        alike = list(dict.fromkeys(name for name in names if name.casefold() == wanted.casefold()))
+        if len(alike) > 1:
+            problem = f"no body named {shown(wanted)}, and {len(alike)} that differ from it in their case alone"
+            raise TrajectoryError(self.path, problem, f"name one of {listed(alike)}")
+        self.wanted = alike[0] if alike else wanted
 
     def recording(self, trajectories: Sequence[Trajectory]) -> Recording:
         """The result, with what there is to say about the bodies that were taken, and those that were not."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.poses import inverse, placed
-from rigid_motion.motion.quaternions import align_signs, conjugate, rotate
+from rigid_motion.motion.quaternions import align_signs, conjugate, from_matrices, rotate
 from rigid_motion_batch.recordings.figures import Figure, size_of, unit_of
 
 from .bvh import MOST_POSES
@@ -226,29 +226,12 @@ def rigid(matrices: np.ndarray) -> Poses:
         y = _unit(y)
         x = _unit(x)
         x = _unit(x - np.sum(x * y, axis=-1, keepdims=True) * y)
-        return Poses(matrices[..., :3, 3], _quaternions(np.stack([x, y, np.cross(x, y)], axis=-1)))
+        return Poses(matrices[..., :3, 3], from_matrices(np.stack([x, y, np.cross(x, y)], axis=-1)))
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(lengths > SHORTEST_AXIS, lengths, np.nan)
-
-
-def _quaternions(rotations: np.ndarray) -> np.ndarray:
-    """Of rotation matrices (..., 3, 3). Each of four ways divides by one component: the largest is taken."""
-    (a, b, c), (d, e, f), (g, h, i) = (np.moveaxis(rotations[..., row, :], -1, 0) for row in range(3))
-    ways = np.stack(
-        [
-            np.stack([1.0 + a + e + i, h - f, c - g, d - b], axis=-1),
-            np.stack([h - f, 1.0 + a - e - i, b + d, c + g], axis=-1),
-            np.stack([c - g, b + d, 1.0 - a + e - i, f + h], axis=-1),
-            np.stack([d - b, c + g, f + h, 1.0 - a - e + i], axis=-1),
-        ],
-        axis=-2,
-    )
-    largest = np.argmax(np.einsum("...ii->...i", ways), axis=-1)
-    taken = np.take_along_axis(ways, largest[..., None, None], axis=-2)[..., 0, :]
-    return taken / np.linalg.norm(taken, axis=-1, keepdims=True)
 
 
 def _filled(poses: Poses) -> Poses:

@@ -18,6 +18,7 @@ from rigid_motion.motion.poses import inverse, placed
 from rigid_motion.motion.quaternions import angle_between
 
 from .bvh import MOST_POSES
+from .clips import ClipWarning
 from .recordings import Trajectory
 
 WITHIN = 1e-3
@@ -139,11 +140,11 @@ class Sampled:
             )
         if self.gaps:
             first, count = moments.times(np.array(self.gaps[:1]))[0], len(self.gaps)
-            warnings += (
+            text = (
                 f"it jumps, or swings too fast, in {count} gap{'s' * (count > 1)} between samples, first at "
-                f"{first:.4g} s: what lies there is up to {1e3 * metres * self.off:.3g} mm off a straight way; "
-                "give it keys at such moments, or smooth the curves",
+                f"{first:.4g} s: what lies there is up to {1e3 * metres * self.off:.3g} mm off a straight way"
             )
+            warnings += (ClipWarning(text, "give it keys at such moments, or smooth the curves", float(first)),)
         rate = moments.fps / moments.step
         return replace(trajectory, remark="; ".join(filter(None, remarks)), warnings=warnings, rate=rate)
 

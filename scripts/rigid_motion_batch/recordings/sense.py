@@ -7,11 +7,14 @@ a second.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from rigid_motion.motion.repair import LARGEST, rising
 
-from .recordings import Trajectory, TrajectoryError, shown
+from .clips import ClipWarning
+from .recordings import Trajectory, TrajectoryError
 from .times import FASTEST, SLOWEST, typical_interval
 
 HIGHEST_SPEED = 20.0
@@ -35,12 +38,8 @@ MIXED = 0.25
 """The share of samples that do not follow the last one, from which on there are several devices. Of two that take turns
 it is all; of two in any order, half."""
 
-STARTLED = 10.0
-"""How many times farther any joint of a body goes from the first sample to the second than ever in the next ones, where
-the first is a pose of its own: the T-pose that programs put before a recording."""
-
-SOON = 60
-"""Samples that are looked at for that."""
+FURTHEST = 20.0
+"""Metres from the origin of a recording, which lies in the room where it was made. A headset is 170 cm above it."""
 
 FEWEST = 16
 """Samples that are enough to see that."""
@@ -77,8 +76,8 @@ def require_one_body(trajectory: Trajectory, path: object, way_out: str, line: i
         raise TrajectoryError(path, problem, way_out, line)
 
 
-def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[str, ...]:
-    """What of a recording is hard to believe, a sentence each with the way out.
+def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[ClipWarning, ...]:
+    """What of a recording is hard to believe.
 
     Parameters
     ----------
@@ -87,10 +86,9 @@ def doubts(trajectory: Trajectory, *, time_unit: bool = False) -> tuple[str, ...
         Whether its format takes the unit of time from the user.
     """
     times, positions = _usable(trajectory)
-    way_out = "; if its times are no seconds, --time-unit ms, us or ns" * time_unit
     # Speeds between times that are next to nothing apart leave the range of floats.
     with np.errstate(over="ignore", invalid="ignore"):
-        return (*_of_times(times, way_out), *_of_lengths(times, positions), *_of_first_pose(trajectory))
+        return (*_of_times(times, time_unit), *_of_lengths(times, positions))
 
 
 def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -101,54 +99,41 @@ def _usable(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     return trajectory.times[rows], positions[rows] * trajectory.metres_per_unit
 
 
-def _of_times(times: np.ndarray, way_out: str) -> list[str]:
+def _of_times(times: np.ndarray, time_unit: bool) -> Iterator[ClipWarning]:
     interval = typical_interval(times)
     if not interval > 0.0:
-        return []
-    found = []
+        return
+    way_out = "if its times are no seconds, --time-unit ms, us or ns" if time_unit else ""
     if interval > 1.0 / SLOWEST:
-        found.append(f"only {1.0 / interval:.2g} samples a second, fewer than any motion needs{way_out}")
+        counted = time_unit and bool(np.all(np.rint(times) == times))
+        yield ClipWarning(
+            f"only {1.0 / interval:.2g} samples a second, fewer than any motion needs",
+            "if it counts frames, --frame-rate 90, or how many there were a second; " * counted + way_out,
+        )
     if interval < 1.0 / FASTEST:
-        found.append(f"{1.0 / interval:.3g} samples a second, more than any device has{way_out}")
+        yield ClipWarning(f"{1.0 / interval:.3g} samples a second, more than any device has", way_out)
     lost = np.count_nonzero(~rising(times))
     if lost > MIXED * len(times):
         row = 1 + np.flatnonzero(np.diff(times) < 0.0)[0]
-        found.append(
+        yield ClipWarning(
             f"its time runs backwards at row {row}, and {lost} of {len(times)} rows are lost to that: these are "
-            "several recordings or devices; split the file, or name the column of devices, --columns device=NAME"
+            "several recordings or devices",
+            "split the file, or name the column of devices, --columns device=NAME",
         )
-    return found
 
 
-def _of_lengths(times: np.ndarray, positions: np.ndarray) -> list[str]:
+def _of_lengths(times: np.ndarray, positions: np.ndarray) -> Iterator[ClipWarning]:
     if len(times) < FEWEST:
-        return []
+        return
     steps = np.diff(times)
     forward = steps > 0.0
     speeds = np.linalg.norm(np.diff(positions, axis=0)[forward], axis=-1) / steps[forward]
     fast = float(np.percentile(speeds, 95.0)) if len(speeds) else 0.0
     low, high = np.percentile(positions, (1.0, 99.0), axis=0)
-    extent = float(np.linalg.norm(high - low))
-    if not (fast > HIGHEST_SPEED or extent > WIDEST):
-        return []
-    return [
-        f"a twentieth of its speeds are above {fast:.3g} m/s, and it goes {extent:.3g} m far, as no hand does; if its "
-        "lengths are centimetres, --scale 0.01, if millimetres, --scale 0.001"
-    ]
-
-
-def _of_first_pose(trajectory: Trajectory) -> list[str]:
-    if trajectory.figure is None or len(trajectory.times) < FEWEST:
-        return []
-    places = trajectory.figure.skeleton.in_root_space(trajectory.poses[:, :SOON]).positions * trajectory.metres_per_unit
-    steps, times = np.linalg.norm(np.diff(places, axis=1), axis=-1), np.diff(trajectory.times[:SOON])
-    joint = int(steps[:, 0].argmax())
-    first, others = steps[joint, 0], steps[:, 1:].max()
-    # What is damaged compares to nothing.
-    if not (first > HIGHEST_SPEED * times[0] > 0.0 and first > STARTLED * others):
-        return []
-    return [
-        f"its first sample is a pose of its own, perhaps the T-pose before a recording: from there to the next "
-        f"{shown(trajectory.figure.joints[joint])} jumps {first:.2g} m, and none jumps more than {others:.2g} m "
-        "afterwards; errors around it say nothing of the motion; delete that frame"
-    ]
+    extent, away = float(np.linalg.norm(high - low)), float(np.linalg.norm(low + high)) / 2.0
+    units = "if its lengths are centimetres, --scale 0.01, if inches, --scale 0.0254, if millimetres, --scale 0.001"
+    if fast > HIGHEST_SPEED or extent > WIDEST:
+        text = f"a twentieth of its speeds are above {fast:.3g} m/s, and it goes {extent:.3g} m far, as no hand does"
+        yield ClipWarning(text, units)
+    elif away > FURTHEST and away > extent:
+        yield ClipWarning(f"it stays {away:.3g} m away from its origin, and moves within {extent:.2g} m", units)

@@ -22,6 +22,7 @@ import numpy as np
 from rigid_motion.motion import Poses
 
 from .recordings import Trajectory, TrajectoryError, shown
+from .vector_cells import expanded, flattened, is_number
 
 Columns = Mapping[str, Sequence[str]]
 """What a column means, to the names that it goes by."""
@@ -70,6 +71,9 @@ class Table:
     header: int
     """The line before the first row."""
 
+    vectors: bool = False
+    """Whether cells hold vectors, which count as several columns."""
+
     def parse(self, columns: Sequence[str], dtype: type = np.float64) -> np.ndarray:
         """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         wanted = {name: self.columns[name] for name in columns}
@@ -85,7 +89,8 @@ class Table:
 
     def _rows(self) -> Iterator[tuple[int, str]]:
         stripped = ((number, line.strip(" ")) for number, line in lines_of(self.path, after=self.header))
-        return ((number, line) for number, line in stripped if line.strip() and not line.startswith("#"))
+        rows = ((number, line) for number, line in stripped if line.strip() and not line.startswith("#"))
+        return ((number, flattened(line, self.separator)) for number, line in rows) if self.vectors else rows
 
     def trajectory(self, name: str) -> Trajectory:
         """The columns t, x, y, z, qw, qx, qy, qz and, if there, scale."""
@@ -172,15 +177,6 @@ def cells_of(path: Path, number: int, line: str, separator: str | None) -> list[
         raise TrajectoryError(path, f"this line is no header ({error})", "name a file of columns", number) from None
 
 
-def is_number(cell: str) -> bool:
-    """Whether a cell is a number."""
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
 @dataclass(frozen=True)
 class HeaderLine:
     """A line that may name the columns."""
@@ -188,6 +184,15 @@ class HeaderLine:
     number: int
     separator: str | None
     cells: list[str]
+
+    vectors: bool = False
+    """Whether cells of the rows hold vectors, and the names of the header are those of their numbers."""
+
+    def of_rows(self, path: Path) -> HeaderLine:
+        """Return the header as the first row below it has it."""
+        rows = (line for _, line in lines_of(path, after=self.number) if line.strip() and not line.startswith("#"))
+        names = expanded(self.cells, next(rows, ""), self.separator)
+        return self if names is None else HeaderLine(self.number, self.separator, names, vectors=True)
 
 
 def header_lines(path: Path) -> Iterator[HeaderLine]:

@@ -44,7 +44,10 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     (name,) = selection.of([path.stem])
     table = read_table(path, NAMES, OPTIONAL_NAMES, default=tuple(NAMES))
     trajectory, unit = table.trajectory(name), options.time_unit or ""
-    require_seconds(table, trajectory.times, unit)
-    trajectory = replace(trajectory, times=seconds_of(table, trajectory.times, unit))
+    if options.frame_rate:
+        trajectory = replace(trajectory, times=trajectory.times / options.frame_rate)
+    else:
+        require_seconds(table, trajectory.times, unit)
+        trajectory = replace(trajectory, times=seconds_of(table, trajectory.times, unit))
     require_one_body(trajectory, path, "write a file for each", table.header + 1)
     return [trajectory]

@@ -17,8 +17,6 @@ from rigid_motion.animation import write_channel
 from .nodes import Group, Socket, apply_group, input_path
 
 CORNER = 0.012
-BOLDNESS = 0.008
-"""How much letters are fattened, in units of their size, so that small ones keep their strokes at few pixels."""
 
 
 def card(
@@ -43,12 +41,14 @@ def card(
 
 
 def words(name: str, text: str, size: float, material: bpy.types.Material, align: str = "LEFT") -> bpy.types.Object:
-    """A line of text, from or to the origin of the new object."""
+    """A line of text, from or to the origin of the new object.
+
+    Its outlines stay as the font has them: moved outwards, those of an M cross, which Blender before 5.2 fills as one
+    blot.
+    """
     curve = bpy.data.curves.new(name, "FONT")
     curve.body = text
     curve.size = size
-    if bpy.app.version >= (5, 0):  # Blender 4.5 fills a fattened M and 4 as one blot.
-        curve.offset = BOLDNESS * size
     curve.align_x = align
     curve.resolution_u = 4
     curve.materials.append(material)

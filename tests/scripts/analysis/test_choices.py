@@ -130,3 +130,22 @@ def test_the_best_of_each_segment_has_the_keys_of_the_best_mode_and_keeps_to_wha
         assert errors[BEST_OF] < errors[best]
     elif isinstance(choice, Tolerance):
         assert made.errors[BEST_OF].shell.max() <= choice.tolerance(clip) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ("5", r"5 units of the recording, 5 m, is more than the whole motion, .* give it with its unit, as in 5mm"),
+        ("90000mm", r"90000 mm, 90 m, is more than the whole motion, .* give a smaller one"),
+    ],
+)
+def test_a_tolerance_larger_than_the_motion_is_refused_with_the_way_out(written: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        Tolerance(written).require_within(swinging_clip(), 0.1)
+
+
+def test_a_tolerance_within_the_motion_or_of_a_clip_that_stands_still_is_none_too_many() -> None:
+    clip = swinging_clip()
+    Tolerance("5mm").require_within(clip, 0.1)
+    still = clip.poses[:1][np.zeros(len(clip.times), int)]
+    Tolerance("5").require_within(replace(clip, poses=still), 0.1)

@@ -149,7 +149,7 @@ def test_the_folder_of_a_comparison_tells_what_it_is_of(output: Path, tmp_path: 
     ],
 )
 def test_no_path_leads_out_of_the_folder(path: str) -> None:
-    with pytest.raises(ValueError, match="is no path below the output folder|keeps its own files"):
+    with pytest.raises(ValueError, match=r"is no path below the output folder|keeps its own files"):
         writing("a", publish={FILE: path})
 
 
@@ -258,8 +258,6 @@ def test_whatever_becomes_of_its_records_the_work_goes_on(
     copying(output, source)
     (path,) = (output / OWN).glob(part)
     damage(path)
-    if not path.is_file():
-        path.rmdir() if path.is_dir() and not any(path.iterdir()) else None
     assert copying(output, source) == {"up to date": 1}
 
 

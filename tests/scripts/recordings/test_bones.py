@@ -222,8 +222,8 @@ def test_a_missing_bone_is_answered_with_those_nearest_to_it(saved, refusal) -> 
     names = ("Root", "Hand.L", "Hand.R", "Foot.L", "Foot.R", "Head")
     rig("Rig", dict.fromkeys(names, ((0, 0, 0), (0, 1, 0), None)))
     path = saved()
-    assert refusal(f"{path}:Rig/hand.l")[1] == (
-        "'Rig' has no bone 'hand.l'; of its 6 bones the nearest by name: Hand.L, Hand.R, Head, Foot.L, Foot.R"
+    assert refusal(f"{path}:Rig/hand.x")[1] == (
+        "'Rig' has no bone 'hand.x'; of its 6 bones the nearest by name: Hand.L, Hand.R, Head, Foot.L, Foot.R"
     )
     assert refusal(f"{path}:Rig/")[1].endswith("the nearest by name: Root, Hand.L, Hand.R, Foot.L, Foot.R")
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion.quaternions import angle_between
-from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError, read_trajectories
 from tests.scripts.recordings import seeds
 
 ARM = f"""{seeds.ARM}Frames: 2
@@ -103,7 +103,7 @@ def test_more_or_fewer_rows_than_the_file_says_are_read_with_a_warning(write, co
     path = write("arm.bvh", ARM.replace("Frames: 2", f"Frames: {count}"))
     (body,) = read_trajectories(path).trajectories
     (warning,) = body.warnings
-    assert warning.startswith(f"arm.bvh:17: Frames: says {count} and 2 whole rows follow")
+    assert str(warning).startswith(f"arm.bvh:17: Frames: says {count} and 2 whole rows follow")
     np.testing.assert_array_equal(body.times, [0.0, 0.04])
     assert read_trajectories(write("arm.bvh", ARM)).trajectories[0].warnings == ()
     shoulder, elbow = read_trajectories(write("arm.bvh", ARM.replace("Frames: 2", "Frames: 3")) + ":*").trajectories
@@ -129,10 +129,10 @@ def test_a_guessed_unit_is_told_with_how_sure_it_is(write, size: float, unit: st
     found = size * body.metres_per_unit
     assert unit in body.remark
     assert told in body.remark
-    doubted = "; if not, say how long it is: --scale METRES" in " ".join(body.warnings)
+    doubted = "; if not, say how long it is: --scale METRES" in " ".join(map(str, body.warnings))
     assert doubted == (not 0.5 <= found <= 2.5)
     if doubted:
-        assert f"it is {found:.3g} m large" in body.warnings[-1]
+        assert f"it is {found:.3g} m large" in body.warnings[-1].text
     if size > 1.0:
         assert found == pytest.approx(metres, abs=5e-3)
     (scaled,) = read_trajectories(path, ReadingOptions(scale=0.5)).trajectories
@@ -148,8 +148,8 @@ def test_a_file_that_is_cut_off_in_a_row_loses_that_row_with_a_warning(write, ke
     (body,) = read_trajectories(path).trajectories
     assert len(body.times) == 2
     cut, short = body.warnings
-    assert cut == "arm.bvh:21: the file is cut off in this row, which is left out"
-    assert short.startswith("arm.bvh:17: Frames: says 60 and 2 whole rows follow")
+    assert str(cut) == "arm.bvh:21: the file is cut off in this row, which is left out"
+    assert str(short).startswith("arm.bvh:17: Frames: says 60 and 2 whole rows follow")
 
 
 def test_the_last_row_needs_no_end_of_line(write) -> None:
@@ -268,3 +268,15 @@ def test_a_wrong_file_is_told_with_its_line(write, refusal, text: str | bytes, l
     told_line, message = refusal(write("arm.bvh", text))
     assert message.startswith(problem)
     assert told_line == line
+
+
+def test_joints_have_their_names_in_any_case_and_an_exact_one_goes_first(write) -> None:
+    path = write("arm.bvh", ARM)
+    recording = read_trajectories(f"{path}:eLBOW")
+    assert (recording.trajectories[0].name, recording.body) == ("Elbow", "Elbow")
+    both = write("both.bvh", ARM.replace("Elbow", "shoulder"))
+    assert read_trajectories(f"{both}:shoulder").trajectories[0].name == "shoulder"
+    with pytest.raises(
+        TrajectoryError, match="no body named 'SHOULDER', and 2 that differ from it in their case alone; "
+    ):
+        read_trajectories(f"{both}:SHOULDER")

@@ -77,11 +77,16 @@ def test_scales_are_known(name: str, body: str) -> None:
     assert column_name(name) == ColumnName("scale", body=body)
 
 
+@pytest.mark.parametrize("name", ["frame", "Frame", "frameNumber", "frame_id", "Frame No.", "sample index", "samples"])
+def test_a_count_of_frames_is_no_time(name: str) -> None:
+    assert column_name(name) == ColumnName("frame")
+
+
 @pytest.mark.parametrize(
     "name",
     [
         *("", "()", "[", "\u00b5", "x" * 101, "m", "deg", "w", "pos_w", "q0", "max", "index", "hp", "button"),
-        *("frame", "frameTime", "delta_time", "dt", "date", "position", "session_id"),
+        *("frames_left", "frameTime", "delta_time", "dt", "date", "position", "session_id"),
     ],
 )
 def test_what_says_nothing_is_not_guessed_at(name: str) -> None:

@@ -90,6 +90,27 @@ def test_a_unit_of_time_may_be_said(write, name: str, unit: str, start: int) -> 
     assert_is_the_motion(read_one(write(name, text), time_unit=unit), MOTIONS["left"], start=start, unit=unit)
 
 
+@pytest.mark.parametrize("time", ["frame", "Frame Number", "t", "sample", "t [ms]"])
+@pytest.mark.parametrize("name", ["take.csv", "take.tum"])
+def test_frames_are_counted_by_their_rate(write, name: str, time: str) -> None:
+    header = names("t" if name.endswith("tum") else time, "{}", "q{}")
+    rows = log(header).splitlines()[1:]
+    frames = [0, *range(5, 5 + len(rows) - 1)]
+    text = "\n".join(
+        [",".join(header), *(f"{frame},{row.partition(',')[2]}" for frame, row in zip(frames, rows, strict=True))]
+    )
+    text = text if name.endswith("csv") else "#" + text.replace(",", " ")
+    np.testing.assert_allclose(read_one(write(name, text), frame_rate=90.0).times, np.array(frames) / 90.0, rtol=1e-15)
+
+
+def test_a_rate_of_frames_goes_before_a_column_of_times_where_there_are_both(write) -> None:
+    header = ["frame", *names("t", "{}", "q{}")]
+    rows = log(header[1:]).splitlines()[1:]
+    source = write("take.csv", "\n".join([",".join(header), *(f"{9 * row},{text}" for row, text in enumerate(rows))]))
+    assert_is_the_motion(read_one(source), MOTIONS["left"])
+    np.testing.assert_allclose(read_one(source, frame_rate=90.0).times, np.arange(len(rows)) / 10.0)
+
+
 @pytest.mark.parametrize("time", ["t", "t_s", "t [ns]", "t [min]"])
 def test_a_unit_of_time_that_is_said_goes_before_that_in_the_name(write, time: str) -> None:
     source = write("take.csv", log(names(time, "{}", "q{}"), "ms"))
@@ -160,7 +181,7 @@ def test_quaternions_are_read_beside_euler_angles_unless_these_are_asked_for(wri
 def test_degrees_that_could_be_radians_are_told(write) -> None:
     source = write("take.csv", euler_log(names("t", "{}", "rot_{}", "xyz"), "XYZ", False))
     (warning,) = read_one(source, euler="XYZ", degrees=True).warnings
-    assert warning.endswith("radians need no --degrees")
+    assert str(warning).endswith("radians need no --degrees")
 
 
 # -- several bodies ---------------------------------------------------------------------------------------------------
@@ -271,6 +292,16 @@ def test_a_body_without_rotations_is_no_body(write) -> None:
             "no column named t, x, y, z, qx, qy, qz, qw (found frame, button, hp_x); known are t,",
         ),
         ("when,x,y,z,qx,qy,qz,qw", {}, "no column named t (found when, x,"),
+        (
+            "frame,x,y,z,qx,qy,qz,qw",
+            {},
+            "no column of time, only one that counts frames ('frame'); say how many frames a second it has: --frame-",
+        ),
+        (
+            "t,left_x,left_y,left_z,button",
+            {},
+            "positions only, and rotations are needed (found t, left_x, left_y, left",
+        ),
         ("t,left_x,left_y,left_z,left_qx", {}, "no column named qy, qz, qw for 'left' (found t, left_x,"),
         ("t,time,x,y,z,qx,qy,qz,qw", {}, "two columns mean t ('t', 'time'); say which with --columns t=NAME, or"),
         ("t,x,px,y,z,qx,qy,qz,qw", {}, "two columns mean x ('x', 'px'); say which with --columns x=NAME, or"),
@@ -313,6 +344,7 @@ def test_angles_that_are_no_radians_are_refused(write, refusal) -> None:
     ("given", "name"),
     [
         ({"columns": [("t", "t")]}, "--columns is for CSV with named columns, and this is TUM"),
+        ({"frame_rate": 90.0, "columns": [("t", "t")]}, "--columns is for CSV with named columns, and this is TUM"),
         ({"euler": "XYZ"}, "--euler is for CSV with named columns, and this is TUM"),
     ],
 )

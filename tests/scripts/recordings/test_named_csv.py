@@ -115,7 +115,7 @@ def test_a_scale_that_is_always_1_is_none(write) -> None:
         (f"{HEADER}\n", None, "'take' has 0 samples"),
         (f"{HEADER}\n0,1,2,3,0,0,0,1\n", None, "'take' has 1 samples"),
         (f"{HEADER.removesuffix(',qw')}\n{ROWS}", 1, "no column named qw"),
-        ("# about\n\nt,x,y,z\n0,1,2,3\n", 3, "no column named qx, qy, qz, qw"),
+        ("# about\n\nt,x,y,z\n0,1,2,3\n", 3, "positions only, and rotations are needed (found t, x, y, z); record"),
         (ROWS, 1, "no column has a known name"),
         ("# nothing but a comment\n", 2, "no column has a known name"),
         (f"{HEADER},time\n{ROWS}", 1, "two columns mean t"),

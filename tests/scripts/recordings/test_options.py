@@ -31,6 +31,22 @@ def test_they_are_the_same_after_a_journey_as_json() -> None:
         assert ReadingOptions(**json.loads(json.dumps(asdict(options)))) == options
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--start", "3", "--end", "2.5"), "--end 2.5 leaves nothing: it has to be later than --start 3"),
+        (("--time-unit", "ms", "--frame-rate", "90"), "--time-unit and --frame-rate exclude one another"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(arguments: tuple[str, ...], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        parsed(*arguments)
+
+
+def test_a_start_of_0_says_something() -> None:
+    assert parsed("--start", "0").given == ("start",)
+
+
 def test_those_that_say_anything_are_known() -> None:
     assert MEANT.given == ("columns", "time_unit", "scale", "euler", "degrees")
     assert ReadingOptions().given == ()
@@ -56,6 +72,10 @@ def test_turns_about_fixed_axes_are_turns_about_moved_ones_in_the_opposite_order
         (["--scale", "cm"], "a unit cannot be nan metres long"),
         (["--scale", "inf"], "a unit cannot be inf metres long"),
         (["--euler", "XYX"], "'XYX' is no order of Euler angles; give the three axes once each, in capitals (YXZ) for"),
+        (["--frame-rate", "0"], "there cannot be 0.0 frames a second; give a number such as 90"),
+        (["--start", "-1"], "--start cannot be -1.0: give seconds after the first sample, such as 2.5"),
+        (["--end", "soon"], "--end cannot be nan: give seconds"),
+        (["--end", "0"], "--end 0 leaves nothing: it has to be later than --start 0"),
         (["--euler", "xYz"], "'xYz' is no order of Euler angles"),
     ],
 )

@@ -130,8 +130,8 @@ def test_a_step_is_two_samples_and_is_told(tmp_path: Path) -> None:
     times = body.moments[(body.moments < 0.4 - 0.03 / 30) | (body.moments >= 0.4)]
     assert off(found, body, times) < WITHIN
     (warning,) = found.warnings
-    assert "it jumps" in warning
-    assert "first at 0.3992 s" in warning
+    assert "it jumps" in warning.text
+    assert "first at 0.3992 s" in warning.text
 
 
 # -- which moments ----------------------------------------------------------------------------------------------------
@@ -267,5 +267,5 @@ def test_what_swings_too_fast_is_warned_of_with_how_far_it_is_off(saved) -> None
     noise.function_type, noise.amplitude, noise.phase_multiplier, noise.use_additive = "SIN", 0.5, 400.0, True
     found = read(saved())
     (warning,) = found.warnings
-    assert "mm off a straight way" in warning
+    assert "mm off a straight way" in warning.text
     assert len(found.times) < 300

@@ -3,7 +3,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -13,6 +12,7 @@ from rigid_motion_batch.scenes.film import join_pieces, render_film, render_piec
 from rigid_motion_batch.scenes.scene import build_stage
 from rigid_motion_batch.scenes.settings import StageSettings
 from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.scripts.scenes.stills import pixels_of, render_still
 
 SETTINGS = StageSettings(resolution=(160, 90), fps=10)
 RENDER_SAVED = """
@@ -39,20 +39,6 @@ def scene():
 def handlers() -> dict[str, list]:
     lists = ((name, getattr(bpy.app.handlers, name)) for name in dir(bpy.app.handlers))
     return {name: list(kind) for name, kind in lists if isinstance(kind, list)}
-
-
-def render_still(scene: bpy.types.Scene, path: Path, frame: int) -> None:
-    scene.frame_set(frame)
-    scene.render.image_settings.file_format = "PNG"
-    scene.render.filepath = str(path)
-    bpy.ops.render.render(write_still=True)
-
-
-def pixels_of(path: Path) -> np.ndarray:
-    image = bpy.data.images.load(str(path))
-    pixels = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels
 
 
 def test_the_film_has_every_frame_at_the_size_asked_for(scene, tmp_path):
@@ -106,8 +92,6 @@ def test_the_saved_file_renders_the_same_picture_in_another_process(scene, tmp_p
     again = tmp_path / "again.png"
     command = [sys.executable, "-c", RENDER_SAVED, str(tmp_path / "comparison.blend"), str(again), "6"]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
-    if hasattr(scene.render.image_settings, "media_type"):
-        scene.render.image_settings.media_type = "IMAGE"
     render_still(scene, tmp_path / "here.png", 6)
     render_still(scene, tmp_path / "other.png", 3)
     here, there = pixels_of(tmp_path / "here.png"), pixels_of(again)

@@ -433,7 +433,7 @@ class Clock:
 
 def test_progress_says_what_is_done_and_how_long_it_will_take(output: Path) -> None:
     stream = io.StringIO()
-    with Progress(stream, clock=Clock(), environ={}) as progress:
+    with Progress(stream, clock=Clock()) as progress:
         run_in(output, task("a"), task("b", "chatter", title="The second"), progress=progress, title="Making")
     lines = stream.getvalue().splitlines()
     assert any(line.startswith(" 50%") and "left  Making" in line for line in lines)
@@ -447,7 +447,7 @@ def test_what_is_counted_is_counted_over_all_tasks_and_never_goes_back(output: P
     stream = io.StringIO()
     films = [task(f"{n}", "count", to=n, amount=n, unit="frame") for n in (4, 2, 3)]
     run_in(output, films[1])
-    with Progress(stream, clock=Clock(), environ={}) as progress:
+    with Progress(stream, clock=Clock()) as progress:
         run_in(output, *films, task("a"), executor=EXECUTORS[executor](), progress=progress)
     counts = re.findall(r"frame (\d+) of (\d+)$", stream.getvalue(), re.MULTILINE)
     assert {total for _, total in counts} == {"7"}  # Two are there already.

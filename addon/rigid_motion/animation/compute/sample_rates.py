@@ -18,7 +18,7 @@ class Need(NamedTuple):
     """How exact a motion is to be between its samples."""
 
     tolerance: float
-    """How far off it may be, in the units of its channels."""
+    """How far off it may be, in the units of its channels; infinite where that does not matter."""
 
     reach: float
     """How far the body reaches from its origin, in the same."""
@@ -98,7 +98,9 @@ def _differences(
 
 def _is_open(samples: Samples, need: Need) -> bool:
     """Whether more samples may do better, or tell how far off it is."""
-    return math.isinf(samples.error) or (samples.error > need.tolerance and samples.rate < need.most)
+    if math.isinf(samples.error):
+        return math.isfinite(need.tolerance)
+    return samples.error > need.tolerance and samples.rate < need.most
 
 
 def _next_rate(samples: Samples, need: Need) -> int:

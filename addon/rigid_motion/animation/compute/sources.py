@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -405,12 +405,7 @@ class Source:
 
     def values_at(self, frames: np.ndarray) -> np.ndarray:
         """What the channels alone have on these frames, shape (10, m)."""
-        rows = np.repeat(REST[:, None], len(frames), axis=1)
-        for row, value in self.rest.items():
-            rows[row] = value
-        evaluated = evaluate(self.curves, [frames] * len(self.channels))
-        for (own, _), values in zip(self.channels, evaluated, strict=True):
-            rows[own] = values
+        (rows,) = values_of([self], [frames])
         return rows
 
     @cached_property
@@ -450,3 +445,18 @@ class Source:
     def cyclic(self) -> Keys | None:
         """The first of the channels that repeat."""
         return next((keys for keys in self.curves if keys.cycles is not None), None)
+
+
+def values_of(sources: Sequence[Source], frames: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """What the channels of each source alone have on frames of its own, shape (10, m)."""
+    curves = [keys for source in sources for keys in source.curves]
+    times = [own for source, own in zip(sources, frames, strict=True) for _ in source.channels]
+    evaluated, found = iter(evaluate(curves, times)), []
+    for source, own in zip(sources, frames, strict=True):
+        rows = np.repeat(REST[:, None], len(own), axis=1)
+        for row, value in source.rest.items():
+            rows[row] = value
+        for of_channels, _ in source.channels:
+            rows[of_channels] = next(evaluated)
+        found.append(rows)
+    return found

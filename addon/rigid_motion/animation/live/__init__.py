@@ -13,6 +13,7 @@ dense_keys       keys inserted all along keep the motion
 segment_keys     keys of modes and turns, which inserted keys share out
 separated_slots  what Separate Slots does to rigs
 edit_mode        rigs in Edit Mode
+between_frames   when drafts have to be finished
 refreshing       what becomes of in-betweens after an edit
 follower         Blender's handlers, which find out what was edited
 

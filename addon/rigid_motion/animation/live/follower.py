@@ -22,7 +22,9 @@ from ..compute import source_cache
 from ..compute.sources import Source
 from ..handlers import append_handlers, remove_handlers
 from ..transforms import ObjectTransform, Refused, Transform, let_override_be_read, prefix_of, transform_of
+from ..writers.filling import finish_drafts
 from ..writers.table import release, writer_of
+from .between_frames import on_main_thread, shows_between_frames
 from .depsgraphs import (
     BlockKey,
     actions_to_evaluate,
@@ -54,6 +56,8 @@ class Follower:
         """Whether edits are followed at once."""
         self.busy = False
         """Whether the edits that Blender tells of are the extension's."""
+        self.drafts = False
+        """Whether large Actions may be edited in draft: see `writers.drafts`."""
         self.operators = OperatorWatch()
         self.handlers = {
             "depsgraph_update_pre": self._handler(self.before_update),
@@ -64,7 +68,7 @@ class Follower:
             "redo_post": self._handler(self.after_undo),
             "load_post": self._handler(self.after_load),
             "save_pre": self._handler(self.before_saving),
-            "render_init": self._handler(self.look_again),
+            "render_init": self._handler(self.before_rendering),
         }
         self.begin_file()
 
@@ -148,7 +152,18 @@ class Follower:
         again: bool = False,
     ) -> int:
         with self.left.keep(places=places):
-            return refresh_places(places, sources, self.inserted, self.frame, again=again)
+            in_draft = self.drafts and not shows_between_frames()
+            return refresh_places(places, sources, self.inserted, self.frame, again=again, in_draft=in_draft)
+
+    def finish_drafts(self) -> None:
+        """Have all in the file be exact between frames."""
+        with self.turn():
+            finish_drafts(bpy.data.actions)
+
+    def finish_what_is_seen(self) -> None:
+        """Finish drafts where what is between frames is shown."""
+        if self.drafts and shows_between_frames():
+            self.finish_drafts()
 
     def refresh_edited(self, actions: Collection[bpy.types.Action]) -> set[Transform]:
         """Refresh what these Actions, which were edited, move; and say what that is."""
@@ -232,6 +247,8 @@ class Follower:
         else:
             self.keep_ranges()
             self.refresh(transforms_under(filter(uses_modes, bpy.data.objects)), again=again)
+        if not self.drafts or shows_between_frames():
+            self.finish_drafts()
 
     def keep_ranges(self) -> None:
         self.ranges = {scene.session_uid: (scene.frame_start, scene.frame_end) for scene in bpy.data.scenes}
@@ -243,6 +260,7 @@ class Follower:
         edited = actions_to_evaluate(scene)
         self.followed = {action.session_uid for action in edited}
         self.moved = self.refresh_edited(edited)
+        self.finish_what_is_seen()
         self.inserted.forget_poses(self.moved)
         self.channels.put_back(edited)
 
@@ -266,6 +284,7 @@ class Follower:
         # Edits not seen yet were made on the frame before this one. Afterwards all that is played looks edited.
         self.waiting = [key_of(obj) for obj in self.before_evaluation(scene)]
         self.refresh_edited(actions_to_evaluate(scene))
+        self.finish_what_is_seen()
 
     def after_frame(self, scene: bpy.types.Scene, *_: object) -> None:
         edited = objects_of(self.waiting)
@@ -303,8 +322,16 @@ class Follower:
                 adopt_from_properties(transform for transform in transforms if transform not in moved)
         self.look_again()
 
-    def before_saving(self, *_: object) -> None:
+    def make_exact(self) -> None:
+        """Bring all in the file up to date, between frames too."""
         self.look_again()
+        self.finish_drafts()
+
+    def before_rendering(self, *_: object) -> None:
+        on_main_thread(self.make_exact)
+
+    def before_saving(self, *_: object) -> None:
+        self.make_exact()
         for obj in bpy.data.objects:
             if obj.rigid_motion.has_bones:
                 let_override_be_read(obj)
@@ -315,7 +342,17 @@ follower = Follower()
 
 def set_enabled(enabled: bool) -> None:
     """Follow edits at once, or else only when `refresh` is called."""
+    if not enabled:
+        follower.finish_drafts()
     follower.enabled, follower.unseen = enabled, enabled
+
+
+def set_drafts(allowed: bool) -> None:
+    """Edit large Actions in draft, as in a window: one sample a frame, until something is shown between frames, or
+    rendered, or saved."""
+    follower.drafts = allowed
+    if not allowed:
+        follower.finish_drafts()
 
 
 def is_busy() -> bool:
@@ -370,6 +407,7 @@ def first_look() -> None:
 
 def register() -> None:
     follower.begin_file()
+    follower.drafts = not bpy.app.background
     append_handlers(follower.handlers)
     if not bpy.app.background:
         # While an extension is switched on, the file is out of its reach.
@@ -380,3 +418,4 @@ def unregister() -> None:
     if bpy.app.timers.is_registered(first_look):
         bpy.app.timers.unregister(first_look)
     remove_handlers(follower.handlers)
+    follower.finish_drafts()

@@ -35,7 +35,7 @@ from ..actions.modifiers import added_values
 from ..actions.slots import SlotTransform
 from ..compute.components import PART_OF
 from ..compute.source_cache import cached_source
-from ..compute.sources import SAME_FRAME, Source, rows_left_to
+from ..compute.sources import SAME_FRAME, Source, rows_left_to, values_of
 from ..compute.turning import needs_turning
 from ..queries.visible_pose import shown_components, visible_components
 from ..transforms import Transform
@@ -80,13 +80,29 @@ class InsertedKeys:
         self._posed: dict[tuple[int, str], _Posed] = {}
         self._whole: OrderedDict[tuple[tuple[int, str], bytes], _Posed] = OrderedDict()
         """The whole poses that undo and redo can bring back, by the transform and the components."""
+        self._had: dict[tuple[str, float], np.ndarray] = {}
+        """What the channels had, (10, 1), by the digest of a source and the frame, while keys are looked through."""
         self._insertions: list[Insertion] = []
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool, bool]] = OrderedDict()
         """What undo and redo bring back is decided as it was: the components that there were, whether they were all of
         the pose, and whether they were the in-between as it was, by the digests before and after."""
 
+    def look_at(self, changes: Iterable[tuple[str, Source]], frame: float) -> None:
+        """Work out at once what the channels of many had on the frame that is shown, where keys were inserted on it.
+
+        `changes` are the digests of what slots are filled in from, and the sources that they have now.
+        """
+        olds = {
+            before: old
+            for before, source in changes
+            if (old := _before_insertion(before, source)) is not None and _is_inserted(old, source, frame)
+        }
+        values = values_of(list(olds.values()), [old.held(np.array([frame])) for old in olds.values()])
+        self._had = {(digest, frame): of_source for digest, of_source in zip(olds, values, strict=True)}
+
     def keep_timing(self) -> None:
         """Have the motion go on as it did beside the keys that were given the pose of it."""
+        self._had.clear()
         insertions, self._insertions = self._insertions, []
         keep_timing(insertions)
 
@@ -184,8 +200,8 @@ class InsertedKeys:
         bool
             Whether there was such a key.
         """
-        old = cached_source(before)
-        if old is None or source.key_count <= old.key_count or old.order != source.order:
+        old = _before_insertion(before, source)
+        if old is None:
             return False
         users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
         users.sort(key=self._precedence)
@@ -212,7 +228,8 @@ class InsertedKeys:
         decided, frames = self._inserted.get(change) if again else None, np.array([frame])
         added = added_values(place, user, source, frames)[:, 0]
         if decided is None:
-            in_between = old.values_at(old.held(frames))[:, 0] + added
+            had = self._had.get((old.digest, frame))
+            in_between = (old.values_at(old.held(frames)) if had is None else had)[:, 0] + added
             # A property that had no keys at all is where it is.
             unkeyed = [part not in old.keyed for part in PART_OF]
             in_between[unkeyed] = user.components()[unkeyed]
@@ -240,6 +257,12 @@ class InsertedKeys:
 
 def _identity(transform: Transform) -> tuple[int, str]:
     return transform.animated.session_uid, transform.prefix
+
+
+def _before_insertion(digest: str, source: Source) -> Source | None:
+    """Return the source with this digest if there are more keys than in it."""
+    old = cached_source(digest)
+    return old if old is not None and source.key_count > old.key_count and old.order == source.order else None
 
 
 def _is_inserted(old: Source, new: Source, frame: float) -> bool:

@@ -18,7 +18,7 @@ from ..actions.slots import SlotTransform, read_again, slot_transforms_of
 from ..compute.source_cache import cache_source
 from ..compute.sources import Source
 from ..transforms import Refused, Transform
-from ..writers.filling import clear, fill_in, follow_ranges, hold, is_complete
+from ..writers.filling import clear, fill_in, finish_drafts, follow_ranges, hold, is_complete
 from ..writers.sampled import regroup
 from ..writers.table import leave_other_way, release, remove_orphans, writer_of
 from .dense_keys import keep_motion
@@ -33,6 +33,7 @@ def refresh_places(
     frame: float,
     *,
     again: bool,
+    in_draft: bool,
 ) -> int:
     """Fill in what has changed in these places, and clear what has no in-betweens any more.
 
@@ -43,6 +44,8 @@ def refresh_places(
         What is keyed in each of them, read already; None to read it here.
     inserted, frame, again
         What keys that were inserted in between keep their pose by: see `InsertedKeys.keep_pose`.
+    in_draft
+        Whether whole frames will do for now, of large Actions.
 
     Returns
     -------
@@ -56,6 +59,8 @@ def refresh_places(
         keyed = dict(zip(with_modes, keyed_in(with_modes), strict=True))
         sources = [keyed.get(place) for place in places]
     stale, idle, emptied, keyed_anew = [], [], [], []
+    read = [(recorded_digest(place), source) for place, source in zip(places, sources, strict=True)]
+    inserted.look_at(((before, source) for before, source in read if isinstance(source, Source)), frame)
     for place, source in zip(places, sources, strict=True):
         if place.slot.action.is_editable:
             leave_other_way(place)
@@ -86,10 +91,11 @@ def refresh_places(
         anew = zip(read, keyed_in(read), strict=True)
         stale = [pair for pair in stale if pair[0] not in divided]
         stale += [pair for pair in anew if _is_wanted(*pair, recorded_digest(pair[0]))]
-    idle += _fill_in(stale)
+    idle += _fill_in(stale, in_draft)
     editable = [place for place in places if place.slot.action.is_editable]
     # Keys of what has no mode count in the frame range of an Action as well.
     follow_ranges({place.slot.action for place in editable} - {place.slot.action for place, _ in stale})
+    finish_drafts({place.slot.action for place in editable if place.slot.in_nla})
     _hold(idle, editable)
     # A bone was renamed or deleted: then it is no edit of a single one.
     if len(editable) > 1:
@@ -97,10 +103,10 @@ def refresh_places(
     return len(stale)
 
 
-def _fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> list[SlotTransform]:
+def _fill_in(readings: Sequence[tuple[SlotTransform, Source]], in_draft: bool) -> list[SlotTransform]:
     """Fill in these. Those with numbers that make no motion keep Blender's own, and are returned."""
     try:
-        fill_in(readings)
+        fill_in(readings, in_draft=in_draft)
     except ValueError:
         failed = []
         for place, source in readings:

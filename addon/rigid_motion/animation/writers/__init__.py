@@ -10,6 +10,7 @@ bone_constraints   constraints on bones, each of which shows a slot
 constraint_repair  what may be amiss with a constraint
 constraints        pose bones, and objects that are exact between frames
 table              what writes the differences of which kind
+drafts             one sample a frame while an Action is edited
 filling            computing and writing the in-betweens of many
 channel_values     the values of keys that do without in-betweens
 

@@ -15,8 +15,9 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ..actions.reading import keyed_in
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
-from ..actions.slots import SlotTransform, is_filled_in, is_time
+from ..actions.slots import SlotTransform, is_filled_in, is_time, slot_transforms_in
 from ..compute.components import PART_OF, ROTATION
 from ..compute.differences import NOTHING
 from ..compute.sample_rates import Need, error_of, sampled
@@ -25,6 +26,7 @@ from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
 from ..transforms.reaches import metres_per_channel_unit, reach_at_rest
 from .corners import corners
+from .drafts import begin_drafts, drafts_among, end_drafts, is_draft
 from .table import release, writer_of
 
 TOLERANCE = 0.00005
@@ -35,8 +37,13 @@ SAME_ROTATION = 1e-4
 """Components of rotations that are one, in single precision, and far from those a turn or a sign apart."""
 
 
-def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
-    """Compute and write the in-betweens of these; of those that are there already, what has changed."""
+def fill_in(readings: Sequence[tuple[SlotTransform, Source]], *, in_draft: bool = False) -> None:
+    """Compute and write the in-betweens of these; of those that are there already, what has changed.
+
+    Large Actions may begin a draft, where `in_draft`.
+    """
+    if in_draft:
+        begin_drafts(readings)
     changed, anew = [], []
     needs = _needs(readings)
     for (place, source), need in zip(readings, needs, strict=True):
@@ -53,7 +60,8 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
         writer = writer_of(place)
         layout, channels = writer.layout(source, samples.rate), _channels(place, source)
         pieces, error = corners(source, samples, layout, need)
-        record_in_betweens(place, source.digest, samples, samples.rate, max(samples.error, error))
+        error = max(samples.error, error) if math.isfinite(need.tolerance) else recorded(place).error
+        record_in_betweens(place, source.digest, samples, samples.rate, error)
         writer.write(
             place,
             {channels[row]: layout.points(points) for row, points in samples.items()},
@@ -70,15 +78,32 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     _limit_ranges({place.slot.action for place, _ in readings}, longer)
 
 
+def finish_drafts(actions: Iterable[bpy.types.Action]) -> None:
+    """Have those of these Actions that are in draft be exact between frames as well."""
+    drafts = drafts_among(actions)
+    if not drafts:
+        return
+    places = [place for place in slot_transforms_in(drafts) if recorded_digest(place)]
+    readings = [
+        (place, source)
+        for place, source in zip(places, keyed_in(places), strict=True)
+        if isinstance(source, Source) and source.digest == recorded_digest(place)
+    ]
+    end_drafts(drafts, [place for place, _ in readings])
+    fill_in(readings)
+
+
 def _needs(readings: Sequence[tuple[SlotTransform, Source]]) -> list[Need]:
-    """How exact each of these is to be between frames."""
+    """How exact each of these is to be between frames: in a draft, not at all."""
     reaches: dict[bpy.types.Bone, float] = {}
     needs = []
     for place, source in readings:
         user = place.users[0]
         unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
-        need = Need(TOLERANCE * max(1.0 / unit, reach), reach)
-        needs.append(need._replace(most=writer_of(place).most_samples(source)))
+        if is_draft(place.slot.action):
+            needs.append(Need(math.inf, reach, most=1))
+        else:
+            needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(place).most_samples(source)))
     return needs
 
 
@@ -130,9 +155,11 @@ def _fill_in_changed(
         for row in rows:
             layout.modify(curves[channels[row]], pieces.get(row, ()))
         elsewhere = before.error
-        if elsewhere > need.tolerance and elsewhere > samples.error:
-            elsewhere = error_of(source, written, before.rate, need.reach)
-        record_in_betweens(place, source.digest, rows, before.rate, max(samples.error, error, elsewhere))
+        if math.isfinite(need.tolerance):
+            if elsewhere > need.tolerance and elsewhere > samples.error:
+                elsewhere = error_of(source, written, before.rate, need.reach)
+            elsewhere = max(samples.error, error, elsewhere)
+        record_in_betweens(place, source.digest, rows, before.rate, elsewhere)
         _tag(place)
     return others
 
@@ -233,15 +260,17 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
                     samples.append(fcurve)
                 else:
                     begin, end = min(begin, first), max(end, last)
-        if begin <= end and any(_is_outside(fcurve, begin, end) for fcurve in samples):
+        # Those of a draft are going to lie outside again.
+        if begin <= end and ((samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)):
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end
-            motion.range_is_ours = True
+            if not was_set_for_samples:
+                motion.range_is_ours = True
         elif was_set_for_samples:
             action.use_frame_range = motion.range_is_ours = False
         if not samples and motion.has_longer:
-            motion.has_longer = False
+            motion.has_longer = motion.is_draft = False
 
 
 def _has_range(fcurve: bpy.types.FCurve) -> bool:

@@ -48,11 +48,10 @@ def replace_samples(
     curves: Curves = {}
     for channel, samples in points.items():
         fcurve = present.get(channel)
-        if fcurve is not None and len(fcurve.sampled_points) != layout.count:
-            channelbag.fcurves.remove(fcurve)
-            fcurve = None
         if fcurve is None:
             fcurve = _new(channelbag, group, channel, layout.count)
+        elif len(fcurve.sampled_points) != layout.count:
+            _resize(fcurve, layout.count)
         fcurve.sampled_points.foreach_set("co", samples)
         layout.modify(fcurve, pieces.get(channel, ()))
         curves[channel] = fcurve
@@ -121,3 +120,12 @@ def _new(channelbag: bpy.types.ActionChannelbag, group: str, channel: Channel, c
     fcurve.keyframe_points.add(1)
     fcurve.convert_to_samples(0, count)
     return fcurve
+
+
+def _resize(fcurve: bpy.types.FCurve, count: int) -> None:
+    """Give a sampled F-curve room for so many samples."""
+    if len(fcurve.sampled_points):
+        fcurve.convert_to_keyframes(0, 1)
+    else:
+        fcurve.keyframe_points.add(1)
+    fcurve.convert_to_samples(0, count)

@@ -1,0 +1,86 @@
+"""Drafts: large Actions have one sample a frame while they are edited, and as many as they need once it matters.
+
+After every edit Blender copies all of an Action, with up to 16 samples a frame of each bone. On whole frames, which is
+what is seen in the viewport, one is as good. An Action keeps itself that it is in draft: so it goes through undo.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
+
+import bpy
+import numpy as np
+
+from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
+from ..actions.slots import SlotTransform, slot_transforms_in
+from ..compute.source_cache import cached_source
+from ..compute.sources import Source
+from .table import writer_of
+
+LARGE = 10_000
+"""Bones times frames. Blender copies less in a few milliseconds, however many samples a frame there are."""
+
+
+def begin_drafts(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
+    """Have large Actions that are to be filled in go on in draft."""
+    apart = [(place, source) for place, source in readings if place.kind.has_difference_slot]
+    counts = Counter(place.slot.action for place, _ in apart)
+    for place, source in apart:
+        action, (first, last) = place.slot.action, source.frame_range
+        bones = max(counts.pop(action, 0), len(action.rigid_motion.slots))
+        if not is_draft(action) and bones * (last - first) >= LARGE:
+            _begin_draft(action, [place for place, _ in readings if place.slot.action == action])
+
+
+def _begin_draft(action: bpy.types.Action, known: Iterable[SlotTransform]) -> None:
+    """Take out of an Action the samples between frames. `known` are some of its places."""
+    places = {(place.slot.handle, place.prefix): place for place in (*slot_transforms_in([action]), *known)}
+    # Strips may show what is between the frames of an Action on whole frames of the scene.
+    if not any(place.slot.in_nla for place in places.values()):
+        action.rigid_motion.is_draft = action.rigid_motion.has_longer = True
+        for place in places.values():
+            _take_out_between_frames(place)
+
+
+def _take_out_between_frames(place: SlotTransform) -> None:
+    """Leave the samples on whole frames, where it is known how they lie."""
+    written, source, rows = recorded(place), cached_source(recorded_digest(place)), recorded_rows(place)
+    if written.rate == 1 or source is None:
+        return
+    (first, last), (begin, end) = source.sample_range(1), source.sample_range(written.rate)
+    frames = np.arange(first, last + 1)
+    # Beside the outermost keys, off whole frames, all is as it is on these.
+    chosen = np.clip(frames * written.rate - begin, 0, end - begin)
+    samples = np.empty(2 * (end - begin + 1), np.float32)
+    layout, points = writer_of(place).layout(source, 1), {}
+    for channel, fcurve in place.filled.items():
+        if 2 * len(fcurve.sampled_points) != len(samples):
+            return
+        fcurve.sampled_points.foreach_get("co", samples)
+        points[channel] = layout.points(np.stack((frames, samples[1::2][chosen]), axis=1, dtype=np.float32).ravel())
+    record_in_betweens(place, source.digest, rows, 1, written.error)
+    writer_of(place).write(place, points, layout, {})
+
+
+def is_draft(action: bpy.types.Action) -> bool:
+    """Whether an Action is in draft."""
+    return action.rigid_motion.is_draft
+
+
+def drafts_among(actions: Iterable[bpy.types.Action]) -> set[bpy.types.Action]:
+    """Those that are in draft and can be finished."""
+    return {action for action in actions if is_draft(action) and action.is_editable}
+
+
+def end_drafts(actions: Collection[bpy.types.Action], filled_in: Iterable[SlotTransform]) -> None:
+    """Have these Actions be in draft no more, all of which is about to be filled in anew but what moves nothing now.
+
+    That will be when it does.
+    """
+    found = {(place.slot.action, place.slot.handle, place.prefix) for place in filled_in}
+    for action in actions:
+        action.rigid_motion.is_draft = False
+        for record in action.rigid_motion.slots:
+            if (action, record.handle, record.prefix) not in found:
+                record.digest = ""

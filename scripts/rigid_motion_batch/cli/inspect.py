@@ -1,0 +1,133 @@
+"""Look into recordings: bodies, units, axes, rate, length, and what looks wrong, with what to do about it.
+
+The program reads a recording as the other commands do, with the same options, and says what it found. It changes
+nothing. Blender is needed for FBX, glTF and .blend files alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import textwrap
+from collections.abc import Iterator
+from dataclasses import asdict
+
+from rigid_motion_batch.axes import AXES
+from rigid_motion_batch.command_line import INSTALLED, Parser, complain, not_empty, printable
+from rigid_motion_batch.places import CHECKOUT
+from rigid_motion_batch.recordings import TrajectoryError, files_of
+from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
+from rigid_motion_batch.recordings.inspecting import Contents, Inspection, inspect
+from rigid_motion_batch.recordings.recordings import listed
+
+PROGRAM = f"{'python scripts/bootstrap.py' if CHECKOUT else INSTALLED} inspect"
+
+LISTED = 12
+"""Names of bodies or joints in a line."""
+
+WIDTH = 100
+"""Characters of a line."""
+
+EPILOG = f"""
+examples:
+  {PROGRAM} hand.csv
+  {PROGRAM} hand.csv --axes unity --scale 0.01
+  {PROGRAM} log.csv:left --columns t=when,device=who --time-unit ms
+  {PROGRAM} dance.bvh dance.bvh:LeftHand
+  {PROGRAM} takes/
+  {PROGRAM} take.csv --json
+
+Exit code: 0 all could be read, 1 some could not, 2 none could, or a wrong option.
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """Look into the recordings, and return the exit code."""
+    options = _parse(arguments)
+    found, failures = [], 0
+    for source in (file for given in options.inputs for file in files_of(given)):
+        try:
+            inspection = inspect(source, options.axes, options.reading)
+        except TrajectoryError as error:
+            failures += 1
+            found.append({"source": source, "error": str(error)})
+            complain(PROGRAM, error)
+            continue
+        found.append(asdict(inspection))
+        if not options.json:
+            print(*_lines(inspection), sep="\n", flush=True)
+    if options.json:
+        print(json.dumps(found, indent=1, ensure_ascii=False))
+    return 0 if not failures else 1 if failures < len(found) else 2
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = Parser(
+        prog=PROGRAM,
+        description=__doc__,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "inputs", nargs="+", type=not_empty, metavar="INPUT", help="recordings, bodies of them (FILE:BODY), or folders"
+    )
+    parser.add_argument("--axes", type=str.lower, choices=AXES, help="axes of the recordings, where you know them")
+    parser.add_argument("--json", action="store_true", help="print everything as JSON, a list with an entry for each")
+    add_reading_options(parser)
+    options = parser.parse_args(arguments)
+    try:
+        options.reading = reading_options(options)
+    except ValueError as error:
+        parser.error(str(error))
+    return options
+
+
+def _lines(found: Inspection) -> Iterator[str]:
+    """What is in a recording, as text."""
+    size = f"{found.bytes / 1e6:.1f} MB" if found.bytes >= 1e6 else f"{found.bytes / 1e3:.1f} KB"
+    yield printable(f"{found.source}: {found.format}, {size}")
+    if len(found.bodies) > 1:
+        yield from _row("bodies", f"{listed(found.bodies, LISTED)} ({len(found.bodies)})")
+    axes = f"{found.axes.name}, {found.axes.known_from}"
+    if found.axes.others:
+        axes += f"; {found.contents[0].up} seems to be up, as in {' and '.join(found.axes.others)}: --axes"
+    yield from _row("axes", axes)
+    for body in found.contents:
+        yield from _row("body", printable(body.name))
+        yield from _body(body)
+    for name, problem in found.unreadable:
+        yield from _row("body", f"{printable(name)}: {problem}")
+    if found.note:
+        yield from _row("note", found.note)
+
+
+def _body(body: Contents) -> Iterator[str]:
+    timing, size = body.timing, body.size
+    if body.joints:
+        yield from _row("  joints", f"{listed(body.joints, LISTED)} ({len(body.joints)})")
+    samples = f"{timing.samples} in {timing.seconds:.4g} s"
+    if timing.recorded != timing.samples:
+        samples += f", of {timing.recorded} in the file"
+    yield from _row("  samples", samples)
+    rate = f"{timing.rate:.4g} a second, {'even' if timing.even else 'uneven'}"
+    rate += f": intervals from {1e3 * timing.shortest:.3g} to {1e3 * timing.longest:.3g} ms"
+    if timing.gaps:
+        rate += f", {timing.gaps} gap{'s' * (timing.gaps > 1)}"
+    yield from _row("  rate", rate)
+    yield from _row("  lengths", f"{body.unit.name}, {body.unit.known_from}")
+    extent = " x ".join(f"{length:.3g}" for length in size.extent)
+    motion = f"{extent} m along x, y, z; {size.path:.3g} m of path; mostly below {size.speed:.3g} m/s and "
+    motion += f"{size.turning:.3g} degrees/s; turns up to {size.turned:.3g} degrees away from its first pose"
+    yield from _row("  motion", motion + "; it grows or shrinks" * body.scaled)
+    for repair in body.repairs:
+        yield from _row("  repaired", repair)
+    for warning in body.warnings:
+        yield from _row("  warning", printable(warning.text))
+        if warning.way_out:
+            yield from _row("", f"-> {warning.way_out}")
+
+
+def _row(name: str, text: str) -> list[str]:
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=f"  {name:<11}", subsequent_indent=" " * 13, break_on_hyphens=False
+    )

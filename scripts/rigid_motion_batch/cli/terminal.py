@@ -1,0 +1,128 @@
+"""What a comparison comes to, in a terminal: a table of modes and errors, one sentence, the path of the report.
+
+The numbers are those of the report. In a pipe the table is plain text without colours; `--json` has it as data.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from rigid_motion_batch.analysis.choices import Tolerance
+
+if TYPE_CHECKING:
+    from rigid_motion_batch.report.numbers import Numbers
+
+RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
+"""The measures that are shown."""
+
+NARROW = 80
+"""Columns of what is no terminal."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A motion under a choice of keys."""
+
+    choice: str
+    """As a heading: "5 keys/s"."""
+
+    modes: tuple[str, ...]
+    """The ids of those that are this motion."""
+
+    name: str
+    rms_mm: float
+    """The RMS shell error, over several clips the geometric mean."""
+
+    worst_mm: float
+    """The largest error of all clips."""
+
+    keys_per_s: float
+    best: bool
+    """Whether no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
+
+
+def lines_of(numbers: Numbers) -> list[Line]:
+    """The table: choices from the fewest keys to the most, motions in the order of the modes."""
+    from rigid_motion_batch.report.numbers import MEASURES
+
+    places = {measure.metric: place for place, measure in enumerate(MEASURES)}
+    mean, groups = numbers.mean(), numbers.groups()
+    columns = [numbers.modes.index(group[0]) for group in groups]
+    worst = np.nanmax(np.where(np.isnan(numbers.values[places[WORST]]), -np.inf, numbers.values[places[WORST]]), axis=0)
+    lines = []
+    for row, choice in enumerate(numbers.choices):
+        rms, keys = mean[places[RMS], row, columns], mean[places[KEYS], row, columns]
+        decide = keys if isinstance(choice, Tolerance) else rms
+        # What is shown as the same is as good.
+        shown = [number(value) for value in decide.tolist()]
+        least = shown[int(np.argmin(decide))]
+        lines += [
+            Line(
+                choice.title,
+                group,
+                numbers.joined(group),
+                float(rms[place]),
+                float(worst[row, columns[place]]),
+                float(keys[place]),
+                len(groups) > 1 and shown[place] == least,
+            )
+            for place, group in enumerate(groups)
+        ]
+    return lines
+
+
+def number(value: float) -> str:
+    """A number with three digits, as the table shows it."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:.{max(0, 2 - int(np.floor(np.log10(value))))}f}" if value > 1e-6 else "0"
+
+
+def table_of(lines: Sequence[Line], clips: int) -> Table:
+    """The table for a terminal; the best of each choice is marked with a star."""
+    title = "Shell error" if clips == 1 else f"Shell error, mean and largest of {clips} clips"
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("Keys")
+    table.add_column("Mode", overflow="fold")
+    for name in ("RMS, mm", "worst, mm", "keys/s"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("")
+    for place, line in enumerate(lines):
+        first = place == 0 or lines[place - 1].choice != line.choice
+        last = place + 1 == len(lines) or lines[place + 1].choice != line.choice
+        table.add_row(
+            line.choice if first else "",
+            Text(line.name),
+            number(line.rms_mm),
+            number(line.worst_mm),
+            number(line.keys_per_s),
+            "*" if line.best else "",
+            style="bold green" if line.best else "",
+            end_section=last,
+        )
+    return table
+
+
+def as_data(lines: Sequence[Line]) -> list[dict[str, object]]:
+    """The table for JSON."""
+    return [asdict(line) for line in lines]
+
+
+def show(*what: Table | str, stream: TextIO | None = None) -> None:
+    """Print tables and lines; without colours where the stream is no terminal, or NO_COLOR is set."""
+    stream = stream or sys.stdout
+    console = Console(file=stream, highlight=False, width=None if stream.isatty() else NARROW)
+    for one in what:
+        if isinstance(one, str):
+            console.print(one, markup=False, soft_wrap=not stream.isatty())
+        else:
+            console.print(one)

@@ -1,0 +1,275 @@
+"""What is in a recording: its bodies, units, axes, times and motion, and what looks wrong with it.
+
+Nothing is printed here, and nothing but the recording read. Lengths are in metres, times in seconds, angles in degrees;
+x, y and z are the recording's own axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigid_motion.motion.quaternions import angle_between
+from rigid_motion.motion.repair import GAP
+from rigid_motion_batch.axes import AXES
+
+from .clip_reading import make_clip
+from .clips import Clip, ClipWarning
+from .column_names import METRES
+from .options import AS_THE_FILE_SAYS, ReadingOptions
+from .reading import Format, format_of, read_trajectories, split_source
+from .recordings import ALL, Recording, Trajectory, TrajectoryError
+
+UNIT_NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches", "ft": "feet"}
+
+EVEN = 0.1
+"""By what part of the median the middle nine tenths of all intervals differ, at most, where samples are even."""
+
+ABOVE_THE_FLOOR = 0.3, 2.5
+"""Metres, where hands, heads and cameras of people are."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a body's lengths."""
+
+    metres: float
+    name: str
+    known_from: str
+    """Where that is from, and so how sure."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When the samples are that can be used."""
+
+    samples: int
+    recorded: int
+    """Samples in the file; those that are damaged or left out are no part of the others."""
+
+    first: float
+    """The time of the first, in seconds as the file has them."""
+
+    seconds: float
+    rate: float
+    """Samples a second: as the file has it, or by the median interval."""
+
+    shortest: float
+    longest: float
+    """Intervals, in seconds."""
+
+    even: bool
+    gaps: int
+    """Intervals in which samples are missing."""
+
+
+@dataclass(frozen=True)
+class Size:
+    """How large a motion is; of a whole body, that of all its joints, and the turns of its first root."""
+
+    lowest: tuple[float, float, float]
+    highest: tuple[float, float, float]
+    path: float
+    """Metres that the body, or the first root, goes."""
+
+    speed: float
+    """Metres a second, which 95 % of the speeds are below."""
+
+    turning: float
+    """Degrees a second, likewise."""
+
+    turned: float
+    """Degrees, the largest turn away from the first sample."""
+
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        return tuple(high - low for low, high in zip(self.lowest, self.highest, strict=True))
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What is known of a body."""
+
+    name: str
+    joints: tuple[str, ...]
+    """Of a whole body; none for a single rigid one."""
+
+    unit: Unit
+    timing: Timing
+    size: Size
+    scaled: bool
+    """Whether it grows or shrinks."""
+
+    up: str
+    """The axis that seems to be up, or empty."""
+
+    repairs: tuple[str, ...]
+    """What was repaired, a sentence each."""
+
+    warnings: tuple[ClipWarning, ...]
+
+
+@dataclass(frozen=True)
+class Axes:
+    """The convention of a recording's axes."""
+
+    name: str
+    """The one that it is read in: a name in `axes.AXES`."""
+
+    known_from: str
+    others: tuple[str, ...] = ()
+    """Those that the motion speaks for, where that is another one."""
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What is in a recording."""
+
+    source: str
+    format: str
+    bytes: int
+    bodies: tuple[str, ...]
+    """The names of all, as they may stand behind FILE: in a source. Of a whole body, see its joints."""
+
+    axes: Axes
+    contents: tuple[Contents, ...]
+    unreadable: tuple[tuple[str, str], ...] = ()
+    """Bodies that there are no two poses of, and why."""
+
+    note: str = ""
+    """What there is to say of what was taken and left: takes, armatures, guessed units."""
+
+
+def inspect(source: str, axes: str | None = None, options: ReadingOptions = AS_THE_FILE_SAYS) -> Inspection:
+    """Look into a recording.
+
+    Parameters
+    ----------
+    source : str
+        As `read_trajectories` takes it. Of a file without a whole body, all bodies are looked at.
+    axes : str, optional
+        The axes of the recording, a name in `rigid_motion_batch.axes.AXES`, where the user knows them.
+    options : ReadingOptions, optional
+
+    Raises
+    ------
+    TrajectoryError
+        Where it cannot be read, or no body of it has two poses.
+    """
+    recording = read_trajectories(source, options)
+    path, body = split_source(source)
+    if body is None and recording.others and all(one.figure is None for one in recording.trajectories):
+        recording = read_trajectories(f"{path}:{ALL}", options)
+    found = format_of(path)
+    contents, unreadable = [], []
+    for trajectory in recording.trajectories:
+        try:
+            clip = make_clip(
+                trajectory, source, trajectory.name, axes or recording.axes, options, measured=found.measured
+            )
+            contents.append(_contents(clip, trajectory, _unit(clip, trajectory, found, options)))
+        except TrajectoryError as error:
+            unreadable.append((trajectory.name, error.problem))
+    if not contents:
+        raise TrajectoryError(source, "; ".join(problem for _, problem in unreadable), "record at least 2 poses")
+    bodies = (*(one.name for one in recording.trajectories), *recording.others)
+    ups = {one.up for one in contents if one.up}
+    taken = _axes(recording, axes, next(iter(ups)) if len(ups) == 1 else "")
+    size = path.stat().st_size
+    return Inspection(source, found.label, size, bodies, taken, tuple(contents), tuple(unreadable), _note_of(recording))
+
+
+def _note_of(recording: Recording) -> str:
+    """What is said of the bodies; not that of the others, which are listed."""
+    return "; ".join(one.remark for one in recording.trajectories if one.remark)
+
+
+def _contents(clip: Clip, trajectory: Trajectory, unit: Unit) -> Contents:
+    said = {str(warning) for warning in clip.warnings}
+    return Contents(
+        trajectory.name,
+        clip.figure.joints if clip.figure else (),
+        unit,
+        _timing(clip, len(trajectory.times)),
+        _size(clip),
+        clip.poses.scales is not None,
+        _up(clip),
+        tuple(repair for repair in clip.repairs if repair not in said),
+        clip.warnings,
+    )
+
+
+def _unit(clip: Clip, trajectory: Trajectory, found: Format, options: ReadingOptions) -> Unit:
+    metres = clip.metres_per_unit
+    short = next((unit for unit, length in METRES.items() if length == metres), "")
+    name = UNIT_NAMES.get(short, f"units of {metres:.4g} m")
+    if options.scale is not None:
+        return Unit(metres, name, "as --scale says")
+    if clip.figure is not None and not found.in_metres:
+        guessed = "taken for" in trajectory.remark
+        return Unit(metres, name, "guessed from the size of the body" if guessed else "they make a body of usual size")
+    if metres != 1.0:
+        return Unit(metres, name, "as the file says")
+    return Unit(
+        metres, name, "as the format has it" if found.says_unit else "assumed, where the file says nothing else"
+    )
+
+
+def _timing(clip: Clip, recorded: int) -> Timing:
+    steps = np.diff(clip.times)
+    median = 1.0 / clip.samples_a_second
+    low, high = np.percentile(steps, (5.0, 95.0)) / median
+    return Timing(
+        samples=len(clip.times),
+        recorded=recorded,
+        first=float(clip.times[0]),
+        seconds=float(clip.times[-1] - clip.times[0]),
+        rate=clip.samples_a_second,
+        shortest=float(steps.min()),
+        longest=float(steps.max()),
+        even=bool(low >= 1.0 - EVEN and high <= 1.0 + EVEN),
+        gaps=int(np.count_nonzero(steps > GAP * median)),
+    )
+
+
+def _size(clip: Clip) -> Size:
+    root = clip.poses if clip.figure is None else clip.poses[0]
+    places, steps = root.positions * clip.metres_per_unit, np.diff(clip.times)
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1)
+    turns = np.degrees(angle_between(root.quaternions[1:], root.quaternions[:-1]))
+    if clip.figure is not None:
+        places = clip.figure.skeleton.in_root_space(clip.poses).positions.reshape(-1, 3) * clip.metres_per_unit
+    return Size(
+        tuple(places.min(axis=0).tolist()),
+        tuple(places.max(axis=0).tolist()),
+        float(lengths.sum()),
+        float(np.percentile(lengths / steps, 95.0)),
+        float(np.percentile(turns / steps, 95.0)),
+        float(np.degrees(angle_between(root.quaternions, root.quaternions[0]).max())),
+    )
+
+
+def _up(clip: Clip) -> str:
+    """The axis that is up, by where people are above the floor, or how they stand; empty where nothing tells it."""
+    if clip.figure is not None:
+        places = clip.figure.skeleton.in_root_space(clip.poses[:, :1]).positions[:, 0]
+        extents = np.ptp(places, axis=0)
+        largest = int(extents.argmax())
+        return "xyz"[largest] if extents[largest] > 1.5 * np.delete(extents, largest).max() else ""
+    low, high = np.percentile(clip.poses.positions * clip.metres_per_unit, (1.0, 99.0), axis=0)
+    above = (low > ABOVE_THE_FLOOR[0]) & (high < ABOVE_THE_FLOOR[1])
+    around = (low < 0.0) & (high > 0.0)
+    return "xyz"[int(above.argmax())] if above.sum() == 1 and around.sum() == 2 else ""
+
+
+def _axes(recording: Recording, given: str | None, up: str) -> Axes:
+    name = given or recording.axes
+    if given:
+        known_from = "as --axes says"
+    elif not recording.measured:
+        known_from = "as Blender reads it"
+    else:
+        known_from = "as its format has it" if name != "blender" else "assumed"
+    matching = tuple(axes for axes, change in AXES.items() if up and change[2]["xyz".index(up)] == 1.0)
+    return Axes(name, known_from, () if name in matching or not recording.measured else matching)

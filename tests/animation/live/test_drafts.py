@@ -1,0 +1,269 @@
+"""Drafts: while a large rig is edited in a window it is right on whole frames, and between them wherever that matters."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from rigid_motion import animation
+from rigid_motion.animation.live import between_frames, follower
+from rigid_motion.animation.writers import drafts
+from tests.animation.bones.rigs import moving_rig
+from tests.animation.bones.test_between_frames import EIGHTHS, PROMISE, largest_error
+from tests.animation.oracle import curves_of
+from tests.animation.scenes import push_down
+
+WHOLE = np.arange(1.0, 41.0)
+
+
+@pytest.fixture
+def window(live_file, monkeypatch) -> Iterator[bpy.types.Context]:
+    """A new file that is edited as in a window, in which every rig is large."""
+    monkeypatch.setattr(drafts, "LARGE", 0)
+    follower.set_drafts(True)
+    yield live_file
+    follower.set_drafts(False)
+
+
+@pytest.fixture
+def rig(window) -> bpy.types.Object:
+    rig = moving_rig()
+    bpy.context.view_layer.update()
+    return rig
+
+
+def is_draft(rig: bpy.types.Object) -> bool:
+    return rig.animation_data.action.rigid_motion.is_draft
+
+
+def rates(rig: bpy.types.Object) -> set[int]:
+    return rates_in(rig.animation_data.action)
+
+
+def rates_in(action: bpy.types.Action) -> set[int]:
+    return {record.rate for record in action.rigid_motion.slots}
+
+
+def edit(rig: bpy.types.Object, by: float = 0.3) -> None:
+    curves_of(rig.pose.bones["Hand"])["location", 0].keyframe_points[1].co_ui.y += by
+    bpy.context.view_layer.update()
+
+
+def assert_exact(rig: bpy.types.Object, of: np.ndarray = EIGHTHS) -> None:
+    errors = largest_error(rig, of)
+    assert max(errors.values()) < PROMISE, errors
+
+
+def shown_unfollowed(rig: bpy.types.Object) -> dict[str, float]:
+    """How far bones are off between frames in what the file has by itself."""
+    follower.follower.enabled = False
+    try:
+        return largest_error(rig, EIGHTHS)
+    finally:
+        follower.follower.enabled = True
+
+
+def is_exact_by_itself(rig: bpy.types.Object) -> bool:
+    return max(shown_unfollowed(rig).values()) < PROMISE
+
+
+def test_a_rig_that_is_edited_has_one_sample_a_frame_and_is_right_on_whole_frames(rig):
+    assert is_draft(rig)
+    assert rates(rig) == {1}
+    assert not is_exact_by_itself(rig), "or nothing is tested here"
+    assert_exact(rig, WHOLE)
+    edit(rig)
+    assert is_draft(rig)
+    assert_exact(rig, WHOLE)
+
+
+def test_who_goes_between_frames_finds_it_exact_and_an_edit_on_a_whole_frame_begins_a_draft_again(rig):
+    for _ in range(3):
+        assert_exact(rig)
+        assert not is_draft(rig)
+        assert max(rates(rig)) > 1
+        edit(rig)
+        assert is_draft(rig)
+        assert rates(rig) == {1}
+        assert_exact(rig, WHOLE)
+
+
+def test_edits_between_frames_are_exact_at_once(rig):
+    bpy.context.scene.frame_set(17, subframe=0.25)
+    edit(rig)
+    assert not is_draft(rig)
+    assert is_exact_by_itself(rig)
+
+
+def test_what_is_taken_out_is_what_is_computed_on_whole_frames(rig):
+    def samples() -> list[np.ndarray]:
+        found = []
+        for fcurve in follower.slots_in([rig.animation_data.action])[0].bones_channelbag.fcurves:
+            found.append(np.empty(2 * len(fcurve.sampled_points), np.float32))
+            fcurve.sampled_points.foreach_get("co", found[-1])
+        return found
+
+    computed = samples()
+    follower.follower.finish_drafts()
+    assert max(rates(rig)) > 1
+    edit(rig, 0.3)
+    edit(rig, -0.3)
+    for one, other in zip(samples(), computed, strict=True):
+        assert np.allclose(one, other, atol=1e-6)
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_file_that_is_saved_is_exact(rig, tmp_path, again):
+    name, path = rig.name, tmp_path / "saved.blend"
+    edit(rig)
+    if again:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+        edit(rig)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    assert not is_draft(rig)
+    follower.follower.enabled = False
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert is_exact_by_itself(bpy.data.objects[name])
+
+
+def test_a_file_that_blender_saved_by_itself_is_exact_in_the_background(rig, tmp_path):
+    name, path = rig.name, tmp_path / "autosave.blend"
+    edit(rig)
+    follower.follower.enabled = False
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    follower.follower.enabled = True
+    follower.set_drafts(False)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    assert is_exact_by_itself(bpy.data.objects[name])
+
+
+def test_a_render_is_exact(rig):
+    edit(rig)
+    for handler in bpy.app.handlers.render_init:
+        handler(bpy.context.scene, None)
+    assert is_exact_by_itself(rig)
+
+
+def test_undo_and_redo_go_through_drafts_and_what_was_finished(window, tmp_path):
+    name = moving_rig().name
+    bpy.context.view_layer.update()
+
+    def rig() -> bpy.types.Object:
+        return bpy.data.objects[name]
+
+    def value() -> float:
+        return curves_of(rig().pose.bones["Hand"])["location", 0].keyframe_points[1].co.y
+
+    def push() -> float:
+        bpy.ops.ed.undo_push(message="Edit")
+        return value()
+
+    values = [push()]
+    for number, finish in enumerate((False, True, False, True)):
+        edit(rig(), 0.1 * (number + 1))
+        values.append(push())
+        if finish:
+            bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+            assert not is_draft(rig())
+    for step, order in ((bpy.ops.ed.undo, values[-2::-1]), (bpy.ops.ed.redo, values[1:])):
+        for number, expected in enumerate(order):
+            assert step() == {"FINISHED"}
+            assert value() == pytest.approx(expected)
+            assert_exact(rig(), WHOLE)
+            if number % 2:
+                assert_exact(rig())
+    edit(rig())
+    assert_exact(rig(), WHOLE)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert is_exact_by_itself(rig())
+
+
+def test_strips_are_exact(rig):
+    edit(rig)
+    action = rig.animation_data.action
+    push_down(rig)
+    bpy.context.view_layer.update()
+    assert not action.rigid_motion.is_draft
+    assert max(rates_in(action)) > 1
+    action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1].co_ui.y += 0.2
+    bpy.context.view_layer.update()
+    assert not action.rigid_motion.is_draft
+    assert max(rates_in(action)) > 1
+
+
+def test_time_that_is_stretched_is_exact(rig):
+    bpy.context.scene.render.frame_map_new = 200
+    edit(rig)
+    assert not is_draft(rig)
+    assert max(rates(rig)) > 1
+
+
+def test_nothing_is_left_in_draft_where_edits_are_not_followed(rig):
+    edit(rig)
+    animation.set_enabled(False)
+    assert is_exact_by_itself(rig)
+
+
+def test_nothing_is_left_in_draft_where_the_extension_is_switched_off(rig):
+    edit(rig)
+    animation.unregister()
+    animation.register()
+    assert is_exact_by_itself(rig)
+
+
+def test_an_action_in_draft_that_nothing_had_for_a_while_is_exact(rig):
+    edit(rig)
+    data = rig.animation_data
+    action, slot = data.action, data.action_slot
+    data.action = None
+    bpy.context.view_layer.update()
+    follower.follower.finish_drafts()
+    assert not action.rigid_motion.is_draft
+    follower.set_drafts(False)
+    data.action, data.action_slot = action, slot
+    bpy.context.view_layer.update()
+    assert is_exact_by_itself(rig)
+
+
+def test_what_has_no_modes_any_more_is_no_draft(rig):
+    edit(rig)
+    animation.set_mode(list(rig.pose.bones), "BLENDER")
+    assert not is_draft(rig)
+    assert not rig.animation_data.action.use_frame_range
+
+
+def test_the_error_that_is_told_is_not_that_of_a_draft(rig):
+    follower.follower.finish_drafts()
+    before = animation.error_between_frames(rig.pose.bones["Hand"])
+    edit(rig)
+    assert animation.error_between_frames(rig.pose.bones["Hand"]) == before > 0.0
+
+
+def test_small_rigs_are_exact_at_once(window, monkeypatch):
+    monkeypatch.undo()
+    rig = moving_rig()
+    edit(rig)
+    assert not is_draft(rig)
+    assert is_exact_by_itself(rig)
+
+
+def test_nothing_is_in_draft_without_a_window(live_file, monkeypatch):
+    monkeypatch.setattr(drafts, "LARGE", 0)
+    assert bpy.app.background
+    rig = moving_rig()
+    edit(rig)
+    assert not is_draft(rig)
+
+
+def test_a_render_waits_for_the_main_thread_but_not_for_ever(monkeypatch):
+    monkeypatch.setattr(between_frames, "PATIENCE", 0.0)
+    done: list[str] = []
+    thread = threading.Thread(target=between_frames.on_main_thread, args=(lambda: done.append("done"),))
+    thread.start()
+    thread.join()
+    assert done == ["done"]

@@ -1,0 +1,143 @@
+"""Steps in a Blender program. `BLENDER` names one; without it a stand-in runs the worker in a Python with bpy."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.pipeline.blender import version_of
+from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
+from rigid_motion_batch.pipeline.performing import ExecutorError
+from rigid_motion_batch.pipeline.running import Outcome, run
+from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.store import Store
+from tests.scripts.pipeline import blender_steps
+from tests.scripts.pipeline.blender_steps import Scene
+from tests.scripts.pipeline.plans import Listener, contents, states, task, writing
+
+ROOT = Path(__file__).resolve().parents[3]
+
+STAND_IN = """#!{python}
+import bpy, runpy, sys
+if "--version" in sys.argv:
+    print("Blender", bpy.app.version_string)
+else:
+    runpy.run_path(sys.argv[sys.argv.index("--python") + 1])
+"""
+
+
+@pytest.fixture(params=["program", "stand-in"])
+def blender(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.delenv("PYTHONPATH")  # A Blender finds nothing by it.
+    monkeypatch.chdir(ROOT)
+    if request.param == "program":
+        if "BLENDER" not in os.environ:
+            pytest.skip("needs BLENDER, the path of a Blender program: .ci/blender-window, for instance")
+        return os.environ["BLENDER"]
+    if os.name == "nt":
+        pytest.skip("Windows runs no scripts by their first line")
+    path = tmp_path / "blender"
+    path.write_text(STAND_IN.format(python=sys.executable))
+    path.chmod(0o755)
+    return str(path)
+
+
+def saving(scene: Scene, store: Store, *after: Task, source: Path | None = None) -> Task:
+    inputs = (store.input(source),) if source else ()
+    publish = {"scene.blend": "scene.blend", "out.txt": "out.txt"}
+    return task("save", blender_steps.save, scene, *after, inputs=inputs, publish=publish)
+
+
+def saved(output: Path, blender: str, fate: str = "", listener: Listener | None = None) -> Outcome:
+    with Store(output) as store, ProcessExecutor(1) as executor:
+        tasks = [saving(Scene("one", (1, 2), fate), store)]
+        return run(lambda: tasks, store, executor, blender=blender, progress=listener)
+
+
+def test_a_step_is_done_by_the_program(blender: str, tmp_path: Path) -> None:
+    source, listener = tmp_path / "in.csv", Listener()
+    source.write_text("source")
+    with Store(tmp_path / "out") as store, ProcessExecutor(1) as executor:
+        before = writing("a", "before ")
+        tasks = [before, saving(Scene("one", (1, 2, 250)), store, before, source=source)]
+        outcome = run(lambda: tasks, store, executor, blender=blender, progress=listener)
+    assert states(outcome) == {"done": 2}
+    assert outcome.facts["frames"] == 3
+    assert listener.notes == ["saved one"]
+    said = (tmp_path / "out" / "out.txt").read_text()
+    assert said == f"{'BLENDER' in os.environ and blender == os.environ['BLENDER']} before source"
+    assert (tmp_path / "out" / "scene.blend").stat().st_size > 1000
+    assert not (tmp_path / "out" / OWN / "scratch").exists()
+
+
+def test_errors_are_told_in_one_line(blender: str, tmp_path: Path) -> None:
+    assert saved(tmp_path / "a", blender, "foreseen").failures == {"save": "no such scene; make another"}
+    outcome = saved(tmp_path / "b", blender, "unforeseen")
+    assert outcome.failures == {"save": "save: RuntimeError: KeyError: 'one'"}
+    outcome = saved(tmp_path / "c", blender, "full")
+    assert outcome.problem == f"save: {tmp_path / 'c' / 'scene.blend'}: No space left on device"
+
+
+def test_a_blender_that_dies_is_started_twice_more(blender: str, tmp_path: Path) -> None:
+    listener = Listener()
+    outcome = saved(tmp_path / "out", blender, "killed", listener)
+    assert len(listener.notes) == 2
+    assert listener.notes[0].startswith("save: Blender died (exit code ")
+    assert outcome.failures["save"].endswith("given up after 3 attempts")
+    assert contents(tmp_path / "out") == {}
+
+
+def test_without_a_program_the_step_is_done_here(tmp_path: Path) -> None:
+    with Store(tmp_path) as store, SerialExecutor() as executor:
+        tasks = [saving(Scene("one", (1,)), store)]
+        assert states(run(lambda: tasks, store, executor)) == {"done": 1}
+    assert (tmp_path / "out.txt").read_text() == "False "
+
+
+def test_a_blender_says_which_it_is(blender: str) -> None:
+    assert version_of(blender).count(".") == 2
+
+
+@pytest.mark.parametrize("path", ["/nowhere/blender", "/bin/true", "/tmp"])
+def test_what_is_no_blender_is_said_to_be_none(path: str) -> None:
+    with pytest.raises(ExecutorError, match=f"{path}: .*; give the path of a Blender program"):
+        version_of(path)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for processes where Linux shows them")
+def test_a_blender_ends_with_what_started_it(blender: str, tmp_path: Path) -> None:
+    pids: list[int] = []
+
+    def kill() -> None:
+        ends = time.monotonic() + 60.0
+        while not list(tmp_path.glob(f"{OWN}/scratch/*/*/begun")) and time.monotonic() < ends:
+            time.sleep(0.05)
+        pids.extend(blenders())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=kill, daemon=True).start()
+    assert saved(tmp_path, blender, "slow").interrupted
+    assert pids
+    ends = time.monotonic() + 10.0
+    while set(blenders()) & set(pids) and time.monotonic() < ends:
+        time.sleep(0.05)
+    assert not set(blenders()) & set(pids)
+
+
+def blenders() -> list[int]:
+    """The processes that do a request."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            command = path.read_bytes()
+        except OSError:
+            continue
+        if b"pipeline/worker.py" in command and b"--background" in command:
+            found.append(int(path.parent.name))
+    return found

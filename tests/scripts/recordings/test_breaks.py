@@ -1,0 +1,251 @@
+"""T-poses in front of a motion, gaps, jumps, and the part that a user takes of a recording."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigid_motion.motion import Poses
+from rigid_motion_batch.recordings import ReadingOptions, Trajectory, TrajectoryError, read_clips
+from rigid_motion_batch.recordings.clip_reading import make_clip
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import Figure
+from tests.recordings import RECORDINGS
+
+JOINTS = {
+    "Hips": (-1, (0, 1.0, 0)),
+    "Head": (0, (0, 0.7, 0)),
+    "LeftArm": (0, (0.2, 0.45, 0)),
+    "LeftHand": (2, (0.65, 0, 0)),
+    "RightArm": (0, (-0.2, 0.45, 0)),
+    "RightHand": (4, (-0.65, 0, 0)),
+    "LeftFoot": (0, (0.1, -0.95, 0)),
+    "RightFoot": (0, (-0.1, -0.95, 0)),
+}
+"""Parents, and where joints are at rest in their parents' space: a T in metres, y up."""
+
+PARENTS = np.array([parent for parent, _ in JOINTS.values()])
+OFFSETS = np.array([offset for _, offset in JOINTS.values()])
+
+
+def turned(angle: np.ndarray, axis: int) -> np.ndarray:
+    quaternions = np.zeros((*np.shape(angle), 4))
+    quaternions[..., 0], quaternions[..., 1 + axis] = np.cos(angle / 2.0), np.sin(angle / 2.0)
+    return quaternions
+
+
+def dancer(rate: float = 30.0, seconds: float = 4.0, arms: float = 1.2, held: int = 0) -> Trajectory:
+    """One whose arms swing about where they hang by this angle, after so many samples of the T-pose in front."""
+    times = np.arange(round(seconds * rate)) / rate
+    poses = Poses(np.repeat(OFFSETS[:, None], len(times), axis=1), np.zeros((len(JOINTS), len(times), 4)))
+    poses.quaternions[..., 0] = 1.0
+    swing = arms + 0.4 * np.sin(6.0 * times)
+    swing[:held] = 0.0
+    poses.quaternions[2], poses.quaternions[4] = turned(-swing, 2), turned(swing, 2)
+    places = np.where(PARENTS[:, None] > 0, OFFSETS + OFFSETS[PARENTS], OFFSETS)
+    places[1:] += OFFSETS[0]
+    rest = Poses(places, np.tile((1.0, 0.0, 0.0, 0.0), (len(JOINTS), 1)))
+    return Trajectory("dancer", times, poses, figure=Figure(tuple(JOINTS), PARENTS, rest, np.ones((len(JOINTS), 3))))
+
+
+def clip_of(trajectory: Trajectory, measured: bool = True, **options: float) -> Clip:
+    return make_clip(trajectory, "dance.bvh", "dance", "opengl", ReadingOptions(**options), measured=measured)
+
+
+@pytest.mark.parametrize("rate", [24.0, 30.0, 60.0, 120.0])
+@pytest.mark.parametrize("held", [1, 2, 5])
+@pytest.mark.parametrize("metres", [1.0, 0.01])
+def test_a_t_pose_in_front_is_left_out_and_said(rate: float, held: int, metres: float) -> None:
+    dance = dancer(rate, held=held)
+    positions = dance.poses.positions / metres
+    rest = Poses(dance.figure.rest.positions / metres, dance.figure.rest.quaternions)
+    dance = replace(
+        dance,
+        poses=Poses(positions, dance.poses.quaternions),
+        figure=replace(dance.figure, rest=rest),
+        metres_per_unit=metres,
+    )
+    clip = clip_of(dance)
+    assert clip.calibration == held
+    assert len(clip.times) == len(dance.times) - held
+    assert clip.times[0] == dance.times[held]
+    (warning,) = clip.warnings
+    assert re.search(r"a T-pose and left out: from there to the next 'LeftHand' jumps 0\.[6-9]\d? m, ", warning.text)
+    assert warning.way_out == "--start 0 keeps it"
+    assert (warning.start_s, warning.end_s) == (0.0, dance.times[held])
+    assert str(warning) in clip.repairs
+
+
+def test_start_0_keeps_a_t_pose() -> None:
+    clip = clip_of(dancer(held=1), start=0.0)
+    assert (clip.calibration, len(clip.times)) == (0, 120)
+
+
+def test_the_pose_at_rest_in_front_is_left_out_although_it_is_no_t() -> None:
+    dance = dancer(held=1)
+    down = np.where(np.isin(np.arange(len(JOINTS)), (3, 5))[:, None], (0.05, -0.6, 0.3), OFFSETS)
+    poses = Poses(np.repeat(down[:, None], len(dance.times), axis=1), dance.poses.quaternions)
+    places = dance.figure.rest.positions + np.where((PARENTS > 0)[:, None], down - OFFSETS, 0.0)
+    dance = replace(dance, poses=poses, figure=replace(dance.figure, rest=Poses(places, dance.figure.rest.quaternions)))
+    clip = clip_of(dance)
+    assert clip.calibration == 1
+    assert clip.warnings[0].text.startswith("its first frame is the pose at rest and left out: ")
+
+
+def test_another_pose_in_front_stays_and_is_said() -> None:
+    dance = dancer(rate=120.0)
+    dance.poses.quaternions[2, 0] = turned(np.array(-2.6), 0)
+    dance.poses.quaternions[4, 0] = turned(np.array(1.4), 2)
+    clip = clip_of(dance)
+    assert clip.calibration == 0
+    (warning,) = [one for one in clip.warnings if "pose of its own" in one.text]
+    assert warning.way_out == "leave it out: --start 0.00833"
+    assert len(clip_of(dance, start=0.00833).times) == len(dance.times) - 1
+
+
+def test_who_moves_out_of_a_t_pose_keeps_it() -> None:
+    dance = dancer(held=1)
+    swing = np.minimum(1.2, 3.0 * dance.times)
+    dance.poses.quaternions[2], dance.poses.quaternions[4] = turned(-swing, 2), turned(swing, 2)
+    assert clip_of(dance).calibration == 0
+    assert clip_of(dance).warnings == ()
+
+
+def test_a_t_pose_that_is_held_long_is_a_part_of_the_recording() -> None:
+    assert clip_of(dancer(held=6)).calibration == 0
+
+
+def test_who_dances_all_the_time_as_wildly_as_from_a_t_pose_keeps_it() -> None:
+    dance = dancer(held=1)
+    wild = np.where(np.arange(len(dance.times)) % 7 < 3, 0.0, 1.2)
+    dance.poses.quaternions[2] = turned(-wild, 2)
+    assert clip_of(dance).calibration == 0
+
+
+def test_too_few_samples_tell_nothing() -> None:
+    assert clip_of(dancer(seconds=0.5, held=1)).calibration == 0
+
+
+# -- gaps and jumps ---------------------------------------------------------------------------------------------------
+
+
+def hand(count: int = 300, rate: float = 90.0, begin: float = 0.0) -> Trajectory:
+    times = np.arange(count) / rate
+    positions = np.stack((0.3 * np.sin(4.0 * times), 1.0 + 0.1 * np.cos(7.0 * times), 0.0 * times), axis=-1)
+    return Trajectory("hand", begin + times, Poses(positions, np.tile((1.0, 0.0, 0.0, 0.0), (count, 1))))
+
+
+def without(trajectory: Trajectory, *parts: tuple[float, float]) -> Trajectory:
+    seconds = trajectory.times - trajectory.times[0]
+    kept = ~np.any([(seconds > first) & (seconds < last) for first, last in parts], axis=0)
+    return replace(trajectory, times=trajectory.times[kept], poses=trajectory.poses[kept])
+
+
+@pytest.mark.parametrize("begin", [0.0, 1.7e9])
+def test_a_gap_longer_than_keys_are_apart_is_said_with_its_times(begin: float) -> None:
+    clip = clip_of(without(hand(begin=begin), (1.001, 1.299), (2.001, 2.099), (2.501, 3.099)))
+    first, second = clip.warnings
+    assert str(first) == (
+        "no samples from 1.00 s to 1.30 s (one of 2 gaps): no error is measured there; "
+        "take a part without it: --start and --end"
+    )
+    assert (first.start_s - begin, first.end_s - begin) == pytest.approx((1.0, 1.3), abs=1e-6)
+    assert (second.start_s - begin, second.end_s - begin) == pytest.approx((2.5, 3.1), abs=1e-6)
+    assert clip_of(without(hand(begin=begin), (1.001, 1.299)), start=1.299).warnings == ()
+
+
+def test_of_many_gaps_the_longest_five_are_named() -> None:
+    gaps = [(0.4 * number, 0.4 * number + 0.21 + 0.01 * number) for number in range(1, 8)]
+    clip = clip_of(without(hand(), *gaps))
+    assert len(clip.warnings) == 5
+    assert all("(one of 7 gaps)" in warning.text for warning in clip.warnings)
+    assert [warning.start_s for warning in clip.warnings] == sorted(warning.start_s for warning in clip.warnings)
+
+
+def test_a_slow_recording_has_no_gaps() -> None:
+    assert clip_of(hand(rate=4.0)).warnings == ()
+
+
+def test_a_jump_is_said_with_its_time() -> None:
+    one = hand()
+    one.poses.positions[180:] += (0.0, 0.8, 0.0)
+    (warning,) = clip_of(one).warnings
+    assert warning.text.startswith("a jump at 1.99 s: 0.79 m in one sample, at 71.3 m/s")
+    assert (warning.start_s, warning.end_s) == (one.times[179], one.times[180])
+    assert clip_of(one, start=2.0).warnings == ()
+    assert clip_of(one, measured=False).warnings == (), "an animation may jump"
+
+
+def test_a_joint_that_jumps_is_said() -> None:
+    dance = dancer(rate=120.0)
+    dance.poses.quaternions[2, 300] = turned(np.array(1.0), 2)
+    there, back = clip_of(dance).warnings
+    assert there.text.startswith("a jump at 2.49 s (one of 2 jumps)")
+    assert (there.end_s, back.start_s) == (dance.times[300], dance.times[300])
+
+
+@pytest.mark.parametrize("scale", [1.0, 100.0])
+def test_who_is_fast_all_the_time_does_not_jump(scale: float) -> None:
+    one = hand()
+    fast = replace(one, poses=Poses(scale * one.poses.positions, one.poses.quaternions))
+    assert clip_of(fast).warnings == ()
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    "path",
+    sorted([*RECORDINGS.glob("*.[!m]*"), *RECORDINGS.with_name("rigs").glob("*.[!m]*")]),
+    ids=lambda path: path.name,
+)
+def test_of_other_peoples_motions_one_begins_with_a_t_pose_and_none_is_broken(path) -> None:
+    ((clip,), notes) = read_clips([str(path)])
+    assert clip.calibration == (path.name == "cmu_01_01.bvh")
+    assert len(clip.warnings) == clip.calibration
+    assert any("without its first frame" in note for note in notes) == bool(clip.calibration)
+
+
+# -- the part that is taken -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("begin", [0.0, 12.5, 1.7e9])
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [({}, 300), ({"start": 1.0}, 210), ({"end": 2.0}, 181), ({"start": 1.0, "end": 2.0}, 91), ({"end": 99.0}, 300)],
+)
+def test_start_and_end_count_from_the_first_sample(begin: float, options: dict, count: int) -> None:
+    one = hand(begin=begin)
+    clip = clip_of(
+        replace(one, times=np.round(one.times, 6)),
+        **{name: x - 1e-6 if name == "start" else x + 1e-6 for name, x in options.items()},
+    )
+    assert len(clip.times) == count
+    assert clip.times[0] - begin == pytest.approx(options.get("start", 0.0), abs=1e-5)
+
+
+def test_a_wild_time_in_front_does_not_move_the_start() -> None:
+    one = hand()
+    times = one.times.copy()
+    times[0] = -1e9
+    assert clip_of(replace(one, times=times), start=1.0).times[0] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"start": 5.0}, "0 samples from 5 s to its end, and it lasts 3.32 s; give another --start or --end"),
+        ({"start": 1.0, "end": 1.005}, "1 samples from 1 s to 1.005 s, and it lasts 3.32 s"),
+    ],
+)
+def test_a_part_without_samples_is_refused_with_what_there_is(options: dict, told: str) -> None:
+    with pytest.raises(TrajectoryError, match=told):
+        clip_of(hand(), **options)
+
+
+def test_lengths_in_unreals_axes_are_said_to_be_centimetres_unless_the_user_says_what_they_are() -> None:
+    said = make_clip(hand(), "hand.csv", "hand", "unreal").warnings
+    assert [*map(str, said)] == ["its lengths are read as metres, and Unreal has centimetres; add --scale 0.01"]
+    assert make_clip(hand(), "hand.csv", "hand", "unreal", ReadingOptions(scale=1.0)).warnings == ()
+    assert make_clip(hand(), "hand.csv", "hand", "unity").warnings == ()

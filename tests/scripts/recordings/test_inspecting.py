@@ -1,0 +1,166 @@
+"""What is said to be in a recording is in it, and what is wrong with it comes with the way out."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.cli.inspect import main
+from rigid_motion_batch.recordings import ReadingOptions, TrajectoryError
+from rigid_motion_batch.recordings.inspecting import inspect
+from tests.scripts.recordings.seeds import ARM, COUNT, SEEDS
+
+SCRIPTS = Path(__file__).resolve().parents[3] / "scripts"
+
+
+def log(rows: int = 300, rate: float = 90.0, scale: float = 1.0, up: int = 1, header: str = "t,x,y,z") -> str:
+    """A hand that swings 1 m above the floor, and turns about x by 90 degrees a second."""
+    times = np.arange(rows) / rate
+    places = np.roll(
+        np.stack((0.2 * np.cos(3 * times), 1.0 + 0.3 * np.sin(2 * times), 0.3 * np.sin(3 * times))), up - 1, 0
+    )
+    half = np.pi / 4.0 * times
+    columns = np.column_stack([times, *(scale * places), np.sin(half), 0.0 * half, 0.0 * half, np.cos(half)])
+    return f"{header},qx,qy,qz,qw\n" + "".join(",".join(map(repr, row)) + "\n" for row in columns.tolist())
+
+
+def test_a_log_is_described(write) -> None:
+    found = inspect(source := write("hand.csv", log()))
+    (hand,) = found.contents
+    assert (found.source, found.format, found.bodies) == (source, "CSV with named columns", ("hand",))
+    assert found.bytes == os.path.getsize(source)
+    assert (hand.joints, hand.scaled, hand.repairs, hand.warnings) == ((), False, (), ())
+    timing, size = hand.timing, hand.size
+    assert (timing.samples, timing.recorded, timing.even, timing.gaps) == (300, 300, True, 0)
+    assert (timing.rate, timing.seconds, timing.first) == pytest.approx((90.0, 299 / 90.0, 0.0))
+    assert size.extent == pytest.approx((0.4, 0.6, 0.6), abs=1e-3)
+    assert size.turning == pytest.approx(90.0)
+    assert size.turned == pytest.approx(180.0, abs=0.6)
+    assert 0.5 < size.speed < 1.2
+    assert 0.5 * timing.seconds < size.path < 1.2 * timing.seconds
+
+
+@pytest.mark.parametrize(
+    ("header", "scale", "options", "metres", "name", "known_from"),
+    [
+        ("t,x,y,z", 1.0, {}, 1.0, "metres", "assumed, where the file says nothing else"),
+        ("t,x_cm,y_cm,z_cm", 100.0, {}, 0.01, "centimetres", "as the file says"),
+        ("t,x,y,z", 39.37, {"scale": 0.0254}, 0.0254, "inches", "as --scale says"),
+        ("t,x,y,z", 2.0, {"scale": 0.5}, 0.5, "units of 0.5 m", "as --scale says"),
+    ],
+)
+def test_the_unit_comes_with_where_it_is_from(write, header, scale, options, metres, name, known_from) -> None:
+    found = inspect(write("hand.csv", log(scale=scale, header=header)), options=ReadingOptions(**options))
+    unit = found.contents[0].unit
+    assert (unit.metres, unit.name, unit.known_from) == (metres, name, known_from)
+    assert found.contents[0].size.extent == pytest.approx((0.4, 0.6, 0.6), abs=2e-3)
+
+
+def test_a_body_whose_unit_is_guessed_says_so(write) -> None:
+    found = inspect(
+        write(
+            "arm.bvh",
+            ARM.replace("2.0 0.0 0.0", "170 0 0") + "Frames: 2\nFrame Time: .1\n" + "0 " * 8 + "0\n" + "0 " * 8 + "0\n",
+        )
+    )
+    assert found.contents[0].unit.known_from == "guessed from the size of the body"
+    assert found.contents[0].joints[0] == "Shoulder"
+    assert "taken for" in found.note
+
+
+@pytest.mark.parametrize(("up", "matching"), [(1, ("opengl", "unity")), (2, ())])
+def test_the_axis_that_is_up_speaks_for_other_axes(write, up: int, matching: tuple[str, ...]) -> None:
+    found = inspect(write("hand.csv", log(up=up)))
+    assert found.contents[0].up == "xyz"[up]
+    assert (found.axes.name, found.axes.known_from, found.axes.others) == ("blender", "assumed", matching)
+    given = inspect(write("hand.csv", log(up=up)), axes="unity").axes
+    assert (given.name, given.known_from) == ("unity", "as --axes says")
+    assert given.others == (() if up == 1 else ("blender", "ros", "unreal"))
+
+
+def test_where_nothing_is_above_a_floor_no_axis_is_up(write) -> None:
+    text = "t,x,y,z,qx,qy,qz,qw\n" + "".join(f"{0.01 * row},0,0,0,0,0,0,1\n" for row in range(30))
+    assert inspect(write("still.csv", text)).contents[0].up == ""
+
+
+def test_all_devices_of_a_log_are_described_and_those_without_poses_named(write) -> None:
+    rows = log(60).splitlines()
+    text = "\n".join([f"device,{rows[0]}", *(f"{side},{row}" for row in rows[1:] for side in ("left", "right"))])
+    source = write("log.csv", f"{text}\nspare,9,,,,,,,\n")
+    found = inspect(source)
+    assert found.bodies == ("left", "right", "spare")
+    assert [one.name for one in found.contents] == ["left", "right"]
+    assert found.unreadable[0][0] == "spare"
+    assert [one.name for one in inspect(f"{source}:RIGHT").contents] == ["right"]
+
+
+def test_what_looks_wrong_comes_with_the_way_out(write) -> None:
+    (hand,) = inspect(write("hand.csv", log(scale=100.0))).contents
+    assert [warning.way_out.partition(",")[0] for warning in hand.warnings] == ["if its lengths are centimetres"]
+    text = "\n".join([line for row, line in enumerate(log().splitlines()) if not 90 < row < 130])
+    (hand,) = inspect(write("gap.csv", text)).contents
+    assert "no samples from" in hand.warnings[0].text
+    assert hand.timing.gaps == 1
+
+
+def test_what_cannot_be_read_is_refused(write) -> None:
+    with pytest.raises(TrajectoryError, match="positions only"):
+        inspect(write("marker.csv", "t,x,y,z\n0,1,2,3\n1,2,3,4\n"))
+
+
+@pytest.mark.parametrize("kind", SEEDS)
+def test_every_text_format_is_described_without_blender(tmp_path: Path, kind: str) -> None:
+    paths = []
+    for number, text in enumerate(SEEDS[kind]):
+        (tmp_path / f"take{number}{kind}").write_text(text)
+        paths.append(str(tmp_path / f"take{number}{kind}"))
+    program = "import sys; sys.modules['bpy'] = None\nfrom rigid_motion_batch.cli.commands import main\n"
+    command = [sys.executable, "-c", f"{program}sys.exit(main(['inspect', *sys.argv[1:], '--json']))", *paths]
+    if kind == ".csv":
+        command += ["--euler", "YXZ"]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SCRIPTS)})
+    found = json.loads(done.stdout)
+    assert len(found) == len(paths), done.stderr
+    if kind != ".csv":
+        assert done.returncode == 0, done.stderr
+    for one in found:
+        if "error" not in one:
+            assert all(body["timing"]["recorded"] == COUNT for body in one["contents"])
+
+
+def test_the_command_says_it_in_words(write, capsys) -> None:
+    text = "\n".join([line for row, line in enumerate(log(scale=100.0).splitlines()) if not 90 < row < 130])
+    source = write("hand.csv", text)
+    assert main([source, "--scale", "0.01", "--axes", "UNITY"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"{source}: CSV with named columns, ")
+    said = "\n".join(line[13:] if line[2:13].strip() == "" else line for line in lines[1:])
+    for expected in (
+        "  axes       unity, as --axes says",
+        "  body       hand",
+        "    samples  261 in 3.322 s",
+        "    rate     90 a second, even: intervals from 11.1 to 444 ms, 1 gap",
+        "    lengths  centimetres, as --scale says",
+        "    motion   0.4 x 0.6 x 0.6 m along x, y, z; ",
+        "    repaired left gaps as they are",
+        "    warning  no samples from 0.99 s to 1.43 s: no error is measured there",
+        "-> take a part without it: --start and --end",
+    ):
+        assert expected in said, said
+
+
+def test_the_exit_code_says_how_many_could_be_read(write, capsys) -> None:
+    good, bad = write("hand.csv", log()), write("bad.csv", "x")
+    assert main([good, bad]) == 1
+    assert "bad.csv:1: no column named" in capsys.readouterr().err
+    assert main([bad]) == 2
+    assert main([good, bad, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found[0]["contents"][0]["timing"]["samples"] == 300
+    assert "no column named" in found[1]["error"]

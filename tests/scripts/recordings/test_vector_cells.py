@@ -1,0 +1,96 @@
+"""Vectors and quaternions in one cell, as programs print them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from rigid_motion_batch.recordings import ReadingOptions, read_trajectories
+from rigid_motion_batch.recordings.vector_cells import expanded, flattened
+
+ROWS = np.random.default_rng(8).normal(size=(20, 7)).round(3)
+"""Positions and quaternions, not of length 1."""
+
+
+def csv(vector: str, *, separator: str = ",", decimal: str = ".", header: str = "Time;Position;Rotation") -> str:
+    """A log whose cells are written so: {} is what stands between the numbers."""
+    before, between, behind = re.split(r"[{}]", vector)
+
+    def cell(numbers: np.ndarray) -> str:
+        return before + between.join(str(x).replace(".", decimal) for x in numbers.tolist()) + behind
+
+    lines = [
+        separator.join((str(0.01 * row).replace(".", decimal), cell(numbers[:3]), cell(numbers[3:])))
+        for row, numbers in enumerate(ROWS)
+    ]
+    return "\n".join([header.replace(";", separator), *lines])
+
+
+@pytest.mark.parametrize(
+    ("vector", "separator", "decimal"),
+    [
+        ("({, })", ",", "."),
+        ('"({, })"', ",", "."),
+        ('"{, }"', ",", "."),
+        ('"{,}"', ",", "."),
+        ("({,})", ";", "."),
+        ("({, })", ";", "."),
+        ("({, })", ";", ","),
+        ("({; })", "\t", ","),
+        ("({, })", "\t", ","),
+        ('"{ }"', ",", "."),
+        ("[{ }]", ",", "."),
+    ],
+)
+def test_vectors_in_cells_are_read_however_they_are_written(write, vector, separator, decimal) -> None:
+    (trajectory,) = read_trajectories(write("log.csv", csv(vector, separator=separator, decimal=decimal))).trajectories
+    np.testing.assert_array_equal(trajectory.poses.positions, ROWS[:, :3])
+    np.testing.assert_array_equal(trajectory.poses.quaternions, ROWS[:, [6, 3, 4, 5]])
+
+
+def test_unreal_names_its_components(write) -> None:
+    rows = "".join(f'{row},"X={row}.5 Y=2 Z=-3","X=0.0 Y=0.0 Z=0.0 W=1.0"\n' for row in range(3))
+    (trajectory,) = read_trajectories(write("log.csv", "Time,Location,Rotation\n" + rows)).trajectories
+    assert trajectory.poses.positions.tolist() == [[0.5, 2, -3], [1.5, 2, -3], [2.5, 2, -3]]
+    assert trajectory.poses.quaternions.tolist() == [[1, 0, 0, 0]] * 3
+
+
+def test_times_in_quotes_may_have_a_decimal_comma(write) -> None:
+    rows = "".join(f'"{row},5","(0,1, 0,2, 0,3)","(0,0, 0,0, 0,0, 1,0)"\n' for row in range(3))
+    (trajectory,) = read_trajectories(write("log.csv", "Time,Position,Rotation\n" + rows)).trajectories
+    assert trajectory.times.tolist() == [0.5, 1.5, 2.5]
+    assert trajectory.poses.positions.tolist() == [[0.1, 0.2, 0.3]] * 3
+
+
+def test_several_bodies_and_other_cells_stay_apart(write) -> None:
+    header = "Time,Left Position,Left Rotation,Note,Right Position,Right Rotation"
+    row = '(1.0, 2.0, 3.0),(0, 0, 0, 1),"a, b",(4.0, 5.0, 6.0),(0, 0, 1, 0)'
+    source = write("log.csv", f"{header}\n0,{row}\n.1,{row}\n")
+    left, right = read_trajectories(f"{source}:*").trajectories
+    assert (left.name, left.poses.positions.tolist()) == ("Left", [[1, 2, 3]] * 2)
+    assert (right.name, right.poses.quaternions.tolist()) == ("Right", [[0, 0, 0, 1]] * 2)
+
+
+def test_three_numbers_in_a_cell_of_rotations_are_euler_angles_and_ask_for_their_order(write, refusal) -> None:
+    source = write("log.csv", "Time,Position,Rotation\n0,(0, 0, 0),(30, 0, 0)\n.1,(0, 0, 0),(30, 0, 0)\n")
+    assert refusal(source)[1].startswith("rotations are Euler angles here (Rotation.x, Rotation.y, Rotation.z), and")
+    (trajectory,) = read_trajectories(source, ReadingOptions(euler="YXZ", degrees=True)).trajectories
+    assert trajectory.poses.quaternions[0] == pytest.approx((np.cos(np.pi / 12), np.sin(np.pi / 12), 0, 0))
+
+
+def test_a_cell_that_lacks_a_number_is_told_with_its_line(write, refusal) -> None:
+    row = "(0, 0, 0),(0, 0, 0, 1)"
+    source = write("log.csv", f"Time,Position,Rotation\n0,{row}\n.1,(0, 0),(0, 0, 0, 1)\n")
+    line, _ = refusal(source)
+    assert line == 3
+
+
+@pytest.mark.parametrize("text", ['"a, b, c"', "(1, 2)", "()", "(1, 2, 3, 4, 5)", "1,2,3", '"0,1"'])
+def test_what_is_no_vector_has_no_names_of_its_own(text: str) -> None:
+    assert expanded(["t", "a", "b", "c", "d", "e"], f"0,{text}", ",") is None
+
+
+def test_what_is_no_vector_beside_one_keeps_to_its_cell() -> None:
+    assert flattened('0,(1, 2, 3),"a, b",(4, 5),', ",") == "0,1,2,3,a  b,(4  5),"
