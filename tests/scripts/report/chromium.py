@@ -80,8 +80,7 @@ class Browser:
     def open(
         self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True
     ) -> None:
-        """Open a page of so many pixels, and wait until it shows something."""
-        self.loaded = False
+        """Open a page of so many pixels, and wait until it is loaded."""
         phone = width < 600
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -89,10 +88,11 @@ class Browser:
         self.call("Emulation.setEmulatedMedia", features=[scheme, calm])
         self.call("Emulation.setScriptExecutionDisabled", value=not script)
         # A page that differs in the fragment alone would not be loaded anew.
-        self.call("Page.navigate", url="about:blank")
-        self.call("Page.navigate", url=address)
-        while not self.loaded:
-            self._receive()
+        for place in ("about:blank", address):
+            self.loaded = False
+            self.call("Page.navigate", url=place)
+            while not self.loaded:
+                self._receive()
 
     def run(self, expression: str) -> Any:
         """The value of an expression of JavaScript, awaited."""
