@@ -27,6 +27,7 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
 from rigid_motion_batch.recordings.figures import carrying, short_names
 
+from .joints import full_colour
 from .mesh import Mesh
 
 MOST_SEEN = 4_000_000
@@ -121,8 +122,8 @@ def _choice_data(
     rows = [motion.metrics[0] for motion in result.motions]
     body = clip.parents is not None
     largest = max(float(motion.errors[0].max()) for motion in result.motions)
-    joints = [motion.joint_errors.max(axis=1) for motion in result.motions if motion.joint_errors is not None]
-    by_joint = np.max(joints, axis=0) if joints else np.array([largest])
+    of_joints = [motion.joint_errors for motion in result.motions if motion.joint_errors is not None]
+    by_joint = np.max([errors.max(axis=1) for errors in of_joints], axis=0) if of_joints else np.zeros(1)
     keyed = len({row.keys for row in rows}) > 1 or rows[0].decimation != "uniform"
     return {
         "name": result.choice.name,
@@ -136,7 +137,7 @@ def _choice_data(
         "worst": largest,
         "factor": next(factor for factor in FACTORS if factor * largest <= SEEN_AS[body] * size or factor == 1),
         "joint": int(np.argmax(by_joint)),
-        "top": float(by_joint.max()),
+        "top": full_colour(of_joints) if of_joints else 0.0,
         "motions": [
             {
                 "modes": list(motion.modes),
