@@ -17,12 +17,11 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import count, groupby
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-from rigid_motion_batch.analysis.choices import Choice, Tolerance
-from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.results import ChoiceNumbers
 from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
 from rigid_motion_batch.cli.in_blender import blender_program
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
@@ -378,9 +377,9 @@ class _Run:
                     if task.step is steps.count_keys:
                         needed.append(values.read(KeysNeeded, folder / "needed"))
                     else:
-                        choices.append(_metrics_in(folder))
+                        choices.append(values.read(ChoiceNumbers, folder / "numbers"))
             if choices:
-                gathering.add(SimpleNamespace(facts=SimpleNamespace(name=name), choices=choices))
+                gathering.add(name, choices)
         try:
             numbers = gathering.numbers()
         except ValueError:
@@ -424,16 +423,6 @@ class _Run:
             "failures": self.outcome.failures,
             "tasks": {state.value: number for state, number in self.outcome.counts.items()},
         }
-
-
-def _metrics_in(folder: Path) -> SimpleNamespace:
-    """What was measured of a clip under a choice of keys, as a `ChoiceResult` without its arrays."""
-    plain = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    motions = [
-        SimpleNamespace(modes=tuple(one["modes"]), metrics=values.from_plain(tuple[Metrics, ...], one["metrics"]))
-        for one in plain["motions"]
-    ]
-    return SimpleNamespace(choice=values.from_plain(Choice, plain["choice"]), motions=motions)
 
 
 def _explain(plan: ComparisonPlan, store: Store) -> int:
