@@ -45,6 +45,6 @@ def imported(room: str) -> tuple[set[str], set[str]]:
 def test_a_worker_needs_numpy_and_blender_alone(room: str) -> None:
     packages, parts = imported(room)
     assert packages <= ALLOWED
-    drawing = {f"rigid_motion_batch.{name}" for name in ("report", "pipeline", "cli", "comparison", "workplan")}
+    drawing = {f"rigid_motion_batch.{name}" for name in ("report", "pipeline", "cli")}
     assert not parts & drawing
     assert room != "analysis" or "bpy" not in packages

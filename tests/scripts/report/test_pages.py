@@ -27,8 +27,8 @@ from rigid_motion_batch.report.colours import BACKGROUNDS, MODE_COLOURS, OTHER_C
 from rigid_motion_batch.report.numbers import ERROR, KEYS
 from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of
 from rigid_motion_batch.report.tables import grids
-from tests.scripts.comparison.bodies import swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.runs import MODES, result_of
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
