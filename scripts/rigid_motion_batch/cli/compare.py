@@ -106,6 +106,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         shared=options.shared,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
+        beside_decimate=bool(blender),
         stage=stage,
         every_film=options.films == ALL,
         about=About(f"{manifest()['name']} {manifest()['version']}", command, details),
@@ -194,17 +195,18 @@ def _blender(options: argparse.Namespace) -> str:
     Refused, ExecutorError, SubjectError
         Where one is needed that there is not, with the way out.
     """
+    read = next((one for one in options.inputs if _suffix(one) in IN_BLENDER), None)
+    if not (options.blender or blender_program() or find_spec("bpy")):
+        if options.stage or read:
+            raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
+        return ""
+    on_screen = options.stage and options.engine != "cycles" and not options.explain
+    if on_screen and (missing := missing_for_rendering()):
+        raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
         from rigid_motion_batch.pipeline.blender import version_of
 
         return version_of(options.blender)
-    read = next((one for one in options.inputs if _suffix(one) in IN_BLENDER), None)
-    if not blender_program() and not find_spec("bpy"):
-        if options.stage or read:
-            raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
-        return ""
-    if options.stage and options.engine != "cycles" and not blender_program() and (missing := missing_for_rendering()):
-        raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.stage and options.object not in MODELS:
         # Only here is Blender loaded, which takes longer than all else before the work begins.
         from rigid_motion_batch.scenes.subject import load_subject
