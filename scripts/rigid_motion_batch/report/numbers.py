@@ -97,8 +97,8 @@ class Numbers:
 
     def mean(self, clip: int | None = None) -> np.ndarray:
         """The numbers of a clip, or the geometric means over those that have them, shape (measures, choices, modes)."""
-        if clip is not None:
-            return self.values[:, clip]
+        if clip is not None or len(self.clips) == 1:
+            return self.values[:, clip or 0]
         return np.stack([geometric_mean(of_clips) for of_clips in self.values])
 
     def deciding(self, choice: int) -> int:

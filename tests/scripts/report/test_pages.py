@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, KeysOfBody
 from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import Metrics
@@ -251,6 +252,14 @@ def test_a_page_is_made_of_any_choices_and_modes(tmp_path: Path, choices, modes)
     page = written(tmp_path / "report.html", result_of(swinging_clip(), choices, modes))
     assert len(page.texts["h1"]) >= 1
     assert len([one for one in page.attributes("input", "name") if one == "choice"]) == len(choices)
+
+
+@pytest.mark.parametrize("size", [1e30, 1e-30, 0.0])
+def test_a_page_is_made_of_motions_of_any_size(tmp_path: Path, size: float) -> None:
+    swing = swinging_clip()
+    poses = Poses(size * swing.poses.positions, swing.poses.quaternions if size else np.eye(4)[[0] * len(swing.times)])
+    page = written(tmp_path / "report.html", result_of(replace(swing, poses=poses)))
+    assert "nan" not in all_text(page).lower().split()
 
 
 def test_a_clip_too_short_for_a_choice_is_said_to_be(tmp_path: Path) -> None:
