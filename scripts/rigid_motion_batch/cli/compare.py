@@ -27,6 +27,7 @@ from rigid_motion_batch.cli.in_blender import blender_program
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
+from rigid_motion_batch.pipeline.bundle import PROGRESS, FarmProgress
 from rigid_motion_batch.pipeline.comparison import (
     DECIMATED,
     IN_BLENDER,
@@ -275,7 +276,7 @@ class _Run:
     ) -> None:
         self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
         self.progress = progress
-        self.share = Share(*options.part, stages=frozenset({options.only})) if options.only else Share()
+        self.share = Share(frozenset({options.only}), *options.part) if options.only else Share()
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = True
@@ -318,7 +319,8 @@ class _Run:
 
     def _do(self, title: str, tasks: Plan) -> None:
         with self.progress.stage(title, 1.0) as stage:
-            shown = _Shown(self.progress, stage, self.options.quiet)
+            on_farm = os.environ.get(PROGRESS) == "openjd"
+            shown = FarmProgress() if on_farm else _Shown(self.progress, stage, self.options.quiet)
             outcome = run(
                 tasks,
                 self.store,
@@ -327,7 +329,7 @@ class _Run:
                 share=self.share,
                 blender=self.options.blender or "",
             )
-        self.page = shown.page
+        self.page = getattr(shown, "page", True)
         failures = self.outcome.failures | outcome.failures
         self.outcome = self.outcome.continued(outcome)
         self.outcome.failures = failures
