@@ -14,6 +14,8 @@ from typing import Any, Self, TextIO
 
 from rigid_motion_batch.command_line import printable
 
+BAR_COLUMNS = 24
+
 INTERVAL = 10.0
 """Seconds between two plain lines."""
 
@@ -71,6 +73,7 @@ class Progress:
         self._stage: Stage | None = None
         self._bar: Any = None
         self._started = self._shown_at = 0.0
+        self._shown: float | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -81,18 +84,17 @@ class Progress:
     @contextmanager
     def stage(self, title: str, total: float) -> Iterator[Stage]:
         """Open a stage of `total` steps."""
-        self._started = self._clock()
+        self._started = self._shown_at = self._clock()
+        self._shown = None
         self._stage = stage = Stage(title, total, self._redraw)
         if total and not self._quiet:
             self._bar = _bar(self._stream, self._line)
             if self._bar:
                 self._bar.start()
-            self._redraw(now=True)
         try:
             yield stage
-            stage.done, stage.doing = total, ""
-            if total:
-                self._redraw(now=True)
+            stage.done, stage.doing = stage.total, ""
+            self._redraw(now=self._shown not in (None, 1.0))
         except KeyboardInterrupt:
             if self._bar:
                 self._bar.live.transient = False
@@ -102,10 +104,10 @@ class Progress:
                 self._bar.stop()
             self._bar = self._stage = None
 
-    def note(self, text: str) -> None:
-        """Write a line of its own, above the bar."""
+    def note(self, text: str, style: str = "") -> None:
+        """Write a line of its own, above the bar; on a terminal in a style of rich, such as "red"."""
         if self._bar:
-            self._bar.console.print(_fitting(text, self._stream), markup=False, highlight=False, soft_wrap=True)
+            self._bar.console.print(_fitting(text, self._stream), markup=False, style=style)
         elif self._stream is not None:
             self._stream.write(_fitting(text, self._stream) + "\n")
             self._stream.flush()
@@ -114,7 +116,7 @@ class Progress:
         if self._bar:
             self._bar.update(self._bar.task_ids[0], completed=self._stage.fraction)
         elif not self._quiet and (now or self._clock() - self._shown_at >= INTERVAL):
-            self._shown_at = self._clock()
+            self._shown_at, self._shown = self._clock(), self._stage.fraction
             self._stream.write(f"{self._stage.fraction:4.0%}  {self._line()}\n")
             self._stream.flush()
 
@@ -161,14 +163,17 @@ def _bar(stream: TextIO, line: Callable[[], str]) -> Any:
         def render(self, task: object) -> Text:
             return Text(line(), overflow="crop", no_wrap=True)
 
-    columns = (TaskProgressColumn(), BarColumn(24), Line(Column(ratio=1, no_wrap=True)))
+    console = Console(file=stream, soft_wrap=True, highlight=False)
+    # Room for what a terminal shows of Ctrl-C; after the last column it would begin another line.
+    most = max(1, console.width - BAR_COLUMNS - 10)
+    columns = (TaskProgressColumn(), BarColumn(BAR_COLUMNS), Line(Column(no_wrap=True, max_width=most)))
     bar = Progress(
         *columns,
-        console=Console(file=stream, soft_wrap=True),
+        console=console,
         transient=True,
-        expand=True,
-        redirect_stdout=False,
-        redirect_stderr=False,
+        # What is printed meanwhile stands above the bar, unless it goes elsewhere.
+        redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
+        redirect_stderr=sys.stderr is stream,
     )
     bar.add_task("", total=1.0)
     return bar

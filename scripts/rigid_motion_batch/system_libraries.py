@@ -68,3 +68,16 @@ def way_out(error: str, script: str = "compare.py") -> str:
         lines.append("Run this by `python scripts/bootstrap.py`, which installs it,")
         lines.append(f"or inside Blender: blender --background --python scripts/{script} -- INPUT")
     return "\n".join(lines)
+
+
+def without_blender(what: str, *, films: bool) -> str:
+    """What to say where a comparison needs Blender ("Videos are made by") and there is none, in a few lines."""
+    here = ".".join(map(str, sys.version_info[:2]))
+    fits = here in BLENDER_PYTHONS
+    python = f"Python {' or '.join(BLENDER_PYTHONS)}"
+    brings = "python scripts/bootstrap.py compare" if CHECKOUT else "pip install 'rigid-motion[blender]'"
+    lines = [
+        f"{what} Blender, which is not here{'' if fits else f', and has no wheel for Python {here}'}.",
+        f"  `{brings}`{'' if fits else f' with {python}'} brings it; --blender PROGRAM uses one that is installed.",
+    ]
+    return "\n".join([*lines, *(["  --no-video does without: numbers and report."] if films else [])])

@@ -106,19 +106,27 @@ def test_a_log_gets_a_plain_line_every_ten_seconds_at_most() -> None:
             clock.now += 0.3
             stage.advance(1, f"frame {frame + 1}")
     lines = log.getvalue().splitlines()
-    assert [line[:4] for line in lines] == ["  0%", " 34%", " 68%", "100%"]
-    assert lines[1] == " 34%  0:10, 0:20 left  Rendering, frame 34"
+    assert [line[:4] for line in lines] == [" 34%", " 68%", "100%"]
+    assert lines[0] == " 34%  0:10, 0:20 left  Rendering, frame 34"
     assert lines[-1] == "100%  done in 0:30  Rendering"
     assert "\r" not in log.getvalue()
     assert "\x1b" not in log.getvalue()
 
 
+def test_what_is_soon_done_leaves_no_line_in_a_log() -> None:
+    log = io.StringIO()
+    with Progress(log) as progress, progress.stage("Rendering", 2) as stage:
+        stage.advance()
+    assert log.getvalue() == ""
+
+
 def test_blenders_own_python_has_no_rich_and_shows_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rich.console", None)
-    terminal = Terminal()
-    with Progress(terminal) as progress, progress.stage("Baking", 1):
-        pass
-    assert terminal.getvalue() == "  0%  0:00  Baking\n100%  done in 0:00  Baking\n"
+    clock, terminal = Clock(), Terminal()
+    with Progress(terminal, clock=clock) as progress, progress.stage("Baking", 2) as stage:
+        clock.now += 20.0
+        stage.advance()
+    assert terminal.getvalue() == " 50%  0:20, 0:20 left  Baking\n100%  done in 0:20  Baking\n"
 
 
 def test_a_terminal_is_not_redrawn_faster_than_an_eye_can_follow() -> None:

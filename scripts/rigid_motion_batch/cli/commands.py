@@ -41,12 +41,12 @@ RESEARCH = {
 
 COMMANDS = {
     "compare": Command("compare", "compare interpolation modes on recordings: numbers, charts, videos"),
-    "inspect": Command("inspect", "say what is in a recording, and what looks wrong"),
+    "inspect": Command("inspect", "look into recordings: bodies, units, axes, rate, and what looks wrong"),
     "reduce": Command("reduce", "keep the few keys that a motion needs, in .blend files and of recordings"),
     "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
-    "tasks": Command(".workplan.__main__", "list or run single tasks of a comparison"),
+    "tasks": Command("tasks", "list what a comparison did, and what failed"),
     "examples": Command("examples", "make small complete cases to begin with (in a checkout)"),
     "build": Command("build_extension", "build the zip that Blender installs"),
     "completion": Command("completion", "have a shell complete commands and options"),
@@ -158,8 +158,8 @@ Rigid-motion interpolation for keyframes, measured, baked, streamed and rendered
 
 examples:
   {INSTALLED} compare                                  the motions that come with the program
+  {INSTALLED} inspect hand.csv
   {INSTALLED} compare hand.csv --axes unity
   {INSTALLED} compare take.csv --tolerance 5mm --no-video
-  {INSTALLED} inspect take.csv
   {INSTALLED} bake shot.blend
   {INSTALLED} reduce shot.blend --tolerance 5mm"""

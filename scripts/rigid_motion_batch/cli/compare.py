@@ -1,255 +1,456 @@
 """Compare interpolation modes on recorded trajectories: the program that people run.
 
-Its options are in `comparison.options`, its tasks in `comparison.planning`; here they are done, in an output folder.
+Its options are in `compare_options`, its tasks in `pipeline.comparison`; here they are done, in an output folder, and
+what they come to is shown.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import sys
-import time
+import webbrowser
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from itertools import count, groupby
+from pathlib import Path
+from typing import Any
 
-from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, parse
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.results import ChoiceNumbers
+from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
+from rigid_motion_batch.cli.in_blender import blender_program
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
-from rigid_motion_batch.comparison import steps
-from rigid_motion_batch.comparison.explaining import explain_comparison
-from rigid_motion_batch.comparison.planning import (
-    Wanted,
-    comparison_tasks,
-    look_into,
-    plan_of,
-    reading_tasks,
-    without_films,
+from rigid_motion_batch.pipeline import comparison_steps as steps
+from rigid_motion_batch.pipeline import values
+from rigid_motion_batch.pipeline.bundle import PROGRESS, FarmProgress
+from rigid_motion_batch.pipeline.comparison import (
+    DECIMATED,
+    IN_BLENDER,
+    JOINT_METRICS,
+    KEYS_NEEDED,
+    METRICS,
+    Comparison,
+    ComparisonPlan,
 )
-from rigid_motion_batch.comparison.report.pages import Settings
-from rigid_motion_batch.comparison.steps import DECIMATED, FILM, JOINT_METRICS, KEYS_NEEDED, METRICS, REPORT
-from rigid_motion_batch.comparison.version import blender_version, program_version
-from rigid_motion_batch.places import CHECKOUT, manifest
-from rigid_motion_batch.progress import Progress
-from rigid_motion_batch.scenes.settings import SubjectError
+from rigid_motion_batch.pipeline.comparison_steps import PAGE, About
+from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor, processors
+from rigid_motion_batch.pipeline.explain import explain
+from rigid_motion_batch.pipeline.performing import Executor, ExecutorError
+from rigid_motion_batch.pipeline.running import Outcome, Plan, Share, State, Survey, run
+from rigid_motion_batch.pipeline.running import Progress as Listener
+from rigid_motion_batch.pipeline.steps import OWN, Task
+from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
+from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
+from rigid_motion_batch.progress import Progress, Stage
+from rigid_motion_batch.recordings import TrajectoryError
+from rigid_motion_batch.recordings.clip_reading import folder_names
+from rigid_motion_batch.recordings.reading import split_source
+from rigid_motion_batch.report import Gathering, Numbers, Verdict, verdict
+from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import report
-from rigid_motion_batch.system_libraries import missing_for_rendering, way_out
-from rigid_motion_batch.workplan import (
-    Executor,
-    ExecutorError,
-    FolderInUse,
-    ManifestError,
-    Outcome,
-    Plan,
-    ProcessExecutor,
-    SerialExecutor,
-    State,
-    Workspace,
-    run,
-)
-from rigid_motion_batch.workplan.ownership import OutputError, require_free, require_same_inputs
-from rigid_motion_batch.workplan.status import Status
+from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
+
+from . import terminal
 
 PROGRAM = program_of(SCRIPT)
+
+TABLES = (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED)
+
+RECORD = "comparison.json"
+"""What a folder is the comparison of, among the files of the store: its recordings, as they count from there."""
+
+
+class Refused(Exception):
+    """Why nothing is done, and the way out."""
 
 
 def main(arguments: list[str]) -> int:
     """Run a comparison, and return the exit code."""
     options = parse(arguments)
-    command = as_typed(PROGRAM, arguments, options.inputs)
-    needs_screen = not (options.explain or options.no_video or options.engine == "cycles")
-    missing = missing_for_rendering() if needs_screen else None
-    if missing:
-        print(f"{PROGRAM}: {way_out(missing)}\nOr go without videos: --no-video", file=sys.stderr)
-        return 2
     try:
-        if options.explain:
-            asked = wanted(options, command)
-            reading = reading_tasks(options.inputs, options.axes, options.reading)
-            print(*explain_comparison(options.output, reading, asked, force=options.force), sep="\n")
-            return 0
-        if not options.no_video:
-            require_subject(options.object)
-        version = program_version()
-        with (
-            Progress() as progress,
-            Workspace(options.output) as workspace,
-            _executor(options, progress, version) as executor,
-        ):
-            return _Run(options, workspace, executor, progress, command, version).run()
-    except ImportError as error:
-        print(f"{PROGRAM}: {error}\n{way_out(str(error))}", file=sys.stderr)
-    except (SubjectError, FolderInUse, ManifestError, ExecutorError, OutputError) as error:
-        complain(PROGRAM, error)
+        blender = _blender(options)
+        comparison = comparison_of(options, as_typed(PROGRAM, arguments, options.inputs), blender)
+        output = options.output or free_folder(options.inputs)
+        if not options.overwrite:
+            _require_same_comparison(output, options.inputs)
+        with Store(output, alone=not options.only, overwrite=options.overwrite) as store:
+            plan = ComparisonPlan(comparison, store)
+            if options.explain:
+                return _explain(plan, store)
+            with Progress(quiet=options.quiet) as progress, _executor(options, store, progress) as executor:
+                return _Run(options, plan, executor, progress).run()
+    except (SubjectError, FolderInUse, ExecutorError, OutputError, Refused) as error:
+        print(*(f"{PROGRAM}: {error}".splitlines()), sep="\n", file=sys.stderr)
     except OSError as error:
-        complain(PROGRAM, error, options.output)
+        complain(PROGRAM, error, options.output or "")
     return 2
 
 
-def require_subject(wanted: str) -> None:
-    """Make sure that the object to show can be had.
+def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Comparison:
+    """What is wanted by these options of that command, with a Blender of that version."""
+    stage, details = options.stage, {"Blender": blender} if blender else {}
+    if stage:
+        speed = "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower"
+        details["Videos"] = f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s"
+        details["Speed of the videos"] = speed
+    return Comparison(
+        sources=tuple(options.inputs),
+        choices=tuple(options.choices),
+        modes=options.modes.names,
+        axes=options.axes,
+        reading=options.reading,
+        radii=options.radius,
+        shared=options.shared,
+        count_keys=options.decimate == "adaptive",
+        fit=options.fit,
+        beside_decimate=bool(blender),
+        stage=stage,
+        every_film=options.films == ALL,
+        about=About(f"{manifest()['name']} {manifest()['version']}", command, details),
+        blender=blender,
+    )
+
+
+# -- where it is done -------------------------------------------------------------------------------------------------
+
+
+def free_folder(sources: list[str]) -> Path:
+    """`renders/NAME`, by the first recording, with a number where that holds another comparison or anything else."""
+    if sources == own_recordings():
+        name = "comparison"
+    else:
+        file, _, body = os.path.basename(sources[0]).partition(":")
+        name = Path(file).stem + (f"-{body}" if body not in ("", "*") else "")
+    (name,) = folder_names([name])
+    numbered = (output_folder(name if number == 1 else f"{name}-{number}") for number in count(1))
+    return next(folder for folder in numbered if _is_free(folder) or _is_same(folder, sources))
+
+
+def _is_free(folder: Path) -> bool:
+    return not folder.exists() or (folder.is_dir() and not any(folder.iterdir()))
+
+
+def _is_same(folder: Path, sources: list[str]) -> bool:
+    """Whether a folder holds the comparison of some of these recordings."""
+    held = _held(folder)
+    return held is not None and (not held or not held.keys().isdisjoint(_places(sources, folder)))
+
+
+def _held(folder: Path) -> dict[str, str] | None:
+    """The recordings that a folder holds the comparison of, and their digests; None where it holds none."""
+    if not (folder / OWN).is_dir():
+        return None
+    try:
+        return dict(json.loads((folder / OWN / RECORD).read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return {}
+
+
+def _places(sources: list[str], folder: Path) -> list[str]:
+    """The sources as they count from a folder, so that both can be moved."""
+    here = os.path.abspath(folder)
+    return [os.path.relpath(source, here) if Path(source).drive == folder.drive else source for source in sources]
+
+
+def _require_same_comparison(output: Path, sources: list[str]) -> None:
+    """Raise OutputError where a folder holds the comparison of other recordings."""
+    held = _held(output)
+    if held and not _is_same(output, sources) and not {*held.values()} & {*_digests(sources, Store(output)).values()}:
+        names = ", ".join(sorted(Path(one).name for one in held)[:3]) + (" and more" if len(held) > 3 else "")
+        raise OutputError(
+            f"{_short(output)} holds another comparison, of {names}; choose another folder, such as --output "
+            f"{_short(free_folder(sources))}, or replace it with --overwrite"
+        )
+
+
+def _short(path: Path) -> str:
+    """A path as one would type it here."""
+    path, here = path.absolute(), Path.cwd()
+    return os.fspath(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
+def _digests(sources: list[str], store: Store) -> dict[str, str]:
+    """Source to the digest of its file, of those that are there."""
+    found = {}
+    for source in sources:
+        with suppress(TrajectoryError):
+            found[source] = store.input(split_source(source)[0]).sha256
+    return found
+
+
+# -- what it needs ----------------------------------------------------------------------------------------------------
+
+
+def _blender(options: argparse.Namespace) -> str:
+    """The version of the Blender that films and reads; empty where none is needed, and there is none.
 
     Raises
     ------
-    SubjectError
-        Where it cannot.
-    ImportError
-        Where there is no Blender to ask.
+    Refused, ExecutorError, SubjectError
+        Where one is needed that there is not, with the way out.
     """
-    # Only here is Blender loaded, which takes longer than all else before the work begins.
-    from rigid_motion_batch.scenes.subject import load_subject
+    read = next((one for one in options.inputs if _suffix(one) in IN_BLENDER), None)
+    if not (options.blender or blender_program() or find_spec("bpy")):
+        if options.stage or read:
+            raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
+        return ""
+    on_screen = options.stage and options.engine != "cycles" and not options.explain
+    if on_screen and (missing := missing_for_rendering()):
+        raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
+    if options.blender:
+        from rigid_motion_batch.pipeline.blender import version_of
 
-    load_subject(wanted)
+        return version_of(options.blender)
+    if options.stage and options.object not in MODELS:
+        # Only here is Blender loaded, which takes longer than all else before the work begins.
+        from rigid_motion_batch.scenes.subject import load_subject
+
+        load_subject(options.object)
+    try:
+        return version("bpy")
+    except PackageNotFoundError:
+        import bpy
+
+        return ".".join(map(str, bpy.app.version))
 
 
-def _executor(options: argparse.Namespace, progress: Progress, version: str) -> Executor:
+def _suffix(source: str) -> str:
+    """Of the file of a source: ".fbx" of walk.fbx:Hand."""
+    lower = source.lower()
+    return next((end for end in IN_BLENDER if lower.endswith(end) or f"{end}:" in lower), "")
+
+
+def _executor(options: argparse.Namespace, store: Store, progress: Progress) -> Executor:
     """Who does the work. Raises ExecutorError where Dask is wanted, and is not there."""
     if options.scheduler is None:
-        return SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs)
+        return SerialExecutor() if options.jobs == 0 else ProcessExecutor(options.jobs or processors())
     try:
-        from rigid_motion_batch.workplan.dask_executor import DaskExecutor
+        from rigid_motion_batch.pipeline.dask import DaskExecutor
     except ImportError as error:
-        way_out = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
-        raise ExecutorError(f"--scheduler: {error}; `{way_out}` installs it") from None
-    return DaskExecutor(
-        options.scheduler,
-        options.output,
-        identify=f"{steps.__name__}:{steps.identify.__name__}",
-        version=version,
-        note=lambda text: progress.note(f"{PROGRAM}: {text}"),
-    )
+        way = "python scripts/bootstrap.py dask" if CHECKOUT else "pip install 'rigid-motion[farm]'"
+        raise ExecutorError(f"--scheduler: {error}; `{way}` installs it") from None
+    return DaskExecutor(options.scheduler, store.scratch, lambda text: progress.note(f"{PROGRAM}: {text}"))
+
+
+# -- doing it ---------------------------------------------------------------------------------------------------------
+
+
+class _Shown(Listener):
+    """A run of tasks as a stage on the terminal."""
+
+    def __init__(self, progress: Progress, stage: Stage, quiet: bool) -> None:
+        self._progress, self._stage, self._quiet = progress, stage, quiet
+        self.page = True
+        """Whether the page is there."""
+
+    def begin(self, total: float) -> None:
+        self._stage.total = total
+
+    def reach(self, done: float, doing: str, counts: Mapping[str, tuple[int, int]]) -> None:
+        counted = (f"{unit} {number} of {total}" for unit, (number, total) in counts.items())
+        self._stage.reach(done, ", ".join(filter(None, (doing, *counted))))
+
+    def note(self, text: str) -> None:
+        if not self._quiet:
+            self._progress.note(text)
+
+    def finish(self, task: Task, state: State, problem: str) -> None:
+        if task.name == PAGE:
+            self.page = state in (State.DONE, State.UP_TO_DATE)
+        if problem:
+            self._progress.note(f"{PROGRAM}: {problem}", "red")
 
 
 class _Run:
-    """A comparison in its output folder."""
+    """A comparison in its opened folder."""
 
     def __init__(
-        self,
-        options: argparse.Namespace,
-        workspace: Workspace,
-        executor: Executor,
-        progress: Progress,
-        command: str,
-        version: str,
+        self, options: argparse.Namespace, plan: ComparisonPlan, executor: Executor, progress: Progress
     ) -> None:
-        self.options, self.workspace, self.executor, self.progress = options, workspace, executor, progress
-        self.command, self.version = command, version
+        self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
+        self.progress = progress
+        self.share = Share(frozenset({options.only}), *options.part) if options.only else Share()
+        self.notes: list[str] = []
+        self.outcome = Outcome()
+        self.page = True
 
     def run(self) -> int:
-        """Read the recordings, see what there is to do, do it, and say what came of it."""
-        started = time.perf_counter()
-        options = self.options
-        reading = reading_tasks(options.inputs, options.axes, options.reading)
-        first = plan_of(list({task.name: task for task in reading}.values()), self.version)
-        require_same_inputs(first, self.workspace, force=options.force)
-        require_free(
-            first, self.workspace, (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED, REPORT), force=options.force
-        )
-        read = self._do(first, "Reading")
-        if read.interrupted:
-            return 130
-        there = [task for task in reading if read.states[task.name].there]
-        if read.problem or not there:
+        """Read the recordings, see what there is to do, do it, and say what it came to."""
+        report(summary="Stopped; there is no new report yet. The same command goes on from here.")
+        if not self.options.only or self.options.only == "read":
+            self._do("Reading", self.plan.reading)
+            if self.outcome.interrupted or self.outcome.problem or self.options.only:
+                return self._end()
+        notes = self._look_into()
+        warnings = [
+            "; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out)))
+            for study in self.plan.studies
+            for warning in study.warnings
+        ]
+        for note in dict.fromkeys([*notes, *warnings]):
+            self._note(note, "yellow" if note in warnings else "")
+        if not self.plan.studies:
+            self._say_nothing_to_compare()
             return 2
-        try:
-            found = look_into(self.workspace.output, there, options.choices, options.radius)
-        except Exception:  # What was read before may be damaged in any way: it is read again.
-            self.workspace.withdraw_damaged(first.order) or self.workspace.withdraw(first.order)
-            read = self._do(first, "Reading")
-            found = look_into(self.workspace.output, there, options.choices, options.radius)
-        del first, reading  # Of ten thousand clips all of this is a third of the memory.
-        for note in found.notes:
-            self.progress.note(note)
-        if not found.studies:
-            higher = "--budget" if options.budget else "--rates"
-            self.progress.note(f"{PROGRAM}: every clip is too short for two keys at these rates; give higher {higher}")
-            return 2
-        asked = wanted(options, self.command)
-        for note in filter(None, (study.left_out(asked.stage) for study in found.studies if asked.stage)):
-            self.progress.note(note)
-        for note in filter(None, (study.not_decimated for study in found.studies)):
-            self.progress.note(note)
-        tasks = comparison_tasks(found.studies, there, asked)
-        del there, found
-        plan = plan_of(tasks, self.version)
-        del tasks
-        require_free(plan, self.workspace, force=options.force)
-        for table in (JOINT_METRICS, DECIMATED, KEYS_NEEDED):
-            if table not in plan.tasks:
-                # What an earlier run found must not pass for a finding of this.
-                (options.output / table).unlink(missing_ok=True)
-        if asked.stage and self._has_films_to_make(plan):
+        if self.options.only:
+            self._do(self.options.only.capitalize(), self.plan.tasks)
+            return self._end()
+        self._require_tolerances()
+        digests = _digests(self.options.inputs, self.store)
+        self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
+        self.store.withdraw({*TABLES} - self.plan.tables)  # What an earlier run found is no finding of this.
+        if self.plan.comparison.stage and Survey.of(self.plan.tasks, self.store).amounts["frame"]:
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
-            measured = self._do(plan_of(without_films(plan.tasks.values()), self.version), "Measuring")
-            if measured.interrupted or measured.problem:
-                return 130 if measured.interrupted else 2
-            page = self.workspace.output / REPORT
-            self.progress.note(f"All numbers are there, and films come as they are made: {page}")
-        outcome = self._do(plan, "Filming" if asked.stage else "Comparing")
-        outcome.states |= read.states
-        self._say(outcome, time.perf_counter() - started)
-        return 130 if outcome.interrupted else 2 if outcome.problem else int(State.FAILED in outcome.states.values())
+            self._do("Measuring", lambda: self.plan.tasks(films=False))
+            if self.outcome.interrupted or self.outcome.problem:
+                return self._end()
+            self._show_numbers()
+            report(summary="Stopped; the report holds what was ready. The same command goes on from here.")
+            report(written=os.fspath(self.store.output / PAGE))
+            self._note(f"All numbers are there, and films come as they are made: {self.store.output / PAGE}")
+            self._do("Filming", self.plan.tasks)
+        else:
+            self._do("Comparing", self.plan.tasks)
+            self._show_numbers()
+        return self._end()
 
-    def _has_films_to_make(self, plan: Plan) -> bool:
-        films = [name for name, task in plan.tasks.items() if any(path.endswith(FILM) for path in task.outputs)]
-        status = Status(plan, self.workspace.manifest, self.workspace.output, force=self.options.force)
-        return any(map(status.reasons, films))
-
-    def _do(self, plan: Plan, title: str) -> Outcome:
-        outcome = run(
-            plan,
-            self.workspace,
-            self.executor,
-            force=self.options.force,
-            progress=self.progress,
-            title=title,
-            describe=lambda problem: f"{PROGRAM}: {problem}",
-        )
-        if outcome.problem:
-            self.progress.note(
-                f"{PROGRAM}: {outcome.problem}; nothing that is done is lost: put that right, and run the same "
-                "command again"
+    def _do(self, title: str, tasks: Plan) -> None:
+        with self.progress.stage(title, 1.0) as stage:
+            on_farm = os.environ.get(PROGRESS) == "openjd"
+            shown = FarmProgress() if on_farm else _Shown(self.progress, stage, self.options.quiet)
+            outcome = run(
+                tasks,
+                self.store,
+                self.executor,
+                progress=shown,
+                share=self.share,
+                blender=self.options.blender or "",
             )
-        return outcome
+        self.page = getattr(shown, "page", True)
+        failures = self.outcome.failures | outcome.failures
+        self.outcome = self.outcome.continued(outcome)
+        self.outcome.failures = failures
 
-    def _say(self, outcome: Outcome, seconds: float) -> None:
-        """What came of it, and last the path of the report."""
-        work = rendering = 0.0
-        for record in map(self.workspace.manifest.get, outcome.of(State.DONE)):
-            if record:
-                work, rendering = work + record.seconds, rendering + record.facts.get("rendering", 0.0)
-        share = f", {rendering:.1f} s ({rendering / work:.0%}) of them Blender's rendering" if rendering else ""
-        lines = [f"{seconds:.1f} s in all; {work:.1f} s of work{share}.", f"Tasks: {outcome}."]
-        page = self.workspace.output / REPORT
-        if outcome.interrupted:
-            holds = "the report holds what was ready" if outcome.states[REPORT].there else "there is no new report yet"
-            lines.append(f"Stopped; {holds}. The same command goes on from here.")
+    def _look_into(self) -> list[str]:
+        """See what was read. What is damaged is read again."""
+        try:
+            return self.plan.look_into()
+        except Exception:
+            for task in self.plan.reading():
+                if not self.store.result(task.key, thoroughly=True):
+                    self.store.discard(task.key)
+            self._do("Reading", self.plan.reading)
+            return self.plan.look_into()
+
+    def _note(self, text: str, style: str = "") -> None:
+        self.notes.append(text)
+        if not self.options.quiet:
+            self.progress.note(text, style)
+
+    def _say_nothing_to_compare(self) -> None:
+        if not self.outcome.failures:
+            higher = "--budget" if self.options.budget else "--rates"
+            complain(PROGRAM, f"every clip is too short for two keys at these rates; give higher {higher}")
+
+    def _require_tolerances(self) -> None:
+        """Raise Refused where a tolerance is larger than the motion of every clip."""
+        for choice in self.plan.comparison.choices:
+            if isinstance(choice, Tolerance) and (problem := self._too_large(choice)):
+                raise Refused(problem)
+
+    def _too_large(self, choice: Tolerance) -> str:
+        problem = ""
+        for study in self.plan.studies:
+            clip = study.clip.read(self.store.folder_of(study.reader))
+            try:
+                choice.require_within(clip, self.plan.comparison.radii.rigid)
+                return ""
+            except ValueError as error:
+                problem = str(error)
+        return problem
+
+    # -- saying it ----------------------------------------------------------------------------------------------------
+
+    def _show_numbers(self) -> None:
+        if self.options.quiet or self.options.json:
+            return
+        numbers, said = self._numbers()
+        if numbers:
+            terminal.show(terminal.table_of(terminal.lines_of(numbers), len(numbers.clips)), str(said))
+
+    def _numbers(self) -> tuple[Numbers | None, Verdict | None]:
+        """All numbers that there are, and what they come to."""
+        gathering, needed = Gathering(), []
+        for name, tasks in groupby(self._measuring(), key=lambda task: task.parameters.clip.name):
+            choices = []
+            for task in tasks:
+                folder = self.store.folder_of(task.key)
+                with suppress(OSError, ValueError, KeyError):  # What could not be made.
+                    if task.step is steps.count_keys:
+                        needed.append(values.read(KeysNeeded, folder / "needed"))
+                    else:
+                        choices.append(values.read(ChoiceNumbers, folder / "numbers"))
+            if choices:
+                gathering.add(name, choices)
+        try:
+            numbers = gathering.numbers()
+        except ValueError:
+            return None, None
+        return numbers, verdict(numbers, needed)
+
+    def _measuring(self) -> Iterator[Task]:
+        return (task for task in self.plan.tasks(films=False) if task.step in (steps.measure, steps.count_keys))
+
+    def _end(self) -> int:
+        """Say what came of it, and last the path of the report; the exit code."""
+        outcome, page = self.outcome, self.store.output / PAGE
+        there = self.page and page.exists() and not self.options.only
         report(ended=True)
-        for line in lines:
-            print(line, file=sys.stderr)
-        if outcome.states[REPORT].there:
+        if outcome.problem:
+            complain(PROGRAM, f"{outcome.problem}; nothing that is done is lost: put that right, and run this again")
+        if outcome.failures and not self.options.quiet:
+            print(f"{PROGRAM}: {len(outcome.failures)} failed, as said above", file=sys.stderr)
+        if outcome.interrupted:
+            holds = "the report holds what was ready" if there else "there is no new report yet"
+            print(f"Stopped; {holds}. The same command goes on from here.", file=sys.stderr)
+        code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(outcome.failures))
+        if self.options.json:
+            print(json.dumps(self._as_data(page if there else None, code), indent=1, ensure_ascii=False), flush=True)
+        elif there:
             print(path_line(page), flush=True)
+        if there and self.options.open:
+            webbrowser.open(page.absolute().as_uri())
+        return code
+
+    def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
+        numbers, said = self._numbers()
+        return {
+            "report": os.fspath(page) if page else None,
+            "exit_code": code,
+            "verdict": str(said) if said else None,
+            "facts": [terminal.plain(fact) for fact in said.facts] if said else [],
+            "table": terminal.as_data(terminal.lines_of(numbers)) if numbers else [],
+            "clips": list(numbers.clips) if numbers else [],
+            "notes": self.notes,
+            "failures": self.outcome.failures,
+            "tasks": {state.value: number for state, number in self.outcome.counts.items()},
+        }
 
 
-def wanted(options: argparse.Namespace, command: str) -> Wanted:
-    """What is wanted of every clip, by these options of that command."""
-    stage = options.stage
-    settings = Settings(
-        radius=options.radius.rigid,
-        joint_radius=options.radius.joint,
-        program=f"{manifest()['name']} {manifest()['version']}",
-        blender=blender_version(),
-        command=command,
-        details={}
-        if options.no_video
-        else {
-            "Videos": f"{stage.engine}, {stage.resolution[0]} x {stage.resolution[1]}, {stage.fps} frames/s",
-            "Speed of the videos": "real time" if stage.slow_motion == 1 else f"{stage.slow_motion:g} times slower",
-        },
-    )
-    return Wanted(
-        choices=tuple(options.choices),
-        modes=options.modes.names,
-        radii=options.radius,
-        settings=settings,
-        stage=None if options.no_video else stage,
-        every_film=options.films == ALL,
-        count_keys=options.decimate == "adaptive",
-        fit=options.fit,
-        shared=options.shared,
-    )
+def _explain(plan: ComparisonPlan, store: Store) -> int:
+    """Print what a run would do, and why."""
+    reading = [(task, why) for task, why in explain(plan.reading, store)]
+    for task, why in reading:
+        print(f"{task.name}: {why}")
+    if reading:
+        print("What follows from these recordings is known when they have been read.")
+        return 0
+    plan.look_into()
+    lines = [f"{task.name}: {why}" for task, why in explain(plan.tasks, store)]
+    print(*(lines or ["nothing to do"]), sep="\n")
+    return 0

@@ -14,7 +14,7 @@ from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, r
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import did_you_mean, folder_path, number, parser_of
 from rigid_motion_batch.palette import THEMES
-from rigid_motion_batch.places import ASSETS, from_here, output_folder
+from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import files_of
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
 from rigid_motion_batch.scenes.settings import ANTIALIASING, ENGINES, StageSettings
@@ -33,6 +33,9 @@ STREAM_MODES = tuple(mode for mode in MODES if mode not in KEYFRAME_MODES)
 
 ALL, DISTINCT = "all", "distinct"
 """Stand for all modes that keyframes can have, with a lane in the film for each, or for each motion that comes out."""
+
+STAGES = ("read", "measure", "build", "render", "encode", "report")
+"""Of the work, each after those before it."""
 
 SCRIPT = "compare.py"
 
@@ -127,8 +130,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         "-o",
         "--output",
         type=folder_path,
-        default=output_folder("comparison"),
-        help="folder to write to (renders/comparison)",
+        help="folder to write to (renders/NAME, by the first recording, with a number where that is another's)",
     )
     parser.add_argument(
         "--axes", type=str.lower, choices=AXES, help="axes of the recordings (opengl for BVH, blender for others)"
@@ -151,11 +153,18 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     workers.add_argument("--scheduler", metavar="ADDRESS", help="use the workers of a Dask scheduler: tcp://HOST:8786")
     parser.add_argument(
-        "--force",
+        "--overwrite",
         action="store_true",
-        help="do everything again; replace another comparison, and files of other programs",
+        help="replace another comparison in that folder, and files that were edited or are of other programs",
     )
     parser.add_argument("--explain", action="store_true", help="say what would be done and why, and do nothing")
+    output = parser.add_argument_group("output")
+    output.add_argument("--open", action="store_true", help="open the report in the browser")
+    output.add_argument("--quiet", action="store_true", help="print the path of the report alone, and what fails")
+    output.add_argument("--json", action="store_true", help="print verdict, table, notes and failures as JSON")
+    farm = parser.add_argument_group("farms", "One of many machines that share the folder; docs/farm.md has more.")
+    farm.add_argument("--only", choices=STAGES, metavar="STAGE", help=f"do this part alone: {', '.join(STAGES)}")
+    farm.add_argument("--part", type=_part, default=(1, 1), metavar="K/N", help="and of it the K-th of N shares")
     keys = parser.add_argument_group("choosing keys")
     keys.add_argument(
         "--decimate",
@@ -184,6 +193,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     video = parser.add_argument_group("video")
     video.add_argument("--no-video", action="store_true", help="numbers and report only")
+    video.add_argument(
+        "--blender", metavar="PROGRAM", help="film, and read FBX, glTF and .blend, with this Blender (the module bpy)"
+    )
     video.add_argument("--engine", choices=ENGINES, default="workbench", help="Blender's renderer (%(default)s)")
     video.add_argument(
         "--resolution", type=_resolution, default="1280x720", metavar="WxH", help="in pixels (%(default)s)"
@@ -231,14 +243,22 @@ def parse(arguments: list[str]) -> argparse.Namespace:
             deviation=options.deviation,
             distinct=options.modes.distinct,
         )
+        if options.no_video:
+            options.stage = None
+        if options.part != (1, 1) and not options.only:
+            raise ValueError("--part is a share of one stage: add --only STAGE")
         options.choices = _choices(options)
         options.reading = reading_options(options)
     except ValueError as error:
         parser.error(str(error))
-    if not options.inputs:
-        options.inputs = [str(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
+    options.inputs = options.inputs or own_recordings()
     options.inputs = [file for source in options.inputs for file in files_of(source)]
     return options
+
+
+def own_recordings() -> list[str]:
+    """Those that come with the program."""
+    return [str(path) for path in sorted(from_here(ASSETS).glob("*.csv"))]
 
 
 def _choices(options: argparse.Namespace) -> list[Choice]:
@@ -310,6 +330,13 @@ def _jobs(text: str) -> int:
     if not re.fullmatch(r"\d{1,3}", text, re.ASCII):
         raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
     return int(text)
+
+
+def _part(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text, re.ASCII)
+    if not found or not 1 <= int(found[1]) <= int(found[2]):
+        raise argparse.ArgumentTypeError(f"{text!r} is no share; give one such as 1/8")
+    return int(found[1]), int(found[2])
 
 
 def _positive(text: str) -> float:

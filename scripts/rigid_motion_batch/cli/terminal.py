@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 import numpy as np
 from rich import box
@@ -17,14 +17,13 @@ from rich.table import Table
 from rich.text import Text
 
 from rigid_motion_batch.analysis.choices import Tolerance
-
-if TYPE_CHECKING:
-    from rigid_motion_batch.report.numbers import Numbers
+from rigid_motion_batch.report.numbers import MEASURES, Numbers, digits
+from rigid_motion_batch.report.verdict import plain as plain
 
 RMS, WORST, KEYS = "rms_shell_m", "max_shell_m", "keys_per_s"
 """The measures that are shown."""
 
-NARROW = 80
+WIDE = 120
 """Columns of what is no terminal."""
 
 
@@ -52,8 +51,6 @@ class Line:
 
 def lines_of(numbers: Numbers) -> list[Line]:
     """The table: choices from the fewest keys to the most, motions in the order of the modes."""
-    from rigid_motion_batch.report.numbers import MEASURES
-
     places = {measure.metric: place for place, measure in enumerate(MEASURES)}
     mean, groups = numbers.mean(), numbers.groups()
     columns = [numbers.modes.index(group[0]) for group in groups]
@@ -63,7 +60,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
         rms, keys = mean[places[RMS], row, columns], mean[places[KEYS], row, columns]
         decide = keys if isinstance(choice, Tolerance) else rms
         # What is shown as the same is as good.
-        shown = [number(value) for value in decide.tolist()]
+        shown = [digits(value) for value in decide.tolist()]
         least = shown[int(np.argmin(decide))]
         lines += [
             Line(
@@ -78,13 +75,6 @@ def lines_of(numbers: Numbers) -> list[Line]:
             for place, group in enumerate(groups)
         ]
     return lines
-
-
-def number(value: float) -> str:
-    """A number with three digits, as the table shows it."""
-    if not np.isfinite(value):
-        return "-"
-    return f"{value:.{max(0, 2 - int(np.floor(np.log10(value))))}f}" if value > 1e-6 else "0"
 
 
 def table_of(lines: Sequence[Line], clips: int) -> Table:
@@ -102,9 +92,9 @@ def table_of(lines: Sequence[Line], clips: int) -> Table:
         table.add_row(
             line.choice if first else "",
             Text(line.name),
-            number(line.rms_mm),
-            number(line.worst_mm),
-            number(line.keys_per_s),
+            digits(line.rms_mm),
+            digits(line.worst_mm),
+            digits(line.keys_per_s),
             "*" if line.best else "",
             style="bold green" if line.best else "",
             end_section=last,
@@ -120,9 +110,8 @@ def as_data(lines: Sequence[Line]) -> list[dict[str, object]]:
 def show(*what: Table | str, stream: TextIO | None = None) -> None:
     """Print tables and lines; without colours where the stream is no terminal, or NO_COLOR is set."""
     stream = stream or sys.stdout
-    console = Console(file=stream, highlight=False, width=None if stream.isatty() else NARROW)
-    for one in what:
-        if isinstance(one, str):
-            console.print(one, markup=False, soft_wrap=not stream.isatty())
-        else:
-            console.print(one)
+    console = Console(file=stream, highlight=False, width=None if stream.isatty() else WIDE)
+    with console.capture() as captured:
+        for one in what:
+            console.print(one, markup=False, soft_wrap=isinstance(one, str) and not stream.isatty())
+    print(*(line.rstrip() for line in captured.get().splitlines()), sep="\n", file=stream, flush=True)

@@ -82,6 +82,9 @@ class Comparison:
     fit: bool = False
     """And how many where they may be fitted."""
 
+    beside_decimate: bool = True
+    """Whether to set adaptive keys of bodies beside those of Blender's Decimate, for which there must be a Blender."""
+
     stage: StageSettings | None = None
     """How to make the films; None for a run without."""
 
@@ -92,7 +95,7 @@ class Comparison:
     """What pages say of the run; None for a run without."""
 
     blender: str = ""
-    """The version of the Blender that films, reads and decimates; empty where there is none."""
+    """The version of the Blender that films and reads; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +114,7 @@ class Study:
     """How many a whole body has; 0 for a single rigid one."""
 
     warnings: tuple[ClipWarning, ...] = field(default=(), repr=False)
+    beside_decimate: bool = True
 
     @property
     def name(self) -> str:
@@ -126,8 +130,8 @@ class Study:
 
     @property
     def decimated(self) -> list[Choice]:
-        """The choices that may be set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
-        if self.samples * self.joints > MOST_DECIMATED:
+        """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
+        if not self.beside_decimate or self.samples * self.joints > MOST_DECIMATED:
             return []
         return [choice for choice in self.choices if self.joints and choice.decimation == "adaptive"]
 
@@ -203,7 +207,8 @@ class ComparisonPlan:
                 choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
             }
             if long_enough:
-                study = Study(ClipOf(name, body), key, len(times), long_enough, len(one.joints), one.warnings)
+                clip, joints = ClipOf(name, body), len(one.joints)
+                study = Study(clip, key, len(times), long_enough, joints, one.warnings, comparison.beside_decimate)
                 self.studies.append(study)
                 notes += self._left_out(study)
         return notes
@@ -219,8 +224,8 @@ class ComparisonPlan:
                 "--slow-motion"
             )
         adaptive = any(choice.decimation == "adaptive" for choice in study.choices)
-        if study.joints and adaptive and not self.comparison.blender:
-            yield f"{study.name}: not compared with Blender's Decimate: there is no Blender"
+        if study.joints and adaptive and not self.comparison.beside_decimate:
+            yield f"{study.name}: not compared with Blender's Decimate, for there is no Blender here"
         elif study.joints and adaptive and not study.decimated:
             yield (
                 f"{study.name}: not compared with Blender's Decimate: {study.joints} joints with {study.samples} "
@@ -264,14 +269,13 @@ class ComparisonPlan:
     @property
     def tables(self) -> set[str]:
         """The tables that there will be; of others those of earlier runs are to be withdrawn."""
-        found = {METRICS: True, KEYS_NEEDED: self.comparison.count_keys}
-        found[JOINT_METRICS] = any(study.joints for study in self.studies)
-        found[DECIMATED] = any(map(self.decimated, self.studies))
-        return {table for table, there in found.items() if there}
-
-    def decimated(self, study: Study) -> list[Choice]:
-        """The choices that are set beside Blender's Decimate."""
-        return study.decimated if self.comparison.blender else []
+        bodies = [study for study in self.studies if study.joints]
+        found = {METRICS} | ({KEYS_NEEDED} if self.comparison.count_keys else set())
+        return (
+            found
+            | ({JOINT_METRICS} if bodies else set())
+            | ({DECIMATED} if any(s.decimated for s in bodies) else set())
+        )
 
     def filmed(self, study: Study) -> list[Choice]:
         """The choices that there are films of."""
@@ -302,7 +306,7 @@ class ComparisonPlan:
                 group=name,
             )
             yield METRICS, steps.ROWS, ("measure", name, choice.name), measuring
-            if choice in self.decimated(study):
+            if choice in study.decimated:
                 decimating = Task(
                     steps.decimate,
                     measuring.parameters,
@@ -400,7 +404,7 @@ class ComparisonPlan:
         shown, before, filmed = [], [], []
         for study in studies:
             name, of_films = study.name, [choice.name for choice in self.filmed(study)]
-            needed, decimated = keys.get(("needed", name)), [choice.name for choice in self.decimated(study)]
+            needed, decimated = keys.get(("needed", name)), [choice.name for choice in study.decimated]
             before += [study.reader, *([needed] if needed else [])]
             for choice in study.choices:
                 before.append(keys["measure", name, choice.name])

@@ -42,7 +42,7 @@ ABOUT = About("Rigid Motion", "compare toss.csv", {"Videos": "small"})
 
 def wanted(*sources: Path, **fields: object) -> Comparison:
     modes = ("lerp_slerp", "motor_spline")
-    return replace(Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes, blender="5"), **fields)
+    return replace(Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes), **fields)
 
 
 def compared(
@@ -162,8 +162,8 @@ def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Pa
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
         *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4")),
     }
-    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), blender=""))
-    assert "body: not compared with Blender's Decimate: there is no Blender" in listener.notes
+    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), beside_decimate=False))
+    assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
     assert {*published(tmp_path / "without")} >= {"metrics.csv", "metrics_joints.csv"}
     assert "decimated.csv" not in published(tmp_path / "without")
 
