@@ -15,7 +15,7 @@ before = set(sys.modules)
 room = importlib.import_module("rigid_motion_batch.{room}")
 for module in pkgutil.iter_modules(room.__path__):
     importlib.import_module(f"rigid_motion_batch.{room}.{{module.name}}")
-print(*sorted({{name.partition(".")[0] for name in set(sys.modules) - before}}))
+print(*sorted({{name.partition(".")[0] for name in set(sys.modules) - before if "cython" not in name}}))
 print(*sorted({{".".join(name.split(".")[:2]) for name in sys.modules if name.startswith("rigid_motion_batch.")}}))
 """
 ALLOWED = {"numpy", "bpy_extras", "rigid_motion", "rigid_motion_batch"}
