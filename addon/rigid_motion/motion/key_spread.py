@@ -36,7 +36,7 @@ ALIVE = 1.5, 1.2
 
 Where it depends on its two keys alone, and where on more."""
 
-LONGEST = 4
+LONGEST = 8
 """Times the mean number of candidates from key to key: the most that a segment may reach over."""
 
 EFFORT = 200
