@@ -21,10 +21,9 @@ SPREAD = 6, 8
 SPARSER = 3
 """How many times as few candidates there are from then on."""
 
-LENGTHS = (10, 10, 50), (5, 10, 50)
-"""Samples for each key that settings change at: for modes that look at two keys only, and for others.
+LENGTHS = 5, 10, 50
+"""Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
 
-In the middle, from 10 to 50, there is time for every step.
 Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
 at samples takes so long that another try is worth more.
 """
@@ -51,7 +50,7 @@ class BudgetSearch(Search):
     def __init__(self, recording: Recording, budget: int, *, rms: bool = False) -> None:
         super().__init__(recording, rms=rms)
         self.budget = budget
-        self._length = int(np.searchsorted(LENGTHS[min(self.reach, 1)], len(recording.times) / budget, side="right"))
+        self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
         self._is_short = self._length < 2
         """Whether there are few samples for each key."""
 
@@ -59,9 +58,7 @@ class BudgetSearch(Search):
         """So many samples that are keys with as small an error as can be found."""
         count = len(self.recording.times)
         least, most = (self.budget * spread for spread in SPREAD)
-        keys = self.measured(np.arange(count))
-        if self.reach or not self._is_short:
-            keys = self.thinned(keys, math.inf, max(least, min(most, count // 4)))
+        keys = self.thinned(self.measured(np.arange(count)), math.inf, max(least, min(most, count // 4)))
         candidates = keys.indices
         keys = self.thinned(keys, math.inf, self.budget)
         if self.power == 2:
