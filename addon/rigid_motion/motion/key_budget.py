@@ -1,6 +1,7 @@
 """The search for so many keys that are as near to a recording as can be.
 
-Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times;
+Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
+or, where there are few samples for each, some are taken out and put in elsewhere;
 for its mean square some more are put in, moved, and as many taken out.
 """
 
