@@ -274,7 +274,7 @@ class _Run:
     ) -> None:
         self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
         self.progress = progress
-        self.share = Share(*options.part, stages=frozenset({options.only})) if options.only else Share()
+        self.share = Share(frozenset({options.only}), *options.part) if options.only else Share()
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = True
@@ -428,6 +428,7 @@ class _Run:
 
     def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
         numbers, said = self._numbers()
+        counts = {**self.outcome.counts, State.FAILED: len(self.outcome.failures)}
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
@@ -437,7 +438,7 @@ class _Run:
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.outcome.failures,
-            "tasks": {state.value: number for state, number in self.outcome.counts.items()},
+            "tasks": {state.value: counts[state] for state in State if counts.get(state)},
         }
 
 
