@@ -38,6 +38,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(collections|numpy|typing)\..*"),
     ("py:class", r"rigid_motion\.motion\.segments\..*"),
+    ("py:class", r"rigid_motion_batch\.recordings\..*"),
 ]
 """What other people's documentation has, where a link would be none without a network, and what no caller needs."""
 

@@ -101,7 +101,7 @@ def main(arguments: list[str]) -> int:
     try:
         if options.only and options.docs and not (options.docs / PAGE).is_file():
             raise ValueError(f"{options.docs / PAGE}: there is no page to put the section into; leave --docs out")
-        with Store(options.output) as store, SerialExecutor() as executor:
+        with Store(options.output, overwrite=True) as store, SerialExecutor() as executor:
             tasks = list(_studied(options, store).tasks.values())
             if options.force:
                 for task in tasks:

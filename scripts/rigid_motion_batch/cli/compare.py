@@ -17,17 +17,17 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import count, groupby
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-from rigid_motion_batch.analysis.choices import Choice, Tolerance
-from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.results import ChoiceNumbers
 from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
 from rigid_motion_batch.cli.in_blender import blender_program
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
+from rigid_motion_batch.pipeline.bundle import PROGRESS, FarmProgress
 from rigid_motion_batch.pipeline.comparison import (
     DECIMATED,
     IN_BLENDER,
@@ -321,7 +321,8 @@ class _Run:
 
     def _do(self, title: str, tasks: Plan) -> None:
         with self.progress.stage(title, 1.0) as stage:
-            shown = _Shown(self.progress, stage, self.options.quiet)
+            on_farm = os.environ.get(PROGRESS) == "openjd"
+            shown = FarmProgress() if on_farm else _Shown(self.progress, stage, self.options.quiet)
             outcome = run(
                 tasks,
                 self.store,
@@ -330,7 +331,7 @@ class _Run:
                 share=self.share,
                 blender=self.options.blender or "",
             )
-        self.page = shown.page
+        self.page = getattr(shown, "page", True)
         failures = self.outcome.failures | outcome.failures
         self.outcome = self.outcome.continued(outcome)
         self.outcome.failures = failures
@@ -393,9 +394,9 @@ class _Run:
                     if task.step is steps.count_keys:
                         needed.append(values.read(KeysNeeded, folder / "needed"))
                     else:
-                        choices.append(_metrics_in(folder))
+                        choices.append(values.read(ChoiceNumbers, folder / "numbers"))
             if choices:
-                gathering.add(SimpleNamespace(facts=SimpleNamespace(name=name), choices=choices))
+                gathering.add(name, choices)
         try:
             numbers = gathering.numbers()
         except ValueError:
@@ -440,16 +441,6 @@ class _Run:
             "failures": self.outcome.failures,
             "tasks": {state.value: counts[state] for state in State if counts.get(state)},
         }
-
-
-def _metrics_in(folder: Path) -> SimpleNamespace:
-    """What was measured of a clip under a choice of keys, as a `ChoiceResult` without its arrays."""
-    plain = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    motions = [
-        SimpleNamespace(modes=tuple(one["modes"]), metrics=values.from_plain(tuple[Metrics, ...], one["metrics"]))
-        for one in plain["motions"]
-    ]
-    return SimpleNamespace(choice=values.from_plain(Choice, plain["choice"]), motions=motions)
 
 
 def _explain(plan: ComparisonPlan, store: Store) -> int:

@@ -8,7 +8,6 @@ that a task which nobody wants any more can be ended. Dask gives a task of a wor
 from __future__ import annotations
 
 import asyncio
-import importlib.metadata
 import logging
 import os
 import queue
@@ -27,11 +26,9 @@ from typing import Self
 from distributed import Client, Future, KilledWorker, Security, get_worker
 from distributed.comm import connect
 
-from rigid_motion_batch import places
-
 from .executors import ProcessExecutor, Tell
 from .performing import ExecutorError, Failed, Lost, Made, Order, Told, progress_of, write_progress
-from .steps import digest_of
+from .steps import version_here
 
 CONNECTING = 5.0
 """Seconds that a scheduler has to answer."""
@@ -52,15 +49,6 @@ START = "start the scheduler and the workers with this program on their module p
 
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """What Dask raises where its scheduler does not answer."""
-
-
-def version_here() -> str:
-    """What all who work at one plan must have, as it was when this process asked first."""
-    found = [f"program {places.manifest()['version']} {digest_of(places.PACKAGE)} {digest_of(places.EXTENSION)}"]
-    for module in ("numpy", "bpy"):
-        with suppress(importlib.metadata.PackageNotFoundError):
-            found.append(f"{module} {importlib.metadata.version(module)}")
-    return ", ".join(found)
 
 
 LOADED = version_here()

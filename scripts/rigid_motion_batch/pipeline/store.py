@@ -152,9 +152,12 @@ class Store:
         return self.scratch / str(self._number)
 
     def note(self, name: str, content: Any) -> None:
-        """Write a file of the store's own, of JSON."""
+        """Write a file of the store's own, of JSON; of nothing there is none."""
         _clear(self.own / name)
-        write_text(self.own / name, json.dumps(content, indent=1))
+        if content:
+            write_text(self.own / name, json.dumps(content, indent=1))
+        else:
+            (self.own / name).unlink(missing_ok=True)
 
     def _clear_dead_sessions(self) -> None:
         for path in self._scratch.glob("*.lock"):

@@ -8,8 +8,7 @@ dashes, blanks and capitals; words with a meaning are taken away, and what is le
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from .options import TICKS
@@ -121,7 +120,16 @@ def column_name(text: str) -> ColumnName | None:
     words = [text[start:end].lower() for start, end in spans]
     if not FRAMES.isdisjoint(words) and WITH_FRAMES.issuperset(words):
         return ColumnName("frame")
-    return _time(words, unit) or _device(words) or _scale(text, words, spans) or _pose(text, words, spans, unit)
+    if time := _time(words, unit):
+        return time
+    devices = [word for word in DEVICES if word in words]
+    if devices and WITH_DEVICES.issuperset(words):
+        return ColumnName("device", devices[0])
+    if words == ["s"]:
+        return ColumnName("scale")
+    taken = {len(words) - 1}
+    found = ColumnName("scale") if words[-1:] == ["scale"] else _pose(words, unit, taken)
+    return found and replace(found, body=_body(text, words, spans, taken))
 
 
 def unit_in(text: str) -> str:
@@ -155,23 +163,9 @@ def _time(words: list[str], unit: str) -> ColumnName | None:
     return ColumnName("time", dated, unit or (units[-1] if units else ""))
 
 
-def _device(words: list[str]) -> ColumnName | None:
-    named = [word for word in DEVICES if word in words]
-    if not named or not WITH_DEVICES.issuperset(words):
-        return None
-    return ColumnName("device", named[0])
-
-
-def _scale(text: str, words: list[str], spans: list[tuple[int, int]]) -> ColumnName | None:
-    if words == ["s"]:
-        return ColumnName("scale")
-    if words and words[-1] == "scale":
-        return ColumnName("scale", body=_body(text, words, spans, {len(words) - 1}))
-    return None
-
-
-def _pose(text: str, words: list[str], spans: list[tuple[int, int]], unit: str) -> ColumnName | None:
-    taken: set[int] = set()
+def _pose(words: list[str], unit: str, taken: set[int]) -> ColumnName | None:
+    """What the name of a position or rotation says; the places of the words that say it become those in `taken`."""
+    taken.clear()
     for place, word in enumerate(words):
         # A single letter in between is rather part of a name.
         if place and word in UNITS_AS_WORDS and (len(word) > 1 or place == len(words) - 1):
@@ -181,25 +175,23 @@ def _pose(text: str, words: list[str], spans: list[tuple[int, int]], unit: str) 
     if not axes:
         return None
     place = axes[-1]
-    kinds = {KIND_OF[word] for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF and other != place}
-    taken |= {other for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF}
+    of_kinds = {other for other, word in enumerate(words) if len(word) > 1 and word in KIND_OF}
+    taken |= of_kinds | {place}
     if words[place] in TURNS:
-        return ColumnName("euler", words[place], unit, _body(text, words, spans, taken | {place}))
+        return ColumnName("euler", words[place], unit)
+    kinds = {KIND_OF[words[other]] for other in of_kinds - {place}}
     fused, axis, fused_unit = AXIS.fullmatch(words[place]).groups()
     if fused:
         kinds.add(KIND_OF[fused])
     elif place and len(words[place - 1]) == 1 and words[place - 1] in KIND_OF:
         kinds.add(KIND_OF[words[place - 1]])
         taken.add(place - 1)
-    kind = next((kind for kind in ("quaternion", "euler", "rotation", "position") if kind in kinds), "position")
-    if axis == "w" and kind in ("position", "euler"):
-        return None
-    return ColumnName(kind, axis, unit or fused_unit or "", _body(text, words, spans, taken | {place}))
+    kind = next((kind for kind in ("quaternion", "euler", "rotation") if kind in kinds), "position")
+    return None if axis == "w" and kind in ("position", "euler") else ColumnName(kind, axis, unit or fused_unit or "")
 
 
-def _body(text: str, words: list[str], spans: list[tuple[int, int]], taken: Iterable[int]) -> str:
+def _body(text: str, words: list[str], spans: list[tuple[int, int]], taken: set[int]) -> str:
     """What is left of a name: as it was written, where it stands together."""
-    taken = set(taken)
     left = [place for place, word in enumerate(words) if place not in taken and word not in WITHOUT_MEANING]
     if not left:
         return ""

@@ -6,8 +6,8 @@ of several, which another column names (`device`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from .column_names import DEVICES, METRES, TURNS, ColumnName, column_name, unit_in
@@ -58,15 +58,8 @@ class Layout:
     """Columns that may tell whose the row is, the likeliest first."""
 
 
-@dataclass
-class _Found:
-    """The columns of one body, as their names have it: each meaning to all columns that could be it."""
-
-    label: str = ""
-    columns: dict[str, list[int]] = field(default_factory=dict)
-
-    def add(self, meaning: str, index: int) -> None:
-        self.columns.setdefault(meaning, []).append(index)
+Found = dict[str, list[int]]
+"""Of a body each meaning to all columns that could be it, by their names."""
 
 
 def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
@@ -80,32 +73,44 @@ def layout_of(cells: Sequence[str], options: ReadingOptions) -> Layout:
     names = [column_name(cell) for cell in cells]
     known = sum(name is not None for name in names)
     explicit = _explicit(cells, options, known)
-    bodies = _bodies(names, set(explicit.values()))
-    turn = EULER if options.euler else QUATERNION
-    needed = (*POSITION, *turn)
-    times = [index for index, name in enumerate(names) if name and name.kind == "time"]
-    times = [explicit["t"]] if "t" in explicit else [index for index in times if index not in explicit.values()]
-    # A date beside a count of seconds says the same again.
-    times = [index for index in times if names[index] is None or names[index].axis != "date"] or times
-    frames = [index for index, name in enumerate(names) if name and name.kind == "frame"]
-    if options.frame_rate and "t" not in explicit:
-        times = [index for index in frames if index not in explicit.values()] or times
-    whole = {
-        key: found for key, found in bodies.items() if all(one in found.columns or one in explicit for one in needed)
+    of_kind = {
+        kind: [
+            index for index, name in enumerate(names) if name and name.kind == kind and index not in explicit.values()
+        ]
+        for kind in ("time", "frame", "device")
     }
+    bodies = _bodies(names, set(explicit.values()))
+    needed = (*POSITION, *(EULER if options.euler else QUATERNION))
+    whole = {label: found for label, found in bodies.items() if {*found, *explicit} >= {*needed}}
     if explicit.keys() >= set(needed):
-        whole = {"": _Found()}
-    if whole and frames and not times:
-        problem = f"no column of time, only one that counts frames ({shown(cells[frames[0]])})"
+        whole = {"": {}}
+    # A date beside a count of seconds says the same again.
+    times = [index for index in of_kind["time"] if names[index].axis != "date"] or of_kind["time"]
+    times = (options.frame_rate and of_kind["frame"]) or times
+    times = [explicit["t"]] if "t" in explicit else times
+    if whole and of_kind["frame"] and not times:
+        problem = f"no column of time, only one that counts frames ({shown(cells[of_kind['frame'][0]])})"
         raise ColumnProblem(problem, "say how many frames a second it has: --frame-rate 90", known)
     if not times or not whole:
         raise _missing(cells, names, bodies, bool(times), needed, explicit, known)
-    where = {found.label: _columns_of(found, cells, (*needed, "scale"), explicit, known) for found in whole.values()}
-    time = _only("t", times, cells, known)
+
+    def only(meaning: str, indices: Sequence[int]) -> int:
+        if len(indices) == 1:
+            return indices[0]
+        both = listed(list(dict.fromkeys(shown(cells[index]) for index in indices)), limit=3)
+        way_out = f"say which with --columns {meaning}=NAME, or rename or delete one of them"
+        raise ColumnProblem(f"two columns mean {meaning} ({both})", way_out, known)
+
+    where = {}
+    for label, found in whole.items():
+        columns = found | {meaning: [index] for meaning, index in explicit.items()}
+        where[label] = {one: only(one, columns[one]) for one in (*needed, "scale") if one in columns}
     units = {index: name.unit for index, name in enumerate(names) if name and name.unit}
     units |= {index: unit for index in explicit.values() if (unit := unit_in(cells[index]))}
-    unit = options.time_unit or units.get(time, "")
-    return Layout(time, unit, where, units, _devices(names, explicit))
+    time = only("t", times)
+    devices = sorted(of_kind["device"], key=lambda index: DEVICES.index(names[index].axis))
+    devices = [explicit["device"]] if "device" in explicit else devices
+    return Layout(time, options.time_unit or units.get(time, ""), where, units, tuple(devices))
 
 
 def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict[str, int]:
@@ -124,79 +129,49 @@ def _explicit(cells: Sequence[str], options: ReadingOptions, known: int) -> dict
     return explicit
 
 
-def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str, _Found]:
-    """The columns of positions, rotations and scales, by the name of the body in front, its case put aside."""
-    bodies: dict[str, _Found] = {"": _Found()}
+def _bodies(names: Sequence[ColumnName | None], explicit: set[int]) -> dict[str, Found]:
+    """The columns of positions, rotations and scales, by the name of the body in front, whatever its case."""
+    bodies: dict[str, Found] = {"": {}}
+    labels: dict[str, str] = {"": ""}
     with_w = {name.body.lower() for name in names if name and name.kind == "rotation" and name.axis == "w"}
     for index, name in enumerate(names):
         if name is None or name.kind in ("time", "frame", "device") or index in explicit:
             continue
-        body = bodies.setdefault(name.body.lower(), _Found(name.body))
-        if name.kind == "scale":
-            body.add("scale", index)
-        elif name.kind == "position":
-            body.add(name.axis, index)
-        elif name.kind == "quaternion" or (name.kind == "rotation" and name.body.lower() in with_w):
-            body.add(f"q{name.axis}", index)
+        body = name.body.lower()
+        if name.kind == "scale" or name.kind == "position" or name.axis in TURNS:
+            meaning = name.axis or "scale"
         else:
-            body.add(name.axis if name.axis in TURNS else f"r{name.axis}", index)
+            meaning = f"{'q' if name.kind == 'quaternion' or body in with_w else 'r'}{name.axis}"
+        bodies.setdefault(labels.setdefault(body, name.body), {}).setdefault(meaning, []).append(index)
     return bodies
-
-
-def _columns_of(
-    found: _Found, cells: Sequence[str], meanings: Iterable[str], explicit: Mapping[str, int], known: int
-) -> dict[str, int]:
-    columns = {}
-    for meaning in meanings:
-        if meaning in explicit:
-            columns[meaning] = explicit[meaning]
-        elif meaning in found.columns:
-            columns[meaning] = _only(meaning, found.columns[meaning], cells, known)
-    return columns
-
-
-def _only(meaning: str, indices: Sequence[int], cells: Sequence[str], known: int) -> int:
-    if len(indices) > 1:
-        both = listed(list(dict.fromkeys(shown(cells[index]) for index in indices)), limit=3)
-        way_out = f"say which with --columns {meaning}=NAME, or rename or delete one of them"
-        raise ColumnProblem(f"two columns mean {meaning} ({both})", way_out, known)
-    return indices[0]
-
-
-def _devices(names: Sequence[ColumnName | None], explicit: Mapping[str, int]) -> tuple[int, ...]:
-    if "device" in explicit:
-        return (explicit["device"],)
-    indices = [index for index, name in enumerate(names) if name and name.kind == "device"]
-    indices = [index for index in indices if index not in explicit.values()]
-    return tuple(sorted(indices, key=lambda index: DEVICES.index(names[index].axis)))
 
 
 def _missing(
     cells: Sequence[str],
     names: Sequence[ColumnName | None],
-    bodies: Mapping[str, _Found],
+    bodies: Mapping[str, Found],
     timed: bool,
     needed: Sequence[str],
     explicit: Mapping[str, int],
     known: int,
 ) -> ColumnProblem:
     """What is missing to a header of which nobody is whole: of the body that lacks the least."""
-    nearest = max(bodies.values(), key=lambda body: sum(one in body.columns for one in needed))
-    if not nearest.columns.keys() >= set(POSITION):
+    label, nearest = max(bodies.items(), key=lambda body: sum(one in body[1] for one in needed))
+    if not nearest.keys() >= set(POSITION):
         # Something by chance ends like an axis.
-        nearest = bodies[""]
-    missing = [one for one in ("t", *needed) if one not in explicit and one not in nearest.columns]
+        label, nearest = "", bodies[""]
+    missing = [one for one in ("t", *needed) if one not in explicit and one not in nearest]
     if timed:
         missing.remove("t")
     turns = {*QUATERNION, *EULER, *TURNS}
-    positions_only = not any(turns & body.columns.keys() for body in bodies.values()) and turns.isdisjoint(explicit)
+    positions_only = not any(turns & body.keys() for body in bodies.values()) and turns.isdisjoint(explicit)
     if timed and positions_only and set(missing) == set(needed) - set(POSITION):
         problem = f"positions only, and rotations are needed (found {columns_found(cells)})"
         named = ",".join(f"{one}=NAME" for one in missing)
         return ColumnProblem(problem, f"record them as qx, qy, qz, qw, or name them: --columns {named}", known)
-    angles = [one for one in (*EULER, *TURNS) if one in nearest.columns]
+    angles = [one for one in (*EULER, *TURNS) if one in nearest]
     if set(QUATERNION) <= set(missing) and set(needed) - set(missing) >= set(POSITION) and angles:
-        shown_angles = ", ".join(cells[nearest.columns[one][0]] for one in angles[:3])
+        shown_angles = ", ".join(cells[nearest[one][0]] for one in angles[:3])
         return ColumnProblem(
             f"rotations are Euler angles here ({shown_angles}), and their order is not said",
             "say it: --euler ORDER, with --degrees if they are (Unity: --euler YXZ --degrees; docs/csv.md has others)",
@@ -214,7 +189,7 @@ def _missing(
         if all(map(is_number, cells)):
             way_out = f"write a first line of names: {','.join(('t', *needed))}"
         return ColumnProblem(f"no column has a known name (found {columns_found(cells)})", way_out, 0)
-    lacking = f" for {shown(nearest.label)}" if nearest.label else ""
+    lacking = f" for {shown(label)}" if label else ""
     return ColumnProblem(
         f"no column named {', '.join(missing)}{lacking} (found {columns_found(cells)})", way_out, known
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import date
+from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 
 import numpy as np
@@ -29,6 +29,11 @@ MOMENT = re.compile(
 LIKE_A_DATE = re.compile(r"\d[:/]\d|\d[-.]\d\d?[-.]\d|\d{8}T\d", re.ASCII)
 """In dates as other standards and countries have them."""
 
+MIDNIGHT = datetime(1970, 1, 1, tzinfo=UTC)
+
+LEAP_SECOND = 60
+"""The last second of some minutes."""
+
 DAY = 86_400
 """Seconds."""
 
@@ -45,13 +50,10 @@ LONGEST_SHOWN = 40
 
 @dataclass(frozen=True)
 class Kind:
-    """What times are written as."""
+    """What times are written as: dates or clock times, and whether with an offset from UTC."""
 
     dated: bool
-    """Or clock times."""
-
     offset: bool
-    """Whether they say how far they are from UTC."""
 
     def __str__(self) -> str:
         kind = "date" if self.dated else "clock time"
@@ -119,7 +121,9 @@ def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
             continue
         try:
             day, hour, minute, second, fraction, offset = match.groups()
-            seconds = _minute(day, hour, minute, offset) + _below(61, second or "0")
+            seconds = _minute(day, hour, minute, offset) + int(second or 0)
+            if int(second or 0) > LEAP_SECOND:
+                raise ValueError(second)
         except (AttributeError, ValueError):
             name = "date" if kind.dated else "clock time"
             raise TrajectoryError(
@@ -134,23 +138,8 @@ def _moments(table: Table, kind: Kind) -> Iterator[tuple[int, int]]:
 @lru_cache(maxsize=1024)
 def _minute(day: str | None, hour: str, minute: str, offset: str | None) -> int:
     """Seconds from some midnight in UTC to the beginning of a minute. Raises ValueError where there is none such."""
-    days = date.fromisoformat(day).toordinal() if day else 0
-    return DAY * days + 3600 * _below(24, hour) + 60 * _below(60, minute) - _offset(offset or "Z")
-
-
-def _offset(text: str) -> int:
-    """Seconds that a place is ahead of UTC."""
-    if text in "Zz":
-        return 0
-    ahead = 3600 * _below(24, text[1:3]) + 60 * _below(60, text[3:].lstrip(":") or "0")
-    return -ahead if text[0] == "-" else ahead
-
-
-def _below(limit: int, digits: str) -> int:
-    """A number that has to be below the limit. That of seconds is 61: some minutes have a leap second."""
-    if int(digits) >= limit:
-        raise ValueError(digits)
-    return int(digits)
+    moment = datetime.fromisoformat(f"{day or '2000-01-01'}T{hour:0>2}:{minute}{(offset or 'Z').upper()}")
+    return (moment - MIDNIGHT) // timedelta(seconds=1)
 
 
 def _through_midnights(seconds: np.ndarray) -> np.ndarray:

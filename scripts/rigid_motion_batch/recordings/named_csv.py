@@ -9,7 +9,7 @@ is `Trajectory.metres_per_unit`. Euler angles need their order from the user.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -60,46 +60,44 @@ class _Body:
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """The bodies that are wanted. One without a name of its own has the file's."""
     header, layout = _find_header(path, options)
-    width, line = len(header.cells), header.number
+    try:
+        return _read(path, selection, options, header, layout)
+    except ColumnProblem as problem:
+        raise problem.at(path, header.number) from None
+
+
+def _read(
+    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout
+) -> list[Trajectory]:
     bodies = _bodies(path, header, layout, "device" in dict(options.columns))
     taken = set(selection.of([body.name for body in bodies]))
     wanted = [body for body in bodies if body.name in taken]
     columns = {"t": layout.time} | {body.label(one): index for body in wanted for one, index in body.columns.items()}
-    table = Table(path, header.separator, columns, width, line, header.vectors)
+    table = header.table(path, columns)
     kind = kind_of_times(table)
     if kind and (options.time_unit or options.frame_rate):
         given = f"--time-unit {options.time_unit}" if options.time_unit else f"--frame-rate {options.frame_rate:g}"
         problem = f"{given} is for times that are numbers, and these have {kind}"
-        raise TrajectoryError(path, problem, "leave it out", line)
+        raise TrajectoryError(path, problem, "leave it out", header.number)
     parsed = [name for name in columns if name != "t" or kind is None]
     numbers = dict(zip(parsed, table.parse(parsed).T, strict=True))
-    times = seconds_of_dates(table, kind) if kind else _seconds(table, numbers["t"], wanted, layout, options)
+    if kind:
+        times = seconds_of_dates(table, kind)
+    elif options.frame_rate:
+        times = numbers["t"] / options.frame_rate
+    else:
+        require_time_unit(layout)
+        for body in wanted:
+            require_seconds(table, numbers["t"][body.rows], layout.time_unit)
+        times = seconds_of(table, numbers["t"], layout.time_unit)
+    way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
     trajectories = []
     for body in wanted:
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
-        try:
-            trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
-        except ColumnProblem as problem:
-            raise problem.at(path, line) from None
-        way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
-        require_one_body(trajectory, path, f"{way_out}, or split the file", line)
+        trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
+        require_one_body(trajectory, path, f"{way_out}, or split the file", header.number)
         trajectories.append(trajectory)
     return trajectories
-
-
-def _seconds(
-    table: Table, ticks: np.ndarray, wanted: Iterable[_Body], layout: Layout, options: ReadingOptions
-) -> np.ndarray:
-    """Times that are numbers, shape (n,), as seconds, where that of all bodies can be."""
-    if options.frame_rate:
-        return ticks / options.frame_rate
-    try:
-        require_time_unit(layout)
-    except ColumnProblem as problem:
-        raise problem.at(table.path, table.header) from None
-    for body in wanted:
-        require_seconds(table, ticks[body.rows], layout.time_unit)
-    return seconds_of(table, ticks, layout.time_unit)
 
 
 def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layout]:
@@ -107,18 +105,17 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
 
     Where none does, TrajectoryError says what the nearest lacks.
     """
+    found: list[tuple[HeaderLine, Layout]] = []
     problems: list[tuple[ColumnProblem, int]] = []
-    for line in (line.of_rows(path) for line in header_lines(path)):
-        try:
-            return line, layout_of(line.cells, options)
-        except ColumnProblem as problem:
-            problems.append((problem, line.number))
-    found = []
-    for line in lines_above_numbers(path):
-        try:
-            found.append((line, layout_of(line.cells, options)))
-        except ColumnProblem as problem:
-            problems.append((problem, line.number))
+    first = (line.of_rows(path) for line in header_lines(path))
+    for is_first, lines in ((True, first), (False, lines_above_numbers(path))):
+        for line in lines:
+            try:
+                found.append((line, layout_of(line.cells, options)))
+            except ColumnProblem as problem:
+                problems.append((problem, line.number))
+            if found and is_first:
+                return found[0]
     if len(found) == 1:
         return found[0]
     if found:
@@ -134,7 +131,7 @@ def _find_header(path: Path, options: ReadingOptions) -> tuple[HeaderLine, Layou
 def _bodies(path: Path, header: HeaderLine, layout: Layout, named: bool) -> list[_Body]:
     """All bodies of the file, in the order of its columns and rows; `named` is whether the user named their column."""
     columns = {f"device {index}": index for index in layout.devices}
-    groups = _devices(Table(path, header.separator, columns, len(header.cells), header.number, header.vectors), named)
+    groups = _devices(header.table(path, columns), named)
     bodies = [
         (f"{device} {prefix}".strip() or path.stem, prefix, columns, rows)
         for device, rows in groups.items()
@@ -178,9 +175,7 @@ def _trajectory(
         quaternions = quaternions_from_intrinsic_eulers(angles, options.intrinsic_order)
     else:
         quaternions = np.column_stack([held[one] for one in ("qw", "qx", "qy", "qz")])
-    scales = held.get("scale")
-    if scales is not None and not np.any(scales != 1.0):
-        scales = None
+    scales = held["scale"] if np.any(held.get("scale", 1.0) != 1.0) else None
     return Trajectory(body.name, times, Poses(positions, quaternions, scales), metres[0], warnings=warnings)
 
 
@@ -189,16 +184,13 @@ def _radians(
 ) -> tuple[np.ndarray, tuple[ClipWarning, ...]]:
     """Angles of shape (n, 3) as radians, and what is hard to believe of them."""
     largest = float(np.nanmax(np.abs(angles), initial=0.0, where=np.isfinite(angles)))
+    warnings = ()
+    if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
+        text = f"its angles are all within {largest:.3g} degrees"
+        warnings = (ClipWarning(text, "radians need no --degrees"),)
     if options.degrees or "deg" in units:
-        if options.degrees and len(angles) and 0.0 < largest <= SMALLEST_DEGREES:
-            return np.radians(angles), (
-                ClipWarning(f"its angles are all within {largest:.3g} degrees", "radians need no --degrees"),
-            )
-        return np.radians(angles), ()
+        return np.radians(angles), warnings
     if "rad" not in units and largest > LARGEST_RADIANS:
-        raise ColumnProblem(
-            f"angles go up to {largest:.4g}, which are no radians",
-            "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad",
-            len(EULER),
-        )
+        way_out = "say so: --degrees; or name the columns of radians rx_rad, ry_rad, rz_rad"
+        raise ColumnProblem(f"angles go up to {largest:.4g}, which are no radians", way_out, len(EULER))
     return angles, ()

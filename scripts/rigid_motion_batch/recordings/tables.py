@@ -1,8 +1,7 @@
-"""Text files of numbers: lines, named columns, and rows parsed by NumPy's C parser.
+"""Text files of numbers: lines, named columns and rows.
 
 A file is gone through piece by piece, so that it is the numbers that take memory and not the text, and nothing that
-a file says of itself is believed before it has been read. A row that cannot be parsed is looked for only after the
-parser has refused, so that a good file pays nothing for errors that name their line.
+a file says of itself is believed before it has been read.
 """
 
 from __future__ import annotations
@@ -10,11 +9,10 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-import re
-import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -78,19 +76,21 @@ class Table:
         """The numbers in these columns, shape (rows, columns). Empty cells are NaN."""
         wanted = {name: self.columns[name] for name in columns}
         needed = max(self.columns.values()) + 1
-        return parse_rows(self.path, self._rows(), self.separator, wanted, self.width, dtype, needed=needed)
+        return parse_rows(self.path, self.rows(), self.separator, wanted, self.width, dtype, needed=needed)
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
         """The cells of a column, without quotes, with their lines; empty where a row is too short."""
         index = self.columns[column]
-        for number, line in self._rows():
-            cells = line.replace('"', "").split(self.separator, index + 1)
+        for number, line in self.rows():
+            cells = split_row(line, self.separator)
             yield number, cells[index].strip() if index < len(cells) else ""
 
-    def _rows(self) -> Iterator[tuple[int, str]]:
-        stripped = ((number, line.strip(" ")) for number, line in lines_of(self.path, after=self.header))
-        rows = ((number, line) for number, line in stripped if line.strip() and not line.startswith("#"))
-        return ((number, flattened(line, self.separator)) for number, line in rows) if self.vectors else rows
+    def rows(self) -> Iterator[tuple[int, str]]:
+        """The lines of the rows with their numbers, without blank ones and comments."""
+        for number, line in lines_of(self.path, after=self.header):
+            line = line.strip(" ")
+            if line and not line.isspace() and line[0] != "#":
+                yield number, flattened(line, self.separator) if self.vectors else line
 
     def trajectory(self, name: str) -> Trajectory:
         """The columns t, x, y, z, qw, qx, qy, qz and, if there, scale."""
@@ -188,10 +188,21 @@ class HeaderLine:
     vectors: bool = False
     """Whether cells of the rows hold vectors, and the names of the header are those of their numbers."""
 
+    @classmethod
+    def of(cls, path: Path, number: int, text: str) -> HeaderLine:
+        """Return the cells of a line, which may be a comment."""
+        text = text.lstrip("# \t")
+        separator = max(SEPARATORS, key=text.count) if any(mark in text for mark in SEPARATORS) else None
+        return cls(number, separator, cells_of(path, number, text, separator))
+
+    def table(self, path: Path, columns: dict[str, int]) -> Table:
+        """Return the rows below with some of the columns."""
+        return Table(path, self.separator, columns, len(self.cells), self.number, self.vectors)
+
     def of_rows(self, path: Path) -> HeaderLine:
         """Return the header as the first row below it has it."""
-        rows = (line for _, line in lines_of(path, after=self.number) if line.strip() and not line.startswith("#"))
-        names = expanded(self.cells, next(rows, ""), self.separator)
+        rows = self.table(path, {}).rows()
+        names = expanded(self.cells, next(rows, (0, ""))[1], self.separator)
         return self if names is None else HeaderLine(self.number, self.separator, names, vectors=True)
 
 
@@ -199,24 +210,16 @@ def header_lines(path: Path) -> Iterator[HeaderLine]:
     """The lines that may name the columns: comments, as `numpy.savetxt` and EuRoC have it, and the first line behind.
 
     The last one is that line, without cells where there are only comments. Blank lines are skipped, and so is what
-    tells spreadsheets the separator (`sep=;`).
-
-    Raises
-    ------
-    TrajectoryError
-        Where the file is empty.
+    tells spreadsheets the separator (`sep=;`). Raises TrajectoryError where the file is empty.
     """
     number = comments = 0
     for number, line in lines_of(path):
         text = line.strip()
-        if not text or text.lower().startswith("sep="):
-            continue
-        header = text.lstrip("# \t")
-        separator = _separator_of(header)
-        yield HeaderLine(number, separator, cells_of(path, number, header, separator))
-        comments += 1
-        if not text.startswith("#") or comments > MOST_COMMENTS:
-            return
+        if text and not text.lower().startswith("sep="):
+            yield HeaderLine.of(path, number, text)
+            comments += 1
+            if not text.startswith("#") or comments > MOST_COMMENTS:
+                return
     if not comments:
         raise TrajectoryError(path, "the file is empty", "it needs a line that names its columns, and rows")
     yield HeaderLine(number, None, [])
@@ -229,29 +232,20 @@ def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
     """
     above: HeaderLine | None = None
     for number, line in islice(lines_of(path), MOST_METADATA):
-        text = line.strip().lstrip("# \t")
-        if not text:
+        if not (text := line.strip().lstrip("# \t")):
             continue
-        if above and _are_numbers(cells := cells_of(path, number, text, above.separator), above.separator):
+        cells = cells_of(path, number, text, above.separator) if above else []
+        filled = [cell if above.separator == "," else cell.replace(",", ".") for cell in cells if cell]
+        if sum(map(is_number, filled)) > len(filled) / 2:
             if len(cells) == len(above.cells) and not any(map(is_number, above.cells)):
                 yield above
             above = None
         else:
-            separator = _separator_of(text)
-            above = HeaderLine(number, separator, cells_of(path, number, text, separator))
-
-
-def _are_numbers(cells: Sequence[str], separator: str | None) -> bool:
-    filled = [cell if separator == "," else cell.replace(",", ".") for cell in cells if cell]
-    return sum(map(is_number, filled)) > len(filled) / 2
-
-
-def _separator_of(header: str) -> str | None:
-    return max(SEPARATORS, key=header.count) if any(mark in header for mark in SEPARATORS) else None
+            above = HeaderLine.of(path, number, text)
 
 
 def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[str] = ()) -> Table:
-    """The table whose header names all the columns in `names`.
+    """The table whose header, one of `header_lines`, names all the columns in `names`.
 
     Parameters
     ----------
@@ -260,38 +254,40 @@ def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[
         Names are lower case, without their unit in brackets.
     default : sequence of str
         The meanings of the columns, in order, of a file without a header; such a file is separated by white space.
-
-    Notes
-    -----
-    The header is one of `header_lines`. Blank lines and comments (`#`) between the rows are skipped.
     """
-    expected = ", ".join(aliases[0] for aliases in names.values())
-    partial: tuple[int, list[str]] | None = None
-    first = 0
+    meaning_of = {alias: meaning for meaning, aliases in {**names, **optional}.items() for alias in aliases}
+    nearest: tuple[list[str], int] | None = None
     for line in header_lines(path):
-        first = line.number
-        cells = [cell.partition("[")[0].strip().lower() for cell in line.cells]
-        meanings = [_meaning_of(cell, {**names, **optional}) for cell in cells]
+        meanings = [meaning_of.get(cell.partition("[")[0].strip().lower()) for cell in line.cells]
         columns = {meaning: index for index, meaning in enumerate(meanings) if meaning}
         missing = [meaning for meaning in names if meaning not in columns]
         if not missing:
             if repeated := [meaning for meaning in columns if meanings.count(meaning) > 1]:
-                raise TrajectoryError(path, f"two columns mean {repeated[0]}", "rename or delete one of them", first)
-            return Table(path, line.separator, columns, len(cells), first)
-        if columns and (partial is None or len(missing) < len(partial[1])):
-            partial = first, missing
-    if default and not (partial and partial[0] == first):
+                way_out = "rename or delete one of them"
+                raise TrajectoryError(path, f"two columns mean {repeated[0]}", way_out, line.number)
+            return Table(path, line.separator, columns, len(meanings), line.number)
+        if columns and (nearest is None or len(missing) < len(nearest[0])):
+            nearest = missing, line.number
+    if default and not (nearest and nearest[1] == line.number):
         columns = {meaning: index for index, meaning in enumerate(default)}
-        return Table(path, None, columns, len(default), first - 1)
-    if partial is None:
-        raise TrajectoryError(path, "no column has a known name", f"the first line has to name {expected}", first)
-    number, missing = partial
-    absent = ", ".join(names[meaning][0] for meaning in missing)
-    raise TrajectoryError(path, f"no column named {absent}", f"the header has to name {expected}", number)
+        return Table(path, None, columns, len(default), line.number - 1)
+    expected = ", ".join(aliases[0] for aliases in names.values())
+    if nearest is None:
+        way_out = f"the first line has to name {expected}"
+        raise TrajectoryError(path, "no column has a known name", way_out, line.number)
+    absent = ", ".join(names[meaning][0] for meaning in nearest[0])
+    raise TrajectoryError(path, f"no column named {absent}", f"the header has to name {expected}", nearest[1])
 
 
-def _meaning_of(cell: str, names: Columns) -> str | None:
-    return next((meaning for meaning, aliases in names.items() if cell in aliases), None)
+def split_row(line: str, separator: str | None) -> list[str]:
+    """The cells of a row, without quotes."""
+    if '"' in line:
+        return (
+            next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+            if separator
+            else line.replace('"', "").split()
+        )
+    return line.split(separator)
 
 
 def parse_rows(
@@ -332,85 +328,51 @@ def parse_rows(
     TrajectoryError
         With the number of the line.
     """
+    needed = max(needed, *(index + 1 for index in columns.values()))
+    convert = float if dtype is np.float64 else _whole
+    indices = [*columns.values()]
+    pick = itemgetter(*indices) if len(indices) > 1 else lambda cells: [cells[indices[0]]]
     rows, blocks, count = iter(rows), [np.empty((0, len(columns)), dtype)], 0
     while block := list(islice(rows, BLOCK)):
         count += len(block)
         if count > MOST_ROWS:
             problem = f"more than {MOST_ROWS} rows"
             raise TrajectoryError(path, problem, "split the recording, or export it at a lower rate", block[-1][0])
-        blocks.append(_parse_block(path, block, separator, columns, width, dtype, needed))
+        numbers = []
+        for number, line in block:
+            if separator != "," and "," in line:
+                line = line.replace(",", ".")
+            cells = split_row(line, separator)
+            if len(cells) > width and any(cell.strip() for cell in cells[width:]):
+                problem = f"{len(cells)} columns where {width} have a name"
+                raise TrajectoryError(path, problem, "correct the line", number)
+            if len(cells) < needed:
+                problem = f"{len(cells)} columns where {needed} are needed"
+                raise TrajectoryError(path, problem, "correct or delete the line", number)
+            try:
+                if "_" in line:
+                    raise ValueError("Python's own way of writing numbers")
+                numbers.append([*map(convert, pick(cells))])
+            except (ValueError, OverflowError):
+                named = zip(columns, pick(cells), strict=True)
+                numbers.append([_number(path, number, name, cell, convert) for name, cell in named])
+        blocks.append(np.array(numbers, dtype))
     return np.concatenate(blocks)
 
 
-def _parse_block(
-    path: Path,
-    rows: Sequence[tuple[int, str]],
-    separator: str | None,
-    columns: Mapping[str, int],
-    width: int,
-    dtype: type,
-    needed: int,
-) -> np.ndarray:
-    needed = max(needed, *(index + 1 for index in columns.values()))
-    empty = re.compile(f"(^|{separator}) *(?={separator}|$)")
-    lines = []
-    for number, line in rows:
-        if separator is None:
-            count = len(line.split())
-        else:
-            if '"' in line:
-                line = line.replace('"', "")
-            if separator != "," and "," in line:
-                line = line.replace(",", ".")
-            if (
-                separator * 2 in line
-                or f"{separator} " in line
-                or line.startswith(separator)
-                or line.endswith(separator)
-            ):
-                line = empty.sub(r"\1nan", line)
-            count = line.count(separator) + 1
-        if count > width and not _only_blanks_beyond(line, separator, width):
-            raise TrajectoryError(path, f"{count} columns where {width} have a name", "correct the line", number)
-        if count < needed:
-            raise TrajectoryError(
-                path, f"{count} columns where {needed} are needed", "correct or delete the line", number
-            )
-        lines.append(line)
-    indices = list(columns.values())
+def _whole(cell: str) -> np.int64:
+    return np.int64(int(cell))
+
+
+def _number(path: Path, line: int, name: str, cell: str, convert: Callable[[str], float]) -> float:
+    """The number in a cell, which may be empty or have a decimal comma in quotes."""
     try:
-        return _load(lines, separator, indices, dtype)
-    except _UNPARSABLE:
-        row = _first_unparsable(lines, separator, indices, dtype)
-    number, cells = rows[row][0], lines[row].split(separator)
-    kind = "a whole number" if np.issubdtype(dtype, np.integer) else "a number"
-    wrong = _first_unparsable([cells[index] for index in indices], separator, [0], dtype)
-    name, cell = list(columns)[wrong], cells[indices[wrong]].strip()
-    raise TrajectoryError(path, f"{name} is {shown(cell)}, not {kind}", "correct or delete the line", number)
-
-
-def _only_blanks_beyond(line: str, separator: str | None, width: int) -> bool:
-    return separator is not None and all(cell == "nan" for cell in line.split(separator)[width:])
-
-
-_UNPARSABLE = (ValueError, OverflowError, DeprecationWarning)
-
-
-def _load(lines: list[str], separator: str | None, columns: list[int], dtype: type) -> np.ndarray:
-    with warnings.catch_warnings():
-        # NumPy only warns where it reads 1.5e18 as an integer, which loses digits.
-        warnings.simplefilter("error", DeprecationWarning)
-        return np.loadtxt(lines, dtype, comments=None, delimiter=separator, usecols=columns, ndmin=2)
-
-
-def _first_unparsable(lines: list[str], separator: str | None, columns: list[int], dtype: type) -> int:
-    """The index of the first line that cannot be parsed, of lines among which there is one."""
-    first, last = 0, len(lines)
-    while last - first > 1:
-        middle = (first + last) // 2
-        try:
-            _load(lines[first:middle], separator, columns, dtype)
-            first = middle
-        except _UNPARSABLE:
-            last = middle
-    return first
+        if not cell.strip(" ") and convert is float:
+            return np.nan
+        if "_" in cell:
+            raise ValueError
+        return convert(cell.replace(",", "."))
+    except (ValueError, OverflowError):
+        kind = "a number" if convert is float else "a whole number"
+        problem = f"{name} is {shown(cell.strip())}, not {kind}"
+        raise TrajectoryError(path, problem, "correct or delete the line", line) from None

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from .options import ReadingOptions
-from .recordings import Selection, Trajectory
+from .recordings import Selection, Trajectory, TrajectoryError
 from .sense import require_one_body
 from .tables import read_table
 from .times import require_seconds, seconds_of
@@ -43,6 +43,10 @@ def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Traj
     """The one body of the file, which has the file's name."""
     (name,) = selection.of([path.stem])
     table = read_table(path, NAMES, OPTIONAL_NAMES, default=tuple(NAMES))
+    line, row = next(table.rows(), (0, ""))
+    if len(row.split()) == 4:
+        problem = "positions only, and rotations are needed"
+        raise TrajectoryError(path, problem, "write t x y z qx qy qz qw in every line", line)
     trajectory, unit = table.trajectory(name), options.time_unit or ""
     if options.frame_rate:
         trajectory = replace(trajectory, times=trajectory.times / options.frame_rate)

@@ -38,7 +38,7 @@ STYLE: Specification = {
 
 DASHES: Specification = {
     "field": "keys",
-    "legend": {"title": "Keys", "orient": "bottom", "symbolStrokeColor": "var(--ink)"},
+    "legend": {"title": "Keys", "orient": "bottom"},
     "scale": {"domain": ["where needed", "evenly spaced"], "range": [[1, 0], [4, 3]]},
 }
 

@@ -4,10 +4,10 @@ An array of shape (rows, n) is described by `[offset, rows, n, step, width]`: wh
 unit is worth, and how many bytes a number has. Each row holds the first number and then differences, modulo the width;
 the lowest bytes of all numbers come first, then the next, which gzip likes. `viewer/data.js` reads it.
 
-Metres, radians, seconds from the clip's first sample; z is up. Of a single body the deviations of a mode from the
-recording are a difference of positions and a rotation vector in the world; of a whole body the differences of all
-joints' positions. Where a clip is long, the view has fewer samples than the chart, and the chart the largest error of
-every few samples: the worst sample of each mode is in both.
+Metres from the middle of the recording, radians, seconds from the clip's first sample; z is up. Of a single body the
+deviations of a mode from the recording are a difference of positions and a rotation vector in the world; of a whole
+body the differences of all joints' positions. Where a clip is long, the view has fewer samples than the chart, and the
+chart the largest error of every few samples: the worst sample of each mode is in both.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import base64
 import gzip
 import json
 from collections.abc import Callable
+from functools import lru_cache
 from math import floor, log10
 from typing import Any
 
@@ -27,6 +28,7 @@ from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
 from rigid_motion_batch.recordings.figures import carrying, short_names
 
+from .joints import full_colour
 from .mesh import Mesh
 
 MOST_SEEN = 4_000_000
@@ -54,11 +56,10 @@ class Block:
         self._parts: list[bytes] = []
         self._size = 0
 
-    def put(self, values: np.ndarray, width: int = 2, step: float | None = None) -> Description:
-        """Add an array of shape (rows, n) or (n,), rounded to steps; by default as fine as the width has room for."""
+    def put(self, values: np.ndarray, width: int = 2, step: float = 0.0) -> Description:
+        """Add an array of shape (rows, n) or (n,), rounded to this step, or the finest that the width has room for."""
         values = np.atleast_2d(np.asarray(values, dtype=float))
-        if step is None:
-            step = float(np.abs(values).max(initial=0.0)) / (2 ** (8 * width - 1) - 1) or 1.0
+        step = max(step, float(np.abs(values).max(initial=0.0)) / (2 ** (8 * width - 1) - 1)) or 1.0
         whole = np.rint(values / step).astype(np.int64)
         differences = np.diff(whole, axis=1, prepend=0).astype(f"<i{width}" if width > 1 else "i1")
         packed = np.ascontiguousarray(differences.reshape(-1, 1).view(np.uint8).T).tobytes()
@@ -80,6 +81,8 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
     begin = float(clip.times[0])
     seen = _seen(clip)
     truth = _joints(clip.truth)[:, seen]
+    # Around the middle: what is far from the origin of its world has digits to spare.
+    truth = truth - (truth.min(axis=(0, 1)) + truth.max(axis=(0, 1))) / 2.0
     size = (_extent(truth) if body else mesh.size) or 1.0
     cell = _nice(0.3 * size)
     recording = {
@@ -121,8 +124,8 @@ def _choice_data(
     rows = [motion.metrics[0] for motion in result.motions]
     body = clip.parents is not None
     largest = max(float(motion.errors[0].max()) for motion in result.motions)
-    joints = [motion.joint_errors.max(axis=1) for motion in result.motions if motion.joint_errors is not None]
-    by_joint = np.max(joints, axis=0) if joints else np.array([largest])
+    of_joints = [motion.joint_errors for motion in result.motions if motion.joint_errors is not None]
+    by_joint = np.max([errors.max(axis=1) for errors in of_joints], axis=0) if of_joints else np.zeros(1)
     keyed = len({row.keys for row in rows}) > 1 or rows[0].decimation != "uniform"
     return {
         "name": result.choice.name,
@@ -136,7 +139,7 @@ def _choice_data(
         "worst": largest,
         "factor": next(factor for factor in FACTORS if factor * largest <= SEEN_AS[body] * size or factor == 1),
         "joint": int(np.argmax(by_joint)),
-        "top": float(by_joint.max()),
+        "top": full_colour(of_joints) if of_joints else 0.0,
         "motions": [
             {
                 "modes": list(motion.modes),
@@ -173,6 +176,7 @@ def _deviations(
     return found
 
 
+@lru_cache(maxsize=4)
 def mesh_data(mesh: Mesh) -> dict[str, Any]:
     """A mesh as the viewer draws it."""
     block = Block()

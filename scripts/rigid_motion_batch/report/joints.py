@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,12 @@ class Joints:
     pictures: list[tuple[str, str]]
     """Of each motion its name and its picture, as an address."""
 
+    worst: list[str]
+    """Of each motion the joint with the largest error, and that, in mm."""
+
+    slide: str
+    """How far a joint that stands on the ground slides in the recording itself, in mm; empty where none stands."""
+
     rows: list[list[str]]
     """RMS and largest error under each motion, for each joint, in mm."""
 
@@ -50,7 +57,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
     if not motions:
         return None
     errors = [1e3 * motion.joint_errors for motion in motions]
-    top = max(float(np.quantile(some, NEARLY_ALL)) for some in errors) or 1.0
+    top = 1e3 * full_colour(motion.joint_errors for motion in motions)
     pictures = [
         (numbers.joined(motion.modes), heat_map(some, top)) for motion, some in zip(motions, errors, strict=True)
     ]
@@ -60,7 +67,17 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
         for of_joint in zip(*by_mode, strict=True)
     ]
     names = short_names(clip.joint_names)
-    return Joints(place, clip.facts.name, result.choice.name, result.choice.title, names, digits(top), pictures, rows)
+    places = [int(motion.joint_errors.max(axis=1).argmax()) for motion in motions]
+    worst = [f"{names[joint]} {digits(some[joint].max())} mm" for joint, some in zip(places, errors, strict=True)]
+    slid = motions[0].metrics[0].recorded_slide_m
+    slide = "" if slid is None else digits(1e3 * slid)
+    facts = clip.facts.name, result.choice.name, result.choice.title
+    return Joints(place, *facts, names, digits(top), pictures, worst, slide, rows)
+
+
+def full_colour(errors: Iterable[np.ndarray]) -> float:
+    """The error that colours reach up to, one scale for all of these (joints, n): nearly the largest."""
+    return max(float(np.quantile(some, NEARLY_ALL)) for some in errors) or 1.0
 
 
 def heat_map(errors: np.ndarray, top: float) -> str:

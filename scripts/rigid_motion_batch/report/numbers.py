@@ -5,9 +5,10 @@ Values are in the units that the report shows: millimetres, degrees, keys and by
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import floor, isfinite, log10
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Unifo
 from rigid_motion_batch.analysis.metrics import NOTHING, Metrics, geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE, label_of
 from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
-from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.analysis.results import ChoiceNumbers
 
 
 @dataclass(frozen=True)
@@ -96,8 +97,8 @@ class Numbers:
 
     def mean(self, clip: int | None = None) -> np.ndarray:
         """The numbers of a clip, or the geometric means over those that have them, shape (measures, choices, modes)."""
-        if clip is not None:
-            return self.values[:, clip]
+        if clip is not None or len(self.clips) == 1:
+            return self.values[:, clip or 0]
         return np.stack([geometric_mean(of_clips) for of_clips in self.values])
 
     def deciding(self, choice: int) -> int:
@@ -109,40 +110,40 @@ class Gathering:
     """Numbers while clips come in, one at a time."""
 
     def __init__(self) -> None:
-        self._rows: list[dict[Choice, dict[str, np.ndarray]]] = []
         self._clips: list[str] = []
+        self._rows: list[tuple[tuple[Choice, ...], tuple[str, ...], np.ndarray]] = []
+        """Of each clip its choices, its modes, and its numbers, shape (measures, choices, modes)."""
         self._groupings: list[frozenset[Groups]] = []
-        self._known: dict[frozenset[Groups], frozenset[Groups]] = {}
+        self._known: dict[Any, Any] = {}
 
-    def add(self, clip: ClipResult) -> None:
-        """Take the numbers of a clip, and nothing that is as long as it."""
-        self._clips.append(clip.facts.name)
-        self._rows.append(
-            {
-                result.choice: {
-                    row.mode: np.array([measure.of(row) for measure in MEASURES])
-                    for motion in result.motions
-                    for row in motion.metrics
-                }
-                for result in clip.choices
-            }
-        )
-        groupings = frozenset(tuple(motion.modes for motion in result.motions) for result in clip.choices)
-        self._groupings.append(self._known.setdefault(groupings, groupings))
+    def add(self, clip: str, results: Sequence[ChoiceNumbers]) -> None:
+        """Take the numbers of a clip of this name."""
+        choices = tuple(result.choice for result in results)
+        modes = tuple(dict.fromkeys(row.mode for result in results for row in result.rows))
+        values = np.full((len(MEASURES), len(choices), len(modes)), np.nan)
+        for place, result in enumerate(results):
+            for row in result.rows:
+                values[:, place, modes.index(row.mode)] = [measure.of(row) for measure in MEASURES]
+        groupings = frozenset(result.groups for result in results)
+        self._clips.append(clip)
+        self._rows.append((self._same(choices), self._same(modes), values))
+        self._groupings.append(self._same(groupings))
+
+    def _same(self, value: Any) -> Any:
+        """An equal value that was here before, so that thousands of clips share one."""
+        return self._known.setdefault(value, value)
 
     def numbers(self, names: dict[str, str] | None = None) -> Numbers:
         """All of them. Raises ValueError where no clip had a result."""
-        found = dict.fromkeys(choice for rows in self._rows for choice in rows)
+        found = dict.fromkeys(choice for choices, _, _ in self._rows for choice in choices)
         choices = tuple(sorted(found, key=lambda choice: (KINDS.index(type(choice)), choice.size)))
-        modes = tuple(dict.fromkeys(mode for rows in self._rows for by_mode in rows.values() for mode in by_mode))
+        modes = tuple(dict.fromkeys(mode for _, own, _ in self._rows for mode in own))
         if not choices:
             raise ValueError("no reconstruction to report: every clip is too short for two keys")
-        values = np.full((len(MEASURES), len(self._clips), len(choices), len(modes)), np.nan)
-        columns = {choice: place for place, choice in enumerate(choices)}
-        for clip, rows in enumerate(self._rows):
-            for choice, by_mode in rows.items():
-                for mode, row in by_mode.items():
-                    values[:, clip, columns[choice], modes.index(mode)] = row
+        values = np.full((len(MEASURES), len(self._rows), len(choices), len(modes)), np.nan)
+        for clip, (own_choices, own_modes, own) in enumerate(self._rows):
+            rows, columns = [choices.index(one) for one in own_choices], [modes.index(one) for one in own_modes]
+            values[:, clip, np.array(rows)[:, None], columns] = own
         return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings), names or {})
 
 

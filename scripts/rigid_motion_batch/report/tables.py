@@ -23,7 +23,7 @@ class Cell:
     small: str = ""
     best: bool = False
     value: float | None = None
-    """What it is sorted by, where that is not the text."""
+    """What it is sorted by, where that is not all of its text."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,6 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
         if not np.isfinite(own).any():
             continue
         texts = [[digits(value) for value in row] for row in own.tolist()]
-        # What is as small as it is shown is as good: ties are ties.
         least = [_least(row) for row in texts]
         rows = tuple(
             Row(
@@ -77,7 +76,8 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
                     Cell(
                         texts[choice][column],
                         _change(own[choice, column], reference, values[place, choice], group, numbers),
-                        len(groups) > 1 and texts[choice][column] == least[choice],
+                        texts[choice][column] == least[choice],
+                        float(np.nan_to_num(own[choice, column], nan=1e12)),
                     )
                     for choice in range(len(numbers.choices))
                 ),
@@ -91,7 +91,9 @@ def grids(numbers: Numbers, clip: int | None = None) -> list[Grid]:
 
 
 def _least(texts: Iterable[str]) -> str:
-    return min((text for text in texts if text != NONE), key=float, default="")
+    """The lowest as it is shown, so that ties are ties; nothing where all are."""
+    different = set(texts) - {NONE}
+    return min(different, key=float) if len(different) > 1 else ""
 
 
 def _change(value: float, reference: int | None, row: np.ndarray, group: Sequence[str], numbers: Numbers) -> str:
@@ -116,15 +118,13 @@ def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[C
             for motion in result.motions
             for row in motion.metrics[:1]
         ]
-        least = [
-            min((text for text in column if text != NONE), key=float, default="") for column in zip(*lines, strict=True)
-        ]
+        least = [_least(column) for column in zip(*lines, strict=True)]
         found += [
             (
                 clip.facts.name,
                 result.choice.title,
                 motion.modes,
-                tuple(Cell(text, best=len(lines) > 1 and text == best) for text, best in zip(line, least, strict=True)),
+                tuple(Cell(text, best=text == best) for text, best in zip(line, least, strict=True)),
             )
             for motion, line in zip(result.motions, lines, strict=True)
         ]

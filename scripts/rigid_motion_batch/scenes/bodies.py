@@ -29,9 +29,6 @@ SHADES = 16
 ERROR, FLASH, WORST = "error", "flash", "worst"
 """The attributes of the errors: in metres; how much a joint flashes and whether it has the ring, 0 to 1."""
 
-GHOST_ALPHA = 0.7
-"""Its parts are thin."""
-
 IN_FRONT = 0.45
 """How far towards the camera what marks joints is, in units of the frame's height."""
 
@@ -96,8 +93,7 @@ class Bodies:
         self.rig: Rig | None = None
         self.ghost_action: bpy.types.Action | None = None
         self.figure = physique.Carried.figure("Figure", shape)
-        self.recording = physique.Carried.ghost("Figure recording", shape, self.size)
-        self.recording.mesh.materials.append(ghost(cast.theme, GHOST_ALPHA))
+        self.ghost = ghost(cast.theme)
         for shade in range(SHADES):
             name = f"Error {1e3 * full * shade / (SHADES - 1):.3g} mm"
             self.figure.mesh.materials.append(surface(name, error_hex(shade / (SHADES - 1)), roughness=0.55))
@@ -152,7 +148,10 @@ class Bodies:
             rig.obj.animation_data.action_slot = self.ghost_action.slots[0]
             for bone, (place, turn) in zip(rig.obj.pose.bones, self.still, strict=True):
                 bone.location, bone.rotation_quaternion = place, turn
-        self._carried(f"{lane.mode} recording figure", self.recording, rig, lane)
+        figure = self._carried(f"{lane.mode} recording figure", self.figure, rig, lane)
+        figure.location = rig.obj.location = self.cast.behind
+        figure.material_slots[0].link = "OBJECT"
+        figure.material_slots[0].material = self.ghost
 
     @staticmethod
     def _carried(name: str, carried: physique.Carried, rig: Rig, lane: Lane) -> bpy.types.Object:
@@ -192,8 +191,7 @@ class Bodies:
         return obj
 
     def _add_ground(self, lane: Lane) -> None:
-        cast, cell, metres = self.cast, lane.cell, self.cast.layout.metres
-        width, height = cell.room * metres / 2.0
+        cast, metres = self.cast, self.cast.layout.metres
         apply_group(
             lane.child(f"{lane.mode} ground", self.grid),
             self.trail_group,
@@ -202,9 +200,7 @@ class Bodies:
             Radius=GRID_RADIUS * metres,
             Taper=0.0,
             Material=self.track,
-            Middle=layout.unproject(np.append(cell.view * metres, 0.0)),
-            Right=layout.RIGHT / width,
-            Up=layout.UP / height,
+            **lane.window(metres),
         )
 
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from rigid_motion import animation
 from rigid_motion.motion import Poses, interpolate, shell_error
-from rigid_motion_batch.analysis.bodies import BodyReconstruction, identical_body_modes
+from rigid_motion_batch.analysis.bodies import BLOCK, BodyReconstruction, identical_body_modes
 from rigid_motion_batch.analysis.body_metrics import key_samples
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import THEMES, error_hex, full_colour
@@ -25,7 +25,7 @@ from . import captions, layout
 from .armature import Rest
 from .bodies import SHADES, Bodies, BodyMotion, flashes
 from .framing import SMOOTHING, Framing, Jointed
-from .lanes import Cast
+from .lanes import Cast, names_of
 from .materials import ink
 from .physique import Physique, figure_size
 from .scene import LEGEND, Header, put_on_stage
@@ -67,23 +67,26 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
     rest = Rest.of(made.clip.figure, made.clip.metres_per_unit, made.clip.axes)
     motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest, radii)
 
-    framing = Framing.of(Jointed(motion.places(motion.recording)), SMOOTHING * settings.fps)
-    low, high = framing.extent([Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values())])
-    size = figure_size(rest)
-    low, high = low - MARGIN * size, high + MARGIN * size
-    low[1] -= GROUND * size
+    recording, *others = (Jointed(motion.places(some)) for some in (motion.recording, *motion.modes.values()))
+    framing = Framing.of(recording, SMOOTHING * settings.fps)
+    extent, size = framing.extent(recording, others), figure_size(rest)
+    extent = replace(
+        extent, low=extent.low - size * np.array((MARGIN, MARGIN + GROUND, MARGIN)), high=extent.high + MARGIN * size
+    )
     width, height = settings.resolution
-    plan = layout.arrange(len(lanes_of), (high - low)[:2], width / height)
-    in_mm = {mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()}
+    notes = _notes(made, motion.modes)
+    named = any(names_of(modes, notes) for modes in lanes_of)
+    plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
     cast = Cast(
         timeline=timeline,
         framing=framing,
         framing_steps=1,
         layout=plan,
-        middle=np.append((low + high)[:2] / 2.0, high[2]),
-        errors=in_mm,
-        largest_error=max(float(error.max()) for error in in_mm.values()),
-        notes=_notes(made, motion.modes),
+        extent=extent,
+        errors={mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()},
+        sampled={mode: 1e3 * _sampled_errors(made, mode, radii) for mode in motion.modes},
+        sample_frames=timeline.frames_of(made.times),
+        notes=notes,
         theme=theme,
         ink=ink("Ink", theme.ink),
         faint=ink("Faint", theme.faint),
@@ -96,7 +99,7 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
     header = Header(made.clip.name, made.choice.title, _legend(made, settings), bar.width + 2.0 * BAR_GAP)
     with _extension():
         actors = Bodies(cast, motion, shape, full)
-        put_on_stage(scene, settings, cast, lanes_of, actors, header, depth=float(high[2] - low[2]))
+        put_on_stage(scene, settings, cast, lanes_of, actors, header)
     bar.put(cast)
     scene["recording_centre_m"] = centre.tolist()
     scene["recording_start_s"] = timeline.start
@@ -148,6 +151,14 @@ def shown_motion(
         errors=errors,
         flashes={mode: flashes(own, timeline.frames, fade) for mode, own in moment.items()},
     ), centre
+
+
+def _sampled_errors(made: BodyReconstruction, mode: str, radii: np.ndarray) -> np.ndarray:
+    """The largest error of any joint at each sample, in metres, shape (n,)."""
+    samples = np.arange(made.samples.start, made.samples.stop)
+    blocks = np.array_split(samples, len(samples) // BLOCK + 1)
+    errors = [shell_error(made.shown(mode, made.clip.times[some]), made.truth(some), radii[:, None]) for some in blocks]
+    return np.concatenate([error.max(axis=0) for error in errors])
 
 
 def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from rigid_motion.motion.twists import between, exponential
 
 from . import layout
 
-SHARE = 0.4
+SHARE = 0.25
 """Of the object's size: how large the largest deviation is shown at most, where it is magnified."""
 
 STEPS = (1.0, 2.0, 5.0)

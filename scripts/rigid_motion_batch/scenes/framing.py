@@ -31,7 +31,13 @@ THREE_QUARTER = np.radians(30.0)
 """By how much it comes nearer to the camera as it goes."""
 
 SMOOTHING = 0.12
-"""Seconds of the film: the standard deviation of the bell by which the focus is smoothed."""
+"""Seconds of the film: the standard deviation of the bell by which the focus is smoothed, at most."""
+
+BESIDE = 0.25
+"""What is off from the recording by more than so much of the room that this needs is cut where it leaves the view."""
+
+LAG = 1.35
+"""What is followed may need so many times the room that it needs with a focus which is not smoothed."""
 
 
 class Moving(Protocol):
@@ -102,6 +108,29 @@ class Jointed:
 
 
 @dataclass(frozen=True, eq=False)
+class Extent:
+    """The lowest and highest of right, up and away, shape (3,) each, that are seen of what moves, from the focus on.
+
+    As `layout.project` has them.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+    cut: bool
+    """Whether something gets farther to the sides."""
+
+    @property
+    def size(self) -> np.ndarray:
+        """Width and height in metres."""
+        return (self.high - self.low)[:2]
+
+    @property
+    def depth(self) -> float:
+        return float(self.high[2] - self.low[2])
+
+
+@dataclass(frozen=True, eq=False)
 class Framing:
     """How a motion of n moments is seen."""
 
@@ -113,32 +142,36 @@ class Framing:
 
     follows: bool
 
-    def extent(self, shown: Sequence[Moving]) -> tuple[np.ndarray, np.ndarray]:
-        """The lowest and highest of right, up and away, shape (3,) each, that any of them reaches.
-
-        As `layout.project` has them, from the focus on.
-        """
+    def extent(self, recording: Moving, shown: Sequence[Moving] = ()) -> Extent:
+        """What a recording reaches, and others beside it as far as they do not make it small."""
         turn = layout.yaw_quaternion(self.yaw)
-        seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in shown]
-        return np.min([points.min(axis=0) for points in seen], axis=0), np.max([p.max(axis=0) for p in seen], axis=0)
+        seen = [layout.project(rotate(turn, moving.around(self.focus))) for moving in (recording, *shown)]
+        lows, highs = (np.array([edge(points, axis=0) for points in seen]) for edge in (np.min, np.max))
+        low, high = lows.min(axis=0), highs.max(axis=0)
+        beside = BESIDE * float((highs[0] - lows[0])[:2].max())
+        least, most = np.append((lows[0] - beside)[:2], -np.inf), np.append((highs[0] + beside)[:2], np.inf)
+        return Extent(np.maximum(low, least), np.minimum(high, most), bool((low < least).any() or (high > most).any()))
 
     @classmethod
     def of(cls, recording: Moving, smoothing: float) -> Framing:
-        """What shows a recording well. `smoothing` is `SMOOTHING` in moments of it."""
-        path = _smoothed(recording.middle, smoothing)
-        still = cls._facing(recording, np.zeros_like(path), follows=False)
-        following = cls._facing(recording, path, follows=True)
-        gain = still._height(recording) / following._height(recording)
-        return following if gain > FOLLOW_GAIN else still
+        """What shows a recording well. `smoothing` is `SMOOTHING` in moments of it, or less where that shows more."""
+        still = cls._facing(recording, np.zeros_like(recording.middle), follows=False)
+        closest = cls(recording.middle, still.yaw, follows=True)._width(recording)
+        if still._width(recording) <= FOLLOW_GAIN * closest:
+            return still
+        for share in (1.0, 0.5, 0.25):
+            following = cls._facing(recording, _smoothed(recording.middle, share * smoothing), follows=True)
+            if following._width(recording) <= LAG * closest:
+                break
+        return following
 
     @classmethod
     def _facing(cls, recording: Moving, focus: np.ndarray, *, follows: bool) -> Framing:
         return cls(focus, recording.heading(focus), follows)
 
-    def _height(self, recording: Moving) -> float:
-        """What a square picture has to span."""
-        low, high = self.extent([recording])
-        return float((high - low)[:2].max())
+    def _width(self, recording: Moving) -> float:
+        """The side of a square as large as what is seen."""
+        return float(np.sqrt(self.extent(recording).size.prod()))
 
 
 def _smoothed(path: np.ndarray, deviation: float) -> np.ndarray:

@@ -19,16 +19,19 @@ from rigid_motion_batch.analysis.modes import label_of
 from rigid_motion_batch.palette import Theme, colour_on
 
 from . import captions, layout, trails
-from .framing import Framing
+from .framing import Extent, Framing
 from .materials import ink
 from .nodes import apply_group
-from .timeline import Timeline
+from .timeline import Timeline, peaks
 
-TITLE, NAME, NUMBER, UNIT, GRAPH = 0.05, 0.033, 0.064, 0.036, 0.07
-"""Sizes of what a caption holds, in units of the frame's height, where there is room."""
+TITLE, NAME, NUMBER, UNIT, SMALL = 0.044, 0.026, 0.05, 0.032, 0.028
+"""Sizes of letters on a card, in units of the frame's height, where there is room."""
 
-NUMBER_OF_JOINT, GRAPH_OF_JOINT, JOINT = 0.052, 0.056, 0.03
-"""The same where the number is that of a joint, which is named above it."""
+INSET, COLUMN = 0.016, 0.15
+"""What is left free at the edges of a card, and how wide the numbers beside the graph are."""
+
+GRAPH, GRAPH_COLUMNS = 0.066, 300
+"""The height of a graph, and how many columns keep their least and their largest sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +45,16 @@ class Cast:
     framing_steps: int
     layout: layout.Layout
 
-    middle: np.ndarray
-    """The middle of all that moves, from the focus on, as `layout.project` gives it but for the depth, which is that of
-    the far end."""
+    extent: Extent
 
     errors: Mapping[str, np.ndarray]
     """Mode id to the error at each frame, in millimetres."""
 
-    largest_error: float
-    """In millimetres: what the graphs reach up to."""
+    sampled: Mapping[str, np.ndarray]
+    """Mode id to the error at each sample of the recording, in millimetres, shape (n,)."""
+
+    sample_frames: np.ndarray
+    """When the samples are, shape (n,)."""
 
     notes: Mapping[str, str]
     """Mode id to what its keys are, where the modes have different ones."""
@@ -65,6 +69,16 @@ class Cast:
     worst: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Mode id to the joint that the error is of, at each frame."""
 
+    @property
+    def largest_error(self) -> float:
+        """In millimetres: what the graphs reach up to."""
+        return max(float(errors.max()) for errors in self.sampled.values())
+
+    @property
+    def behind(self) -> np.ndarray:
+        """How far behind what moves the recording is, in the space of a lane, where it hides nothing."""
+        return rotate(layout.yaw_quaternion(-self.framing.yaw), self.extent.depth * layout.AWAY)
+
 
 @dataclass(frozen=True, eq=False)
 class Lane:
@@ -76,6 +90,12 @@ class Lane:
     empty: bpy.types.Object
     collection: bpy.types.Collection
     cell: layout.Cell
+
+    def window(self, metres: float) -> dict[str, np.ndarray]:
+        """What can be seen of it, as inputs of `trails.WINDOW`; the picture's height spans so many metres."""
+        width, height = self.cell.room * metres / 2.0
+        middle = layout.unproject(np.append(self.cell.view * metres, 0.0))
+        return {"Middle": middle, "Right": layout.RIGHT / width, "Up": layout.UP / height}
 
     def child(self, name: str, data: bpy.types.ID | None) -> bpy.types.Object:
         """A new object that moves with the lane."""
@@ -119,7 +139,9 @@ class Lanes:
         """Put the focus into the middle of the view on every frame."""
         cast = self.cast
         lane.rotation_euler.z = cast.framing.yaw
-        home = layout.unproject(np.append(cell.view * cast.layout.metres, -0.01 * cast.layout.metres) - cast.middle)
+        low, high = cast.extent.low, cast.extent.high
+        middle = np.append((low + high)[:2] / 2.0, high[2] + cast.extent.depth)
+        home = layout.unproject(np.append(cell.view * cast.layout.metres, -0.01 * cast.layout.metres) - middle)
         focus = rotate(layout.yaw_quaternion(cast.framing.yaw), cast.framing.focus)[:: cast.framing_steps]
         lane.location = home - focus[0]
         if cast.framing.follows:
@@ -127,53 +149,43 @@ class Lanes:
             lane.animation_data.action.name = lane.name
 
     def _add_caption(self, modes: tuple[str, ...], cell: layout.Cell) -> None:
-        """From the top the title and the names of the modes, at the foot the error: a number, and a graph of it."""
-        mode = modes[0]
+        """At the top the title and what else is known of the keys, at the foot a graph of the error and a number."""
+        cast, mode, unit = self.cast, modes[0], cell.unit
         card = captions.card(f"{mode} card", cell.width, cell.height, self.card)
         self._put(bpy.data.objects.new(card.name, card), cell.x, cell.y, 1)
-        width, height = cell.caption
-        unit = min(1.0, height / layout.CAPTION_HEIGHT, width / layout.CAPTION_WIDTH)
-        inset = 0.022 * unit
-        left, right, room = cell.left + inset, cell.left + width - inset, width - 2.0 * inset
+        left, right = cell.left + INSET * unit, cell.left + cell.width - INSET * unit
+        room = right - left
         title = min(TITLE * unit, room / self.title_width)
-        line = cell.foot + height - inset - 0.75 * TITLE * unit
-        self._put(captions.words(f"{mode} title", _title(mode), title, self.cast.ink), left, line)
+        line = cell.foot + cell.height - INSET * unit - 0.72 * TITLE * unit
+        self._put(captions.words(f"{mode} title", _title(mode), title, cast.ink), left, line)
+        if names := names_of(modes, cast.notes):
+            size = NAME * unit
+            while (text := captions.wrapped(names, room / size)).count("\n") > 1 or captions.width_of(
+                text
+            ) * size > room:
+                size *= 0.95
+            self._put(captions.words(f"{mode} names", text, size, cast.faint), left, line - 0.036 * unit)
 
-        jointed = self.names is not None
-        number, graph = (NUMBER_OF_JOINT if jointed else NUMBER) * unit, (GRAPH_OF_JOINT if jointed else GRAPH) * unit
-        self._add_graph(mode, left, cell.foot + inset, room, graph)
-        foot = cell.foot + inset + graph + 0.25 * number
-        self._put(captions.words(f"{mode} unit", "mm", UNIT * unit, self.cast.faint, "RIGHT"), right, foot)
-        error = captions.readout(
-            f"{mode} error", self.readout, number, self.cast.timeline.frames, self.cast.errors[mode]
-        )
-        self._put(error, right - 1.9 * UNIT * unit, foot)
-        top = foot + 0.8 * number
-        if jointed:
-            self._add_joint(mode, left, top + 0.15 * number, room, unit)
-            top += JOINT * unit
-
-        # The names shrink until their lines fit between the title and the number.
-        space, size = line - top - 0.3 * TITLE * unit, NAME * unit
-        names = [*modes, *filter(None, (self.cast.notes.get(mode),))]
-        text = captions.wrapped(names, room / size)
-        while (text.count("\n") + 1.4) * size > space or captions.width_of(text) * size > room:
-            size *= 0.95
-            text = captions.wrapped(names, room / size)
-        self._put(captions.words(f"{mode} names", text, size, self.cast.faint), left, line - 1.4 * size)
-
-    def _add_joint(self, mode: str, left: float, foot: float, room: float, unit: float) -> None:
-        """The joint that the number is of."""
-        widest = max(map(captions.width_of, self.cast.joints))
-        size = min(JOINT * unit, room / max(widest, 1e-6))
-        joint = captions.choice(f"{mode} joint", self.names, size, self.cast.timeline.frames, self.cast.worst[mode])
-        self._put(joint, left, foot)
+        column, foot = right - COLUMN * unit, cell.foot + INSET * unit
+        self._add_graph(mode, left, foot, column - left - INSET * unit, GRAPH * unit)
+        number = foot + GRAPH * unit - 0.72 * NUMBER * unit
+        self._put(captions.words(f"{mode} unit", "mm", UNIT * unit, cast.faint, "RIGHT"), right, number)
+        error = captions.readout(f"{mode} error", self.readout, NUMBER * unit, cast.timeline.frames, cast.errors[mode])
+        self._put(error, right - 1.7 * UNIT * unit, number)
+        if self.names is None:
+            text = f"max {cast.sampled[mode].max():.{captions.decimals_for(cast.largest_error)}f}"
+            self._put(captions.words(f"{mode} max", text, SMALL * unit, cast.faint, "RIGHT"), right, foot)
+        else:  # The joint that the number is of.
+            size = min(SMALL, COLUMN / max(map(captions.width_of, cast.joints))) * unit
+            joint = captions.choice(f"{mode} joint", self.names, size, cast.timeline.frames, cast.worst[mode])
+            self._put(joint, column, foot)
 
     def _add_graph(self, mode: str, left: float, foot: float, width: float, height: float) -> None:
         """The error over time, all of it faint, and what has passed in the colour of the mode."""
         cast = self.cast
-        heights = height * cast.errors[mode] / (cast.largest_error or 1.0)
-        mesh = trails.graph(f"{mode} graph", cast.timeline.frames, heights, width)
+        kept = peaks(cast.sampled[mode], GRAPH_COLUMNS)
+        heights = height * cast.sampled[mode][kept] / (cast.largest_error or 1.0)
+        mesh = trails.graph(f"{mode} graph", cast.sample_frames[kept], heights, width)
         mesh.materials.append(self.track)
         self._put(bpy.data.objects.new(f"{mode} graph to come", mesh), left, foot, 3)
         passed = bpy.data.objects.new(f"{mode} graph", mesh)
@@ -184,6 +196,12 @@ class Lanes:
 
     def _put(self, obj: bpy.types.Object, x: float, y: float, lift: int = 2) -> None:
         captions.put(obj, self.frame, self.collection, x, y, lift)
+
+
+def names_of(modes: tuple[str, ...], notes: Mapping[str, str]) -> list[str]:
+    """What is written below the title of modes that are one motion: a note on their keys, and the other modes."""
+    others = [_title(mode) for mode in modes[1:]]
+    return [*filter(None, (notes.get(modes[0]),)), *(["= " + others[0], *others[1:]] if others else [])]
 
 
 def _title(mode: str) -> str:

@@ -23,15 +23,15 @@ MARGIN = 0.022
 HEADER = 0.066
 FOOTER = 0.045
 GAP = 0.014
-PADDING = 0.014
-CAPTION_HEIGHT = 0.3
-"""Of a caption below its view."""
+PADDING = 0.028
+CARD = (0.42, 0.3)
+"""The width and height of a card on which letters have their full size; on a smaller one all of them are smaller."""
 
-CAPTION_WIDTH = 0.34
-"""Of a caption beside its view, in cells that are wide enough for that."""
+HEAD, NAMES, FOOT = 0.062, 0.052, 0.094
+"""What is written on a card takes so much of its height: the title, names below it if there are any, and the error."""
 
 WRAP_GAIN = 0.85
-"""A layout of fewer rows, and with captions below, is kept while it shows the motion so large relative to the best."""
+"""A layout of fewer rows is kept while it shows motion and letters so large relative to the best."""
 
 DIRECTIONS = 1024
 """Spread over the sphere as on a sunflower (a spherical Fibonacci lattice)."""
@@ -42,37 +42,35 @@ SHOWN_RATIO = 2.5
 
 @dataclass(frozen=True)
 class Cell:
-    """One lane's part of the frame: its card, with the view of the motion and the caption below or beside it."""
+    """One lane's part of the frame: its card, with a title at the top, the motion, and the error at the foot."""
 
     x: float
     y: float
     width: float
     height: float
 
-    beside: bool
-    """Whether the caption stands to the left of the view, and not below it."""
+    named: bool = False
+    """Whether there are names below the title."""
 
     @property
-    def caption(self) -> tuple[float, float]:
-        """The width and height of the caption, whose lower left corner is that of the card."""
-        if self.beside:
-            return min(CAPTION_WIDTH, 0.4 * self.width), self.height
-        return self.width, min(CAPTION_HEIGHT, 0.4 * self.height)
+    def unit(self) -> float:
+        """The size of its letters, 1 at most."""
+        return min(1.0, self.width / CARD[0], self.height / CARD[1])
+
+    @property
+    def head(self) -> float:
+        """The height of what is written at the top."""
+        return self.unit * (HEAD + NAMES * self.named)
 
     @property
     def view(self) -> np.ndarray:
         """The middle of the view, shape (2,)."""
-        width, height = self.caption
-        return np.array((self.x + width / 2.0, self.y) if self.beside else (self.x, self.y + height / 2.0))
+        return np.array((self.x, self.y + (self.unit * FOOT - self.head) / 2.0))
 
     @property
     def room(self) -> np.ndarray:
         """The width and height that the motion may fill."""
-        width, height = self.caption
-        padding = 2.0 * min(PADDING, 0.1 * self.width, 0.1 * self.height)
-        if self.beside:
-            return np.array((self.width - width - padding / 2.0, self.height - padding))
-        return np.array((self.width - padding, self.height - height - padding))
+        return np.array((self.width - self.unit * PADDING, self.height - self.head - self.unit * FOOT))
 
     @property
     def left(self) -> float:
@@ -152,8 +150,8 @@ def unproject(seen: np.ndarray) -> np.ndarray:
     return seen @ np.stack((RIGHT, UP, AWAY))
 
 
-def arrange(lanes: int, extent: np.ndarray, aspect: float) -> Layout:
-    """Cells in as few rows as show the object well.
+def arrange(lanes: int, extent: np.ndarray, aspect: float, *, named: bool = False) -> Layout:
+    """Cells in as few rows as show the object, and what is written, well.
 
     Parameters
     ----------
@@ -162,15 +160,15 @@ def arrange(lanes: int, extent: np.ndarray, aspect: float) -> Layout:
         The width and height in metres that the motion needs in every cell. Above zero.
     aspect : float
         The picture's width over its height.
+    named : bool
+        Whether there are names below the titles.
     """
-    candidates = [
-        _arranged(lanes, rows, beside, extent, aspect) for rows in range(1, lanes + 1) for beside in (False, True)
-    ]
-    smallest = min(candidate.metres for candidate in candidates)
-    return next(candidate for candidate in candidates if candidate.metres <= smallest / WRAP_GAIN)
+    candidates = [_arranged(lanes, rows, extent, aspect, named) for rows in range(1, lanes + 1)]
+    sizes = [candidate.cells[0].unit / candidate.metres for candidate in candidates]
+    return next(candidate for candidate, size in zip(candidates, sizes, strict=True) if size >= WRAP_GAIN * max(sizes))
 
 
-def _arranged(lanes: int, rows: int, beside: bool, extent: np.ndarray, aspect: float) -> Layout:
+def _arranged(lanes: int, rows: int, extent: np.ndarray, aspect: float, named: bool) -> Layout:
     columns = -(-lanes // rows)
     width = (aspect - 2.0 * MARGIN - (columns - 1) * GAP) / columns
     height = (1.0 - HEADER - FOOTER - 2.0 * MARGIN - (rows - 1) * GAP) / rows
@@ -181,7 +179,7 @@ def _arranged(lanes: int, rows: int, beside: bool, extent: np.ndarray, aspect: f
             top - height / 2.0 - (lane // columns) * (height + GAP),
             width,
             height,
-            beside,
+            named,
         )
         for lane in range(lanes)
     )

@@ -10,18 +10,23 @@ GLOSS, BOUNCE = 0.0142, 0.878
 """What Workbench's light `paint.sl` shows of a rough colour c that faces the camera: GLOSS + BOUNCE c (measured)."""
 
 
-GHOST_ALPHA = 0.3
+GHOST = 0.5
+"""How much a ghost stands out from its card."""
 
 
-def ghost(theme: Theme, alpha: float = GHOST_ALPHA) -> bpy.types.Material:
-    """What the recording is made of."""
-    return surface("Recording", theme.ghost, alpha=alpha)
+def ghost(theme: Theme) -> bpy.types.Material:
+    """What the recording is made of: between its colour and that of the card, as if it were translucent."""
+    colours = zip(linear(theme.ghost), linear(theme.card), strict=True)
+    return _lit("Recording", tuple(GHOST * ghost + (1.0 - GHOST) * card for ghost, card in colours))
 
 
 def surface(name: str, colour: str, *, alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
     """A lit surface, translucent where alpha is below 1."""
+    return _lit(name, linear(colour), alpha, roughness)
+
+
+def _lit(name: str, rgb: tuple[float, ...], alpha: float = 1.0, roughness: float = 0.4) -> bpy.types.Material:
     material, nodes, output = _new(name)
-    rgb = linear(colour)
     material.diffuse_color = (*rgb, alpha)
     material.roughness = roughness
     principled = nodes.new("ShaderNodeBsdfPrincipled")

@@ -17,7 +17,6 @@ from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.figures import Figure, carrying
 
 from .armature import Rest, Rig
-from .subject import shrink
 
 BONE = "bone"
 """The attribute of a face or point: the number of its bone."""
@@ -38,12 +37,6 @@ STUB = 0.04
 """The length of a solid at a joint without children, relative to the figure, where bones do not lead to children: then
 they are of some program's making, and where they end means nothing."""
 
-THINNER = 0.8
-"""A ghost's solids, beside those that hide them where both agree."""
-
-INSET = 0.004
-"""How far inside of a skin its ghost is, relative to the figure."""
-
 SIDES = 8
 WAIST = 0.22
 """Where along it a solid is thickest."""
@@ -55,9 +48,6 @@ class Physique:
 
     vertices: np.ndarray
     """Shape (v, 3), metres."""
-
-    thinner: np.ndarray
-    """The same of thinner solids, for a ghost: where both agree, the figure hides it. Of a skin the same."""
 
     faces: list[tuple[int, ...]]
     carriers: np.ndarray
@@ -83,22 +73,19 @@ class Physique:
         unturned = np.tile((1.0, 0.0, 0.0, 0.0), (len(skin.vertices), 1))
         vertices = to_blender(Poses(skin.vertices * metres_per_unit, unturned), axes).positions - rest.origin
         faces = [*map(tuple, skin.triangles.tolist())]
-        return cls(vertices, vertices, faces, skin.joints, skin.weights, smooth=True)
+        return cls(vertices, faces, skin.joints, skin.weights, smooth=True)
 
     @classmethod
     def _of_solids(cls, rest: Rest) -> Physique:
         size = figure_size(rest)
-        vertices, thinner, faces, carriers = [], [], [], []
+        vertices, faces, carriers = [], [], []
         for bone, head, tail, share in _parts(rest, size):
-            corners, own_thinner, own = _solid(head, tail, share, size)
+            corners, own = _solid(head, tail, share, size)
             faces += [tuple(len(vertices) * len(corners) + corner for corner in face) for face in own]
             vertices.append(corners)
-            thinner.append(own_thinner)
             carriers.append(np.full(len(corners), bone))
         joints = np.concatenate(carriers)[:, None]
-        return cls(
-            np.concatenate(vertices), np.concatenate(thinner), faces, joints, np.ones(joints.shape), smooth=False
-        )
+        return cls(np.concatenate(vertices), faces, joints, np.ones(joints.shape), smooth=False)
 
 
 def _parts(rest: Rest, size: float) -> Iterator[tuple[int, np.ndarray, np.ndarray, float]]:
@@ -141,10 +128,8 @@ def seen_bones(rest: Rest) -> list[int]:
     return np.flatnonzero(~carries if not carries.all() else carries).tolist()
 
 
-def _solid(
-    head: np.ndarray, tail: np.ndarray, share: float, size: float
-) -> tuple[np.ndarray, np.ndarray, list[tuple[int, ...]]]:
-    """A spindle from head to tail, thickest near its head: its corners, those of a thinner one, and the faces."""
+def _solid(head: np.ndarray, tail: np.ndarray, share: float, size: float) -> tuple[np.ndarray, list[tuple[int, ...]]]:
+    """A spindle from head to tail, thickest near its head: its corners and faces."""
     along = tail - head
     length = float(np.linalg.norm(along))
     radius = share * float(np.clip(SLENDER * length, THICKNESS[0] * size, THICKNESS[1] * size))
@@ -155,17 +140,14 @@ def _solid(
     angles = 2.0 * np.pi * np.arange(SIDES) / SIDES
     ring = np.cos(angles)[:, None] * side + np.sin(angles)[:, None] * other
     rings = ((0.0, 0.45), (WAIST, 1.0), (1.0, 0.35))
-    corners, thinner = (
-        np.concatenate([head + place * length * along + scale * radius * width * ring for place, width in rings])
-        for scale in (1.0, THINNER)
-    )
+    corners = np.concatenate([head + place * length * along + radius * width * ring for place, width in rings])
     steps = np.arange(SIDES)
     faces = [
         (first + step, first + (step + 1) % SIDES, first + SIDES + (step + 1) % SIDES, first + SIDES + step)
         for first in (0, SIDES)
         for step in steps.tolist()
     ]
-    return corners, thinner, [*faces, tuple(steps[::-1].tolist()), tuple((2 * SIDES + steps).tolist())]
+    return corners, [*faces, tuple(steps[::-1].tolist()), tuple((2 * SIDES + steps).tolist())]
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,20 +164,8 @@ class Carried:
     @classmethod
     def figure(cls, name: str, physique: Physique) -> Carried:
         """A physique. Its faces know their bones."""
-        return cls._of(name, physique, physique.vertices)
-
-    @classmethod
-    def ghost(cls, name: str, physique: Physique, size: float) -> Carried:
-        """The same of a figure of this size a little further inside."""
-        carried = cls._of(name, physique, physique.thinner)
-        if physique.smooth:
-            shrink(carried.mesh, INSET * size)
-        return carried
-
-    @classmethod
-    def _of(cls, name: str, physique: Physique, vertices: np.ndarray) -> Carried:
         mesh = bpy.data.meshes.new(name)
-        mesh.from_pydata(vertices.tolist(), [], physique.faces)
+        mesh.from_pydata(physique.vertices.tolist(), [], physique.faces)
         mesh.attributes.new(BONE, "INT", "FACE").data.foreach_set("value", physique.bones.astype(np.int32))
         mesh.polygons.foreach_set("use_smooth", np.full(len(mesh.polygons), physique.smooth))
         mesh.update()

@@ -20,15 +20,18 @@ from rigid_motion_batch.palette import DARK, THEMES, linear
 from . import captions, layout
 from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
-from .lanes import Actors, Cast, Lanes
+from .lanes import Actors, Cast, Lanes, names_of
 from .materials import ink
-from .settings import SMALL_PICTURE, StageSettings
+from .settings import StageSettings
 from .solids import Shape, Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
 
 LEGEND = 0.032
 """The size of the letters below the lanes, in units of the frame's height, where there is room."""
+
+EDGE = 0.1
+"""Where brightness differs by more from one pixel to the next there is an edge to smooth."""
 
 
 def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.types.Scene:
@@ -59,26 +62,30 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     farthest = max(largest_deviation(poses, motion.recording, outline) for poses in motion.modes.values())
     deviation = settings.deviation or magnification(farthest, size)
     deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
-    low, high = framing.extent([Solid(poses, outline) for poses in (motion.recording, *deviated.values())])
+    extent = framing.extent(Solid(motion.recording, outline), [Solid(poses, outline) for poses in deviated.values()])
     width, height = settings.resolution
-    plan = layout.arrange(len(lanes_of), (high - low)[:2], width / height)
-    errors = _errors_in_mm(reconstruction, timeline)
+    notes = _notes(reconstruction)
+    named = any(names_of(modes, notes) for modes in lanes_of)
+    plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
+    sampled = {mode: 1e3 * errors.shell for mode, errors in reconstruction.errors.items()}
+    times = timeline.times_of(timeline.frames)
     cast = Cast(
         timeline=timeline,
         framing=framing,
         framing_steps=timeline.steps,
         layout=plan,
-        middle=np.append((low + high)[:2] / 2.0, high[2]),
-        errors=errors,
-        largest_error=max(float(error.max()) for error in errors.values()),
-        notes=_notes(reconstruction),
+        extent=extent,
+        errors={mode: np.interp(times, reconstruction.times, errors) for mode, errors in sampled.items()},
+        sampled=sampled,
+        sample_frames=timeline.frames_of(reconstruction.times),
+        notes=notes,
         theme=theme,
         ink=ink("Ink", theme.ink),
         faint=ink("Faint", theme.faint),
     )
     shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
     header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
-    put_on_stage(scene, settings, cast, lanes_of, Solids(cast, shape), header, depth=float(high[2] - low[2]))
+    put_on_stage(scene, settings, cast, lanes_of, Solids(cast, shape), header)
     scene["recording_centre_m"] = motion.centre.tolist()
     scene["recording_start_s"] = timeline.start
     scene["deviation_shown_times"] = deviation
@@ -106,27 +113,17 @@ def put_on_stage(
     lanes_of: Groups,
     actors: Actors,
     header: Header,
-    depth: float,
 ) -> None:
-    """Make the lanes, what is written around them, camera and lights; the depth of what moves in metres."""
+    """Make the lanes, what is written around them, camera and lights."""
     plan = cast.layout
     frame = make_frame(plan.metres)
     lanes = Lanes(cast, frame, actors)
     for modes, cell in zip(lanes_of, plan.cells, strict=True):
         lanes.build(modes, cell)
     _make_header(header, cast, frame)
-    make_camera(scene, plan.metres, depth)
+    make_camera(scene, plan.metres, 2.0 * cast.extent.depth)
     make_lights(scene)
     set_up_render(scene, settings, cast.timeline.count, cast.theme.background)
-
-
-def _errors_in_mm(reconstruction: Reconstruction, timeline: Timeline) -> dict[str, np.ndarray]:
-    """Mode id to the shell error at each frame."""
-    times = timeline.times_of(timeline.frames)
-    return {
-        mode: 1e3 * np.interp(times, reconstruction.times, errors.shell)
-        for mode, errors in reconstruction.errors.items()
-    }
 
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
@@ -224,7 +221,9 @@ def set_up_render(
     scene.view_settings.view_transform = "Standard"
     _set_background(scene, background)
     _set_up_video(scene)
-    scene.display.render_aa = settings.antialiasing or ("FXAA" if render.resolution_y < SMALL_PICTURE else "OFF")
+    scene.display.render_aa = settings.antialiasing or "OFF"
+    if settings.engine == "workbench" and settings.antialiasing is None:
+        _smooth_edges(scene)
     shading = scene.display.shading
     shading.light, shading.studio_light = "STUDIO", "paint.sl"
     shading.color_type = "MATERIAL"
@@ -233,6 +232,24 @@ def set_up_render(
     if hasattr(scene, "cycles"):  # An add-on, which may be off.
         scene.cycles.samples = settings.samples
         scene.cycles.use_denoising = False
+
+
+def _smooth_edges(scene: bpy.types.Scene) -> None:
+    """Have the compositor smooth what is rendered."""
+    if bpy.app.version >= (5, 0):
+        tree = scene.compositing_node_group = bpy.data.node_groups.new("Smooth edges", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        output = tree.nodes.new("NodeGroupOutput")
+    else:
+        scene.use_nodes = True
+        tree = scene.node_tree
+        tree.nodes.clear()
+        output = tree.nodes.new("CompositorNodeComposite")
+    rendered, smooth = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("CompositorNodeAntiAliasing")
+    smooth.inputs["Threshold"].default_value = EDGE
+    tree.links.new(rendered.outputs["Image"], smooth.inputs["Image"])
+    tree.links.new(smooth.outputs[0], output.inputs[0])
+    scene.render.compositor_device = "CPU"
 
 
 def _set_up_video(scene: bpy.types.Scene) -> None:

@@ -18,7 +18,7 @@ from . import layout, trails
 from .lanes import Cast, Lane
 from .materials import ghost, ink, surface
 from .nodes import apply_group
-from .subject import shrink, tinted_slots, vertices_of
+from .subject import tinted_slots
 from .timeline import ShownMotion
 
 TRAIL_SECONDS = 0.8
@@ -31,9 +31,6 @@ MARKS_SHOWN = 14
 TRAIL_RADIUS = 0.0036
 PATH_RADIUS = 0.0014
 MARK_RADIUS = 0.0052
-
-GHOST_INSET = 0.003
-"""How much smaller the ghost is all around, in units of the object: where both agree, the object hides it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +58,15 @@ class Solids:
     def __init__(self, cast: Cast, shape: Shape) -> None:
         self.cast, self.shape = cast, shape
         self.ghost = ghost(cast.theme)
-        self.ghost_mesh = shape.mesh.copy()
-        self.ghost_mesh.name = f"{shape.mesh.name} recording"
-        shrink(self.ghost_mesh, GHOST_INSET * float(np.ptp(vertices_of(shape.mesh), axis=0).max()))
         self.ghost_action: bpy.types.Action | None = None
+        self.cut_group = trails.cut_group() if cast.extent.cut else None
         self.trail_group, self.marks_group = trails.trail_group(windowed=True), trails.marks_group()
         recording = shape.path_of(shape.motion.recording)
         self.path = trails.polyline("Recording path", cast.timeline.fine_frames, recording)
 
     def enter(self, lane: Lane) -> None:
         """Add the object, its ghost, trails and marks."""
+        self.window = lane.window(self.cast.layout.metres)
         self._add_actors(lane)
         self._add_trails(lane)
 
@@ -84,8 +80,9 @@ class Solids:
             bpy.data.objects[mode].hide_render = bpy.data.objects[mode].hide_viewport = True
             self._add_actor(f"{mode} deviating", lane, self.shape.deviated[mode][::steps], material)
 
-        ghost = lane.child(f"{mode} recording", self.ghost_mesh)
+        ghost = lane.child(f"{mode} recording", self.shape.mesh)
         ghost.rotation_mode = "QUATERNION"
+        ghost.delta_location = self.cast.behind
         _paint(ghost, range(len(ghost.material_slots)), self.ghost)
         if self.ghost_action is None:
             bake_poses(ghost, frames, motion.recording[::steps])
@@ -101,9 +98,11 @@ class Solids:
         _paint(actor, tinted_slots(self.shape.mesh), material)
         bake_poses(actor, self.cast.timeline.frames, poses)
         actor.animation_data.action.name = name
+        if self.cut_group:
+            apply_group(actor, self.cut_group, **self.window)
 
     def _add_trails(self, lane: Lane) -> None:
-        mode, cell, motion = lane.mode, lane.cell, self.shape.motion
+        mode, motion = lane.mode, self.shape.motion
         cast, rate, metres = self.cast, self.cast.timeline.rate, self.cast.layout.metres
         trail = trails.polyline(
             f"{mode} trail", cast.timeline.fine_frames, self.shape.path_of(self.shape.deviated[mode])
@@ -112,12 +111,6 @@ class Solids:
         keys = motion.keys[mode]
         marks = trails.polyline(f"{mode} keys", motion.key_frames[mode], self.shape.path_of(keys), joined=False)
         crowded = max(1.0, sum(window.values()) / (MARKS_SHOWN * cast.timeline.frames_per_key(len(keys))))
-        width, height = cell.room * metres / 2.0
-        picture = {
-            "Middle": layout.unproject(np.append(cell.view * metres, 0.0)),
-            "Right": layout.RIGHT / width,
-            "Up": layout.UP / height,
-        }
         apply_group(
             lane.child(f"{mode} trail", trail),
             self.trail_group,
@@ -126,7 +119,7 @@ class Solids:
             Radius=TRAIL_RADIUS * metres,
             Taper=0.9,
             Material=ink(f"Trail {mode}", colour_on(cast.theme, mode)),
-            **picture,
+            **self.window,
         )
         apply_group(
             lane.child(f"{mode} recording path", self.path),
@@ -135,7 +128,7 @@ class Solids:
             Radius=PATH_RADIUS * metres,
             Taper=0.0,
             Material=cast.faint,
-            **picture,
+            **self.window,
         )
         apply_group(
             lane.child(f"{mode} keys", marks),
@@ -143,7 +136,7 @@ class Solids:
             **{side: frames / crowded for side, frames in window.items()},
             Radius=MARK_RADIUS * metres,
             Material=cast.ink,
-            **picture,
+            **self.window,
         )
 
 

@@ -41,15 +41,6 @@ def vertices_of(mesh: bpy.types.Mesh) -> np.ndarray:
     return flat.reshape(-1, 3).astype(np.float64)
 
 
-def shrink(mesh: bpy.types.Mesh, depth: float) -> None:
-    """Move every vertex inwards, against its normal, by a length in metres."""
-    normals = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertex_normals.foreach_get("vector", normals)
-    inside = vertices_of(mesh) - depth * normals.reshape(-1, 3)
-    mesh.vertices.foreach_set("co", inside.astype(np.float32).ravel())
-    mesh.update()
-
-
 def tinted_slots(mesh: bpy.types.Mesh) -> list[int]:
     """The material slots that take the colour of the lane: those named `TINTED`, or else the first."""
     named = [index for index, material in enumerate(mesh.materials) if material and _plain(material.name) == TINTED]

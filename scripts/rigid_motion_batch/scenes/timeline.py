@@ -72,6 +72,13 @@ class Timeline:
         return 1.0 + (times - self.start) * self.rate
 
 
+def peaks(values: np.ndarray, columns: int) -> np.ndarray:
+    """The numbers, rising, of the least and the largest of values (n,) in each of so many columns; the ends too."""
+    parts = np.array_split(np.arange(len(values)), min(columns, len(values)))
+    chosen = [part[find(values[part])] for part in parts for find in (np.argmin, np.argmax)]
+    return np.unique([0, *chosen, len(values) - 1])
+
+
 @dataclass(frozen=True, eq=False)
 class ShownMotion:
     """What moves on the stage: poses at the fine frames of a timeline."""

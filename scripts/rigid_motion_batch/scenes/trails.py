@@ -57,9 +57,15 @@ def trail_group(*, windowed: bool = False) -> bpy.types.NodeTree:
         points, thinned = _within_picture(group, points)
         radius = group.math("MULTIPLY", radius, thinned)
     curve = group.add("GeometryNodeMeshToCurve", points)
-    profile = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=6, Radius=1.0)
+    profile = group.add("GeometryNodeCurvePrimitiveCircle", Resolution=4, Radius=1.0)
     tube = _tube(group, curve, profile, radius)
     return group.finish(group.add("GeometryNodeSetMaterial", tube, Material=group.inputs["Material"]))
+
+
+def cut_group() -> bpy.types.NodeTree:
+    """What an object has within the `WINDOW`."""
+    group = Group("Cut", **WINDOW)
+    return group.finish(_within_picture(group, group.inputs["Geometry"])[0])
 
 
 def marks_group() -> bpy.types.NodeTree:

@@ -1,10 +1,9 @@
-"""Drafts: while a large rig is edited in a window it is right on whole frames, and between them wherever that matters."""
+"""While a large rig is edited in a window it is right on whole frames, and between them wherever that matters."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 
 import bpy
 import numpy as np

@@ -41,7 +41,7 @@ def test_backward_times_are_kept_for_the_repair(write) -> None:
             "t is '1.403636580853555e+18', not a whole",
         ),
         (f"{HEADER}\n{ROWS}99999999999999999999,0,0,0,1,0,0,0,0,0,0\n", 5, "t is '99999999999999999999', not a whole"),
-        (f"{HEADER}\n{ROWS},0,0,0,1,0,0,0,0,0,0\n", 5, "t is 'nan', not a whole number"),
+        (f"{HEADER}\n{ROWS},0,0,0,1,0,0,0,0,0,0\n", 5, "t is '', not a whole number"),
         (f"{HEADER}\n{ROWS}1,0,0,0,up,0,0,0,0,0,0\n", 5, "qw is 'up', not a number"),
     ],
 )

@@ -38,6 +38,8 @@ def test_a_comment_that_names_another_order_is_believed(write) -> None:
         (f"{COMMENTS}0 1 2 3 0 0 0 1\n0.1 1 2\n", 5, "3 columns where 8 are needed"),
         (f"{COMMENTS}0 1 2 3 0 0 0 1 9\n", 4, "9 columns where 8 have a name"),
         (f"{COMMENTS}{ROWS}0.1 1 2 3 0 0 O 1\n", 6, "qz is 'O', not a number"),
+        ("# t x y z\n0 1 2 3\n0.1 1 2 3\n", 2, "positions only, and rotations are needed"),
+        ("0 1 2 3\n0.1 1 2 3\n", 1, "positions only, and rotations are needed; write t x y z qx qy qz qw"),
         (f"{ROWS}1,2,3\n", 3, "1 columns where 8 are needed"),
     ],
 )

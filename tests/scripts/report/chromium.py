@@ -72,11 +72,15 @@ class Browser:
             self.loaded = True
         return message
 
+    def close(self) -> None:
+        """Have the browser end, all of its processes."""
+        self._session = {}
+        self.call("Browser.close")
+
     def open(
         self, address: str, *, width: int = 1440, height: int = 900, dark: bool = False, script: bool = True
     ) -> None:
-        """Open a page of so many pixels, and wait until it shows something."""
-        self.loaded = False
+        """Open a page of so many pixels, and wait until it is loaded."""
         phone = width < 600
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -84,10 +88,11 @@ class Browser:
         self.call("Emulation.setEmulatedMedia", features=[scheme, calm])
         self.call("Emulation.setScriptExecutionDisabled", value=not script)
         # A page that differs in the fragment alone would not be loaded anew.
-        self.call("Page.navigate", url="about:blank")
-        self.call("Page.navigate", url=address)
-        while not self.loaded:
-            self._receive()
+        for place in ("about:blank", address):
+            self.loaded = False
+            self.call("Page.navigate", url=place)
+            while not self.loaded:
+                self._receive()
 
     def run(self, expression: str) -> Any:
         """The value of an expression of JavaScript, awaited."""
@@ -129,7 +134,7 @@ def _ended() -> bytes:
 def browser() -> Iterator[Browser]:
     """Start a Chromium, which ends with the block."""
     (from_us, to_it), (from_it, to_us) = os.pipe(), os.pipe()
-    with TemporaryDirectory() as profile:
+    with TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         arguments = ["--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run", "--mute-audio",
                      "--disable-dev-shm-usage", "--disable-background-networking", "--enable-unsafe-swiftshader",
                      f"--user-data-dir={profile}"]  # fmt: skip
@@ -145,7 +150,8 @@ def browser() -> Iterator[Browser]:
             try:
                 page = Browser(sent, answers)
                 yield page
-                page.call("Browser.close") if not page._session else None
+                page.close()
+                process.wait(timeout=20)
             finally:
                 process.kill()
                 process.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,17 @@ import pytest
 from rigid_motion_batch.analysis.choices import Budget, Tolerance
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import Settings, pages, write_overview, write_report
-from tests.scripts.comparison.bodies import swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.chromium import Browser, browser
 from tests.scripts.report.javascript import require
 from tests.scripts.report.runs import RATES, result_of
 
 SETTINGS = Settings(0.1, "Rigid Motion 1.0", "compare a.csv b.csv")
 WARNING = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
+PATIENCE = 30.0
+"""Seconds."""
+
 NOISE = "GL Driver Message"
 """What Chromium says of its own drawing without a graphics card."""
 
@@ -58,14 +62,42 @@ def page(chromium: Browser, folder: Path) -> Iterator[Browser]:
     assert [one for one in chromium.requests if not one.startswith((folder.as_uri(), "data:"))] == []
 
 
+NOW = "+document.getElementById('now').textContent"
+LIVE, WORST = (
+    f"Math.max(...[...document.querySelectorAll('#modes .{kind}')].map((one) => +one.textContent))"
+    for kind in ("live", "worst")
+)
+ADDRESS = "decodeURIComponent(location.hash)"
+LINES, TICKS, LANES = ("#plot .line", "#plot .key", "#lanes div")
+
+
+def shows(page: Browser, expression: str, wanted: object = True) -> None:
+    """Wait until an expression of the page has this value: a busy machine draws late."""
+    end = time.monotonic() + PATIENCE
+    while (found := page.run(expression)) != wanted and time.monotonic() < end:
+        time.sleep(0.05)
+    assert found == wanted, expression
+
+
+def count(selector: str) -> str:
+    return f"document.querySelectorAll({selector!r}).length"
+
+
+def near(moment: float) -> str:
+    return f"Math.abs({NOW} - {moment!r}) < 0.015"
+
+
 def opened(page: Browser, path: Path, fragment: str = "", **how: Any) -> Browser:
+    """Open a page, and wait until it shows its clip, or says why not."""
     page.open(f"{path.as_uri()}{fragment}", **how)
+    shows(page, "document.querySelector('#overview, #cursor line') !== null || "
+                "document.getElementById('about').textContent.endsWith('page')")  # fmt: skip
     page.settle()
     return page
 
 
 def now(page: Browser) -> float:
-    return float(page.run("document.getElementById('now').textContent"))
+    return float(page.run(NOW))
 
 
 def colours_in_view(page: Browser) -> int:
@@ -104,25 +136,21 @@ def test_every_page_draws_its_view_and_chart_and_fits(
 
 def test_the_page_opens_at_the_worst_moment_of_its_clip(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html")
-    worst = page.run("Math.max(...[...document.querySelectorAll('#modes .worst')].map((one) => +one.textContent))")
-    live = page.run("Math.max(...[...document.querySelectorAll('#modes .live')].map((one) => +one.textContent))")
-    assert live == worst > 0.0
+    shows(page, f"{LIVE} === {WORST} && {WORST} > 0")
     assert page.run("document.getElementById('badge').textContent").startswith("Deviation ")
 
 
 def test_it_plays_and_stops(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html", "#a,10,0.5")
-    assert now(page) == pytest.approx(0.5, abs=0.01)
+    shows(page, near(0.5))
     page.press(" ")
-    page.settle()
-    moment = now(page)
-    assert moment > 0.51
-    page.settle()
-    assert now(page) > moment
+    shows(page, f"{NOW} > 0.53 && {NOW} < 3")
+    shows(page, f"{NOW} > 0.6 && {NOW} < 3")
     page.run("document.getElementById('play').click()")
+    page.settle()
     stopped = now(page)
     page.settle()
-    assert now(page) == pytest.approx(stopped, abs=0.02)
+    assert now(page) == stopped
 
 
 def test_dragging_in_the_chart_is_scrubbing(page: Browser, folder: Path) -> None:
@@ -131,10 +159,9 @@ def test_dragging_in_the_chart_is_scrubbing(page: Browser, folder: Path) -> None
     y = plot["y"] + plot["height"] / 2
     places = [plot["x"] + plot["width"] * share for share in (0.2, 0.4, 0.6)]
     page.mouse(("pressed", places[0], y), ("moved", places[1], y), ("moved", places[2], y))
-    page.settle()
     end = float(page.run("document.getElementById('end').textContent.match(/[0-9.]+/)[0]"))
     share = (plot["width"] * 0.6 - 44) / (plot["width"] - 54)
-    assert now(page) == pytest.approx(share * end, abs=0.02)
+    shows(page, near(share * end))
     page.mouse(("released", places[2], y))
 
 
@@ -144,10 +171,7 @@ def test_a_click_near_a_peak_goes_to_it(page: Browser, folder: Path) -> None:
     x, y = page.run("[...document.querySelectorAll('#plot circle')].map((one) => [+one.getAttribute('cx'), "
                     "+one.getAttribute('cy')]).sort((a, b) => a[1] - b[1])[0]")  # fmt: skip
     page.mouse(("pressed", plot["x"] + x + 3, plot["y"] + y + 30), ("released", plot["x"] + x + 3, plot["y"] + y + 30))
-    page.settle()
-    worst = page.run("Math.max(...[...document.querySelectorAll('#modes .worst')].map((one) => +one.textContent))")
-    live = page.run("Math.max(...[...document.querySelectorAll('#modes .live')].map((one) => +one.textContent))")
-    assert live == worst
+    shows(page, f"{LIVE} === {WORST}")
 
 
 def test_the_wheel_scrolls_the_page_until_the_view_has_the_focus(page: Browser, folder: Path) -> None:
@@ -155,84 +179,72 @@ def test_the_wheel_scrolls_the_page_until_the_view_has_the_focus(page: Browser, 
     view = box(page, "#view")
     at = {"x": view["x"] + 50, "y": view["y"] + 50}
     page.call("Input.dispatchMouseEvent", type="mouseWheel", deltaX=0, deltaY=200, **at)
-    page.settle()
-    assert page.run("scrollY") > 0
+    shows(page, "scrollY > 0")
     page.run("scrollTo(0, 0)")
+    shows(page, "scrollY", 0)
     page.mouse(
         ("pressed", at["x"], at["y"]), ("moved", at["x"] + 60, at["y"] + 5), ("released", at["x"] + 60, at["y"] + 5)
     )
     page.settle()
-    before = page.run("document.getElementById('view').toDataURL()")
+    page.run("window.before = document.getElementById('view').toDataURL(), 0")
     page.call("Input.dispatchMouseEvent", type="mouseWheel", deltaX=0, deltaY=200, **at)
-    page.settle()
+    shows(page, "document.getElementById('view').toDataURL() !== window.before")
     assert page.run("scrollY") == 0
-    assert page.run("document.getElementById('view').toDataURL()") != before
 
 
 def test_a_chip_hides_its_mode_everywhere(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html")
-    count = page.run("document.querySelectorAll('#plot .line').length")
-    assert page.run("document.querySelectorAll('#lanes div').length") == count
+    modes = page.run(count(LINES))
+    shows(page, count(LANES), modes)
     page.run("document.querySelector('#modes .chip').click()")
-    page.settle()
-    assert page.run("document.querySelectorAll('#plot .line').length") == count - 1
-    assert page.run("document.querySelectorAll('#lanes div').length") == count - 1
+    shows(page, count(LINES), modes - 1)
+    shows(page, count(LANES), modes - 1)
     page.press("1")
-    page.settle()
-    assert page.run("document.querySelectorAll('#plot .line').length") == count
+    shows(page, count(LINES), modes)
 
 
 @pytest.mark.parametrize("name", ["two", "large"])
 def test_clips_and_choices_are_changed_and_kept_in_the_address(page: Browser, folder: Path, name: str) -> None:
     opened(page, folder / f"{name}.html", "#a,5,1")
     page.run("document.querySelector('[name=clip][value=\"1\"]').click()")
-    page.settle()
-    assert page.run("decodeURIComponent(location.hash)").startswith("#b & <b>,5,")
+    shows(page, f"{ADDRESS}.startsWith('#b & <b>,5,')")
     page.run("document.querySelector('[name=choice][value=\"tolerance-20mm\"]').click()")
-    page.settle()
-    address = page.run("location.href")
-    assert "tolerance-20mm" in address
+    shows(page, f"{ADDRESS}.startsWith('#b & <b>,tolerance-20mm,')")
     assert "where each mode needs them" in page.run("document.getElementById('about').textContent")
-    moment = now(page)
-    opened(page, folder / f"{name}.html", f"#{address.partition('#')[2]}")
+    moment, address = now(page), page.run("location.hash")
+    opened(page, folder / f"{name}.html", address)
     assert page.run("document.querySelector('[name=clip]:checked').value") == "1"
     assert page.run("document.querySelector('[name=choice]:checked').value") == "tolerance-20mm"
-    assert now(page) == pytest.approx(moment, abs=0.01)
+    shows(page, near(moment))
 
 
 def test_a_warning_leads_to_its_moment(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html", "#b%20%26%20%3Cb%3E,10,0.2")
-    assert page.run("document.querySelectorAll('#plot .doubt').length") == 0
+    assert page.run(count("#plot .doubt")) == 0
     page.run("document.querySelector('.warn a').click()")
-    page.settle()
-    assert now(page) == pytest.approx(1.25, abs=0.01)
-    assert page.run("document.querySelectorAll('#plot .doubt').length") == 1
+    shows(page, near(1.25))
+    shows(page, count("#plot .doubt"), 1)
 
 
 def test_keys_that_differ_have_a_row_of_ticks_for_each_mode(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html", "#a,10,1")
-    assert page.run("document.querySelectorAll('#plot .key').length") == 1
+    assert page.run(count(TICKS)) == 1
     opened(page, folder / "adaptive.html")
-    rows = page.run("document.querySelectorAll('#plot .key').length")
-    assert rows == page.run("document.querySelectorAll('#plot .line').length") > 1
+    assert page.run(count(TICKS)) == page.run(count(LINES)) > 1
 
 
 def test_the_keyboard_moves_in_time(page: Browser, folder: Path) -> None:
     opened(page, folder / "two.html", "#a,10,1.005")
-    moments = []
-    for key, shift in (("ArrowRight", False), ("ArrowLeft", False), ("ArrowRight", True), ("ArrowRight", True)):
-        page.press(key, shift=shift)
-        page.settle()
-        moments.append(now(page))
-    after, before, key, following = moments
-    assert after == pytest.approx(1.01, abs=0.011)
-    assert before < after
-    assert (key, following) == (pytest.approx(1.1, abs=0.01), pytest.approx(1.2, abs=0.01))
+    page.press("ArrowRight", shift=True)
+    shows(page, near(1.1))
+    page.press("ArrowRight", shift=True)
+    shows(page, near(1.2))
+    page.press("ArrowLeft")
+    shows(page, f"{NOW} > 1.18 && {NOW} < 1.195")
+    page.press("ArrowRight")
+    shows(page, near(1.2))
     page.press("w")
-    page.settle()
-    assert page.run(
-        "Math.max(...[...document.querySelectorAll('#modes .live')].map((one) => +one.textContent))"
-    ) == page.run("Math.max(...[...document.querySelectorAll('#modes .worst')].map((one) => +one.textContent))")
+    shows(page, f"{LIVE} === {WORST}")
 
 
 def test_the_table_shows_the_clip_and_the_measure_that_are_chosen(page: Browser, folder: Path) -> None:

@@ -16,8 +16,8 @@ from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.report import data
 from rigid_motion_batch.report.data import Block, clip_data, json_in_page, mesh_data
 from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill
-from tests.scripts.comparison.bodies import swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.javascript import value_of
 from tests.scripts.report.runs import result_of
 
@@ -33,6 +33,12 @@ def read(clip: ClipResult, expression: str) -> Any:
         return plain({expression});
     }})({packed})"""
     return value_of(made, "data", "mathematics")
+
+
+def middle_of(clip: ClipResult) -> np.ndarray:
+    """Of the box around the recording."""
+    places = clip.truth.positions.reshape(-1, 3)
+    return (places.min(axis=0) + places.max(axis=0)) / 2.0
 
 
 @pytest.mark.parametrize("width", [1, 2, 4])
@@ -74,12 +80,12 @@ def test_the_view_has_a_body_where_its_mode_puts_it() -> None:
     (result,) = clip.choices
     sample = 137
     moment = float(clip.times[result.first + sample] - clip.times[0])
-    point = np.array((0.03, -0.02, 0.1))
+    point, middle = np.array((0.03, -0.02, 0.1)), middle_of(clip)
     for place, motion in enumerate(result.motions):
         given = f"poseAt(recording, choice, {moment!r}, choice.motions[{place}], 1)"
         seen = read(clip, f"moved(matrixOf({given}), {point.tolist()})")
         pose = motion.poses[sample]
-        np.testing.assert_allclose(seen, pose.positions + rotate(pose.quaternions, point), atol=2e-4)
+        np.testing.assert_allclose(seen, pose.positions - middle + rotate(pose.quaternions, point), atol=2e-4)
 
 
 def test_a_magnified_body_is_so_many_times_as_far_off() -> None:
@@ -89,7 +95,7 @@ def test_a_magnified_body_is_so_many_times_as_far_off() -> None:
     moment = float(clip.times[result.first + sample] - clip.times[0])
     seen = read(clip, f"poseAt(recording, choice, {moment!r}, choice.motions[0], 4)")
     truth = clip.truth[result.first + sample]
-    away = np.array(seen["places"]) - truth.positions
+    away = np.array(seen["places"]) + middle_of(clip) - truth.positions
     np.testing.assert_allclose(away, 4 * (motion.poses.positions[sample] - truth.positions), atol=1e-4)
     turned = 2.0 * np.degrees(np.arccos(abs(float(np.dot(seen["turn"], truth.quaternions)))))
     assert turned == pytest.approx(4.0 * motion.errors[2, sample], rel=1e-2)
@@ -116,7 +122,8 @@ def test_the_joints_of_a_whole_body_are_where_its_mode_puts_them() -> None:
     motion, sample = result.motions[0], 17
     moment = float(clip.times[result.first + sample] - clip.times[0])
     seen = read(clip, f"poseAt(recording, choice, {moment!r}, choice.motions[0], 1)")
-    np.testing.assert_allclose(np.reshape(seen["places"], (-1, 3)), motion.poses.positions[:, sample], atol=1e-4)
+    places = motion.poses.positions[:, sample] - middle_of(clip)
+    np.testing.assert_allclose(np.reshape(seen["places"], (-1, 3)), places, atol=1e-4)
     largest = motion.joint_errors.max()
     np.testing.assert_allclose(seen["errors"], motion.joint_errors[:, sample], atol=largest / 200)
 
@@ -135,6 +142,24 @@ def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch:
         worst = clip.times[result.first + motion.errors[0].argmax()] - clip.times[0]
         assert np.abs(np.array(found["moments"]) - worst).min() < 1e-6
         assert max(errors) == pytest.approx(1e3 * motion.errors[0].max(), rel=1e-4)
+
+
+def test_hours_far_from_the_origin_are_as_exact_as_they_need_to_be() -> None:
+    swing = swinging_clip(seconds=60.0, rate=2.0)
+    far = Poses(swing.poses.positions + np.array((5e5, 5.6e6, 110.0)), swing.poses.quaternions)
+    clip = result_of(replace(swing, times=3600.0 * np.arange(len(swing.times)), poses=far), (Uniform("0.0001"),))
+    found = read(clip, "{ times: recording.times, places: recording.places }")
+    np.testing.assert_allclose(found["times"], clip.times, atol=1e-3)
+    np.testing.assert_allclose(np.transpose(found["places"]), clip.truth.positions - middle_of(clip), atol=2e-5)
+
+
+@pytest.mark.parametrize("size", [1e30, 1e-30])
+def test_places_of_any_size_are_read_as_they_are(size: float) -> None:
+    swing = swinging_clip()
+    clip = result_of(replace(swing, poses=Poses(size * swing.poses.positions, swing.poses.quaternions)), TEN)
+    found = read(clip, "recording.places")
+    assert np.isfinite(found).all()
+    assert np.ptp(found) == pytest.approx(np.ptp(clip.truth.positions, axis=0).max(), abs=1e-5, rel=1e-3)
 
 
 def test_deviations_are_magnified_until_they_can_be_seen() -> None:

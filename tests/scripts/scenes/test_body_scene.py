@@ -16,6 +16,7 @@ from rigid_motion_batch.analysis.bodies import BodyReconstruction, reconstruct_b
 from rigid_motion_batch.analysis.choices import Tolerance, Uniform
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.palette import full_colour
+from rigid_motion_batch.scenes import layout
 from rigid_motion_batch.scenes.armature import Rest, Rig
 from rigid_motion_batch.scenes.bodies import ERROR, SHADES, flashes
 from rigid_motion_batch.scenes.body_scene import build_body_stage
@@ -23,7 +24,7 @@ from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
 from rigid_motion_batch.scenes.settings import StageSettings
 from rigid_motion_batch.scenes.timeline import Timeline
-from tests.scripts.comparison.dancers import JOINTS, dancing_clip
+from tests.scripts.clips.dancers import JOINTS, dancing_clip
 from tests.scripts.scenes.test_scene import evaluated_points
 from tests.thoroughness import sample
 
@@ -81,6 +82,12 @@ def assert_played(made: BodyReconstruction, scene: bpy.types.Scene, modes: tuple
             assert angle_between(quaternions, wanted[mode].quaternions[:, number]).max() < 2e-4
         places, _ = seen(bpy.data.objects[f"{modes[0]} recording"], turns[modes[0]])
         assert np.abs(places[0] + centre - root[number]).max() < 2e-4
+    for mode in modes:
+        rig, figure = bpy.data.objects[f"{mode} recording"], bpy.data.objects[f"{mode} recording figure"]
+        assert (rig.matrix_world.translation - figure.matrix_world.translation).length < 1e-6
+        assert (rig.matrix_world.translation - bpy.data.objects[mode].matrix_world.translation) @ Vector(
+            layout.AWAY
+        ) > 0.1
 
 
 @pytest.mark.parametrize(("axes", "metres_per_unit"), [("blender", 1.0), ("opengl", 0.01), ("unity", 0.0254)])

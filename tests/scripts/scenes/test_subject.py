@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
-from rigid_motion_batch.scenes.subject import load_subject, shrink, tinted_slots, vertices_of
+from rigid_motion_batch.scenes.subject import load_subject, tinted_slots, vertices_of
 
 
 def painted(picture: Path) -> bpy.types.Material:
@@ -98,11 +98,3 @@ def test_what_cannot_be_shown_is_said_in_one_line(wanted, said, user_file, tmp_p
     assert said in str(error.value)
     assert "\n" not in str(error.value)
     assert set(bpy.data.user_map()) == before
-
-
-def test_a_shrunken_mesh_lies_inside_the_whole_one(empty_file):
-    mesh = load_subject("drill")
-    before = vertices_of(mesh)
-    shrink(mesh, 1e-3)
-    assert np.allclose(np.linalg.norm(vertices_of(mesh) - before, axis=1), 1e-3, atol=1e-5)
-    assert (np.ptp(vertices_of(mesh), axis=0) < np.ptp(before, axis=0)).all()

@@ -9,8 +9,8 @@ from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
-from rigid_motion_batch.scenes.timeline import ShownMotion, Timeline
-from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from rigid_motion_batch.scenes.timeline import ShownMotion, Timeline, peaks
+from tests.scripts.clips.recordings import reconstruct, swinging_clip
 
 
 @pytest.fixture(scope="module")
@@ -68,3 +68,14 @@ def test_the_best_of_each_segment_is_shown_by_the_mode_that_was_best_there():
     for number, mode in enumerate(made.segment_modes):
         here = segment == number
         assert np.allclose(motion.modes[BEST_OF].positions[here], motion.modes[mode].positions[here], atol=1e-12)
+
+
+def test_the_least_and_the_largest_of_each_column_are_kept():
+    values = np.random.default_rng(5).normal(size=10_000)
+    kept = peaks(values, 100)
+    assert np.all(np.diff(kept) > 0)
+    assert len(kept) <= 202
+    for column in np.split(np.arange(10_000), 100):
+        here = values[kept[(kept >= column[0]) & (kept <= column[-1])]]
+        assert (here.min(), here.max()) == (values[column].min(), values[column].max())
+    assert np.array_equal(peaks(values[:7], 100), np.arange(7))

@@ -40,7 +40,10 @@ def sampled(
         The first and last samples of each, counted from frame 0, in place of those of the source: then there are the
         fewest a frame that may be.
     """
-    found = _differences(sources, needs, ranges, [need.fewest for need in needs])
+    rates = [need.fewest for need in needs]
+    if all(math.isinf(need.tolerance) for need in needs):
+        return differences(sources, ranges, rates)
+    found = _differences(sources, needs, ranges, rates)
     coarser: dict[int, Samples] = {}
     pending = [number for number, (own, need) in enumerate(zip(found, needs, strict=True)) if _is_open(own, need)]
     while pending:

@@ -59,7 +59,7 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
 
 
 def _cubic_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the handles (1, 2, 2) of the first of the starts, from where most segments need no other, and the error."""
+    """Return the handles (1, 2, 2) of a segment that is a cubic in time, as most are, and the largest error."""
     handles = np.stack((3.0 * times * (1.0 - times) ** 2, 3.0 * times * times * (1.0 - times)), axis=1)
     wanted = values - times**3
     y = np.linalg.lstsq(handles, wanted, rcond=None)[0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import operator
+from collections import defaultdict
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -79,6 +80,10 @@ class _SlotSnapshot:
         self.fcurves = list(channelbag.fcurves)
         self.paths = [fcurve.data_path for fcurve in self.fcurves]
         self.prefixes, properties = zip(*map(split_path, self.paths), strict=True) if self.paths else ((), ())
+        self.under: defaultdict[str, list[int]] = defaultdict(list)
+        """The numbers of the F-curves by what their data paths begin with."""
+        for number, prefix in enumerate(self.prefixes):
+            self.under[prefix].append(number)
         self.read_keys = key_reader([fcurve.keyframe_points for fcurve in self.fcurves])
         self.modifiers = [
             fcurve.modifiers if prop in WIDTHS else () for fcurve, prop in zip(self.fcurves, properties, strict=True)
@@ -105,12 +110,8 @@ class _SlotSnapshot:
 
     def curves_under(self, prefix: str) -> Curves:
         """The F-curves whose data paths begin so."""
-        indices = self.flags[-1].tolist()
-        return {
-            (self.paths[number], indices[number]): self.fcurves[number]
-            for number, own in enumerate(self.prefixes)
-            if own == prefix
-        }
+        indices = self.flags[-1]
+        return {(self.paths[number], int(indices[number])): self.fcurves[number] for number in self.under[prefix]}
 
     def _modified(self) -> list[int]:
         """The numbers of those that have modifiers, which may have been changed for all that can be seen here."""

@@ -261,7 +261,8 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
                 else:
                     begin, end = min(begin, first), max(end, last)
         # Those of a draft are going to lie outside again.
-        if begin <= end and ((samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)):
+        is_outside = (samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)
+        if begin <= end and is_outside:
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
                 action.use_frame_range = True
                 action.frame_start, action.frame_end = begin, end

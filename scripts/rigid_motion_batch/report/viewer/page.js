@@ -55,11 +55,11 @@ function listModes() {
     };
     find("also").textContent = motion.also.map((name) => `= ${name}`).join("\n");
     [find("rms").textContent, find("worst").textContent] = [motion.rms[S.measure], worst(motion).value].map(short);
-    find("rms").classList.toggle("best", short(motion.rms[S.measure]) === least);
+    find("rms").classList.toggle("best", find("rms").textContent === least);
     find("worst").onclick = () => toWorst(undefined, [motion]);
     return row;
   }));
-  $("unit").textContent = UNITS[S.measure];
+  [$("unit").textContent, S.hot] = [UNITS[S.measure], ""];
   changed("chart");
 }
 function toWorst(at_once, motions = shown()) {

@@ -1,5 +1,5 @@
 /* Tables: a click on a heading sorts by its column, a second one turns the order round; rows are found by name. */
-const order = (a, b) => (Number(a) - Number(b) || a.localeCompare(b, "en", { numeric: true }));
+const { compare } = new Intl.Collator("en", { numeric: true }), order = (a, b) => a - b || compare(a, b);
 
 document.addEventListener("click", ({ target }) => {
   const heading = target.closest("table.sortable thead th");

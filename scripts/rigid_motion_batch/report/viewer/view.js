@@ -34,7 +34,7 @@ export function magnify(factor, automatic = false) {
   const said = `×${+factor.toPrecision(2)}`, heat = isBody() && lanes()[0]?.length === 1;
   const { seen, moments, joint, motions, top } = S.choice, places = ofJoint(S.recording.places, joint);
   $("badge").innerHTML = `${factor === 1 ? "Deviation as it is" : `<b>Deviation ${said}</b>`} · grid ${S.clip.grid}`
-    + (heat ? ` · error 0 <i class="ramp"></i> ${short(1000 * top)} mm` : "");
+    + (heat ? ` · error 0 <i class="ramp"></i> ${short(1000 * top)} mm and more` : "");
   [$("factor").value, $("times").value, $("automatic").ariaPressed] = [50 * Math.log10(factor), said, automatic];
   changed("view", "cursor");
   if (!pen) return;

@@ -183,6 +183,7 @@ def test_rigs_are_told_beside_native_work_and_their_goals():
         ("all in-betweens anew", "at least 50"),
         ("a mode chosen for all bones, and the view updated", ""),
         ("a key of each bone edited, and the view updated", ""),
+        ("samples between frames after an edit, for all bones", ""),
         ("all frames played, bare armature", "at most 2"),
         ("all frames played, skin of 400 vertices", "at most 1.3"),
     ]
