@@ -237,7 +237,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="for workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
+        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (edges smoothed by the compositor)",
     )
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
