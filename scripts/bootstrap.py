@@ -49,7 +49,7 @@ COMMANDS = {
     "bake": ([ROOT / "scripts" / "bake.py"], ()),
     "reduce": ([ROOT / "scripts" / "reduce.py"], ()),
     "stream": ([ROOT / "scripts" / "stream.py"], ()),
-    "tasks": (["-m", "rigid_motion_batch.workplan"], ()),
+    "tasks": (["-m", "rigid_motion_batch", "tasks"], ()),
     "dask": (["-m", "dask"], ("farm",)),
     "bundle": ([ROOT / "scripts" / "job_bundle.py"], ()),
     "openjd": (["-m", "openjd"], ("farm",)),

@@ -14,7 +14,7 @@ import bpy
 import pytest
 
 from rigid_motion_batch.cli.build_extension import build
-from rigid_motion_batch.workplan.processes import processors
+from rigid_motion_batch.pipeline.executors import processors
 from tests import thoroughness  # noqa: F401 - loads the profile of Hypothesis
 from tests.blank import blank
 from tests.recordings import RECORDINGS

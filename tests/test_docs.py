@@ -14,7 +14,7 @@ from research.paper.table import RADIUS
 from research.summaries import SUMMARIES, with_summary
 from rigid_motion.motion import curves, decimate
 from rigid_motion_batch.analysis.needed import OfRigidBody
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.recordings import swinging_clip
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PAGES = sorted(DOCS.glob("*.md"))

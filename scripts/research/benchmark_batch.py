@@ -15,7 +15,6 @@ over the length of one clip. Compare the ratios; the times depend on the machine
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
@@ -30,8 +29,8 @@ import numpy as np
 from research.publishing import more_or_less, opening, publish
 from research.summaries import of_batch
 from rigid_motion_batch.command_line import parser_of
+from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.places import ASSETS, PACKAGE
-from rigid_motion_batch.workplan.worker import peak_memory_of
 
 SECONDS = 2.0
 """How long a clip is."""
@@ -123,9 +122,19 @@ def compare(clips: Sequence[Path], folder: Path, jobs: int, *options: str, alone
         said += process.stderr.read() or b""
     if process.returncode:
         raise RuntimeError(f"compare.py ended with {process.returncode}: {said.decode(errors='replace')[-2000:]}")
-    tasks = json.loads((output / "manifest.json").read_text(encoding="utf-8"))["tasks"].values()
+    store = Store(output)
+    tasks = [found.index for key in store.latest().values() if (found := store.result(key))]
     rendering = sum(task["facts"].get("rendering", 0.0) for task in tasks)
     return Run(seconds, own, worker, sum(task["seconds"] for task in tasks), rendering)
+
+
+def peak_memory_of(process: int) -> int:
+    """Return the most memory, in bytes, that a process has had; 0 where it is gone, or the system does not tell."""
+    try:
+        status = Path(f"/proc/{process}/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) << 10 for line in status.splitlines() if line.startswith("VmHWM:")), 0)
 
 
 def children_of(pid: int) -> list[int]:

@@ -73,7 +73,7 @@ class Progress:
         self._stage: Stage | None = None
         self._bar: Any = None
         self._started = self._shown_at = 0.0
-        self._shown = False
+        self._shown: float | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -85,7 +85,7 @@ class Progress:
     def stage(self, title: str, total: float) -> Iterator[Stage]:
         """Open a stage of `total` steps."""
         self._started = self._shown_at = self._clock()
-        self._shown = False
+        self._shown = None
         self._stage = stage = Stage(title, total, self._redraw)
         if total and not self._quiet:
             self._bar = _bar(self._stream, self._line)
@@ -93,8 +93,8 @@ class Progress:
                 self._bar.start()
         try:
             yield stage
-            stage.done, stage.doing = total, ""
-            self._redraw(now=self._shown)
+            stage.done, stage.doing = stage.total, ""
+            self._redraw(now=self._shown not in (None, 1.0))
         except KeyboardInterrupt:
             if self._bar:
                 self._bar.live.transient = False
@@ -116,7 +116,7 @@ class Progress:
         if self._bar:
             self._bar.update(self._bar.task_ids[0], completed=self._stage.fraction)
         elif not self._quiet and (now or self._clock() - self._shown_at >= INTERVAL):
-            self._shown_at, self._shown = self._clock(), True
+            self._shown_at, self._shown = self._clock(), self._stage.fraction
             self._stream.write(f"{self._stage.fraction:4.0%}  {self._line()}\n")
             self._stream.flush()
 

@@ -46,12 +46,18 @@ def beside_path(path: Path, ends: Poses, share: np.ndarray) -> Poses:
 
 def _nearest(path: Path, key: Poses) -> float:
     """How far along the path the pose is that is nearest to a key, a radian being as far as a unit of length."""
-    low, high, best = -0.25, 1.25, 0.0
-    for _ in range(13):
-        grid = np.linspace(low, high, 49)
-        best = grid[(_off(path.poses(grid), key[np.zeros(len(grid), dtype=int)]) ** 2).sum(axis=1).argmin()]
-        low, high = best - (grid[1] - grid[0]), best + (grid[1] - grid[0])
-    return float(best)
+
+    def distance(share: float) -> float:
+        return float((_off(path.poses(np.array((share,))), key) ** 2).sum())
+
+    grid = np.linspace(-0.25, 1.25, 49)
+    best = grid[np.argmin([distance(share) for share in grid])]
+    low, high = best - 1.0 / 32.0, best + 1.0 / 32.0
+    for _ in range(80):
+        # By the golden section.
+        first, second = high - (high - low) / 1.618034, low + (high - low) / 1.618034
+        low, high = (low, second) if distance(first) < distance(second) else (first, high)
+    return 0.5 * (low + high)
 
 
 def _off(poses: Poses, keys: Poses) -> np.ndarray:

@@ -20,5 +20,6 @@ def outputs(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): path.read_bytes() if path.suffix in (".csv", ".mp4") else b""
         for path in folder.rglob("*")
-        if path.is_file() and path.relative_to(folder).parts[0] not in (".parts", ".workplan", "manifest.json")
+        if path.is_file()
+        and path.relative_to(folder).parts[0] not in (".parts", ".workplan", ".rigid-motion", "manifest.json")
     }

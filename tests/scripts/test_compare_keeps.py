@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch import places
 from rigid_motion_batch.cli import compare
+from rigid_motion_batch.pipeline.steps import OWN
 from tests.scripts.comparing import write_toss
 
 OPTIONS = ("--no-video", "--rates", "5", "--modes", "lerp_slerp", "--jobs", "0")
@@ -21,8 +23,8 @@ def run(*arguments: object) -> int:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """All files, but for the plan, which is written by every run that begins."""
-    found = (path for path in folder.rglob("*") if path.is_file() and path.name != "plan.json")
+    """All files but the program's own."""
+    found = (path for path in folder.rglob("*") if path.is_file() and OWN not in path.parts)
     return {str(path.relative_to(folder)): path.read_bytes() for path in found}
 
 
@@ -58,15 +60,15 @@ def refused(capsys: pytest.CaptureFixture, *arguments: object) -> str:
 # -- inputs -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("place", ["metrics.csv", "keys_needed.csv", "report.html", "manifest.json"])
-@pytest.mark.parametrize("force", [(), ("--force",)])
+@pytest.mark.parametrize("place", ["metrics.csv"])
+@pytest.mark.parametrize("force", [(), ("--overwrite",)])
 def test_an_input_that_lies_where_an_output_goes_is_refused(
     tmp_path: Path, place: str, force: tuple[str, ...], capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_toss(tmp_path / place)
     assert f"{place}: this input lies where" in refused(capsys, place, "--output", ".", *force)
-    assert os.listdir(tmp_path) == [place]
+    assert [*files(tmp_path)] == [place]
 
 
 def test_an_input_that_lies_where_the_keys_of_its_clip_go_is_refused(
@@ -91,15 +93,16 @@ def test_an_output_of_an_earlier_run_is_no_input_of_the_next(folder: Path, capsy
 
 
 def test_an_input_where_the_program_keeps_its_own_files_is_refused(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    write_toss(folder / "out" / ".workplan" / "mine.csv")
-    assert "where the program works" in refused(capsys, "out/.workplan/mine.csv", "--output", "out", "--force")
+    write_toss(folder / "out" / OWN / "mine.csv")
+    said = refused(capsys, f"out/{OWN}/mine.csv", "--output", "out", "--overwrite")
+    assert "where the program works" in said
 
 
 # -- files of strangers -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("place", ["report.html", "metrics.csv", "keys_needed.csv", "manifest.json", "toss/5/keys.csv"])
-def test_a_file_of_another_program_is_named_and_replaced_with_force_only(
+@pytest.mark.parametrize("place", ["report.html", "metrics.csv", "toss/5/keys.csv"])
+def test_a_file_of_another_program_is_named_and_replaced_only_if_that_is_asked_for(
     tmp_path: Path, place: str, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -109,25 +112,24 @@ def test_a_file_of_another_program_is_named_and_replaced_with_force_only(
     said = refused(capsys, "toss.csv", "--output", ".")
     assert f"{tmp_path / place} was not written by this program" in said
     assert "--output" in said
-    assert "--force" in said
-    assert run("toss.csv", "--output", ".", "--force") == 0
-    assert not (tmp_path / place).exists() or (tmp_path / place).read_text() != "mine"
+    assert "--overwrite" in said
+    assert run("toss.csv", "--output", ".", "--overwrite") == 0
+    assert (tmp_path / place).read_text() != "mine"
     assert run("toss.csv", "--output", ".") == 0
 
 
 def test_without_its_own_folders_it_knows_no_file_for_its_own(folder: Path, capsys: pytest.CaptureFixture) -> None:
-    shutil.rmtree(folder / "out" / ".workplan")
-    shutil.rmtree(folder / "out" / ".parts")
-    (folder / "out" / "manifest.json").unlink()
+    shutil.rmtree(folder / "out" / OWN)
     said = refused(capsys, "toss.csv", "--output", "out")
-    assert f"{folder / 'out' / 'metrics.csv'}, {folder / 'out' / 'report.html'} were not written" in said
+    assert "metrics.csv" in said
+    assert "were not written by this program" in said
 
 
 def test_a_folder_where_a_file_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
     (folder / "out" / "report.html").unlink()
     (folder / "out" / "report.html").mkdir()
     (folder / "out" / "report.html" / "mine.txt").write_text("mine")
-    assert "a folder where a file goes" in refused(capsys, "toss.csv", "--output", "out", "--force")
+    assert "a folder where a file goes" in refused(capsys, "toss.csv", "--output", "out", "--overwrite")
 
 
 def test_a_file_where_a_folder_goes_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture) -> None:
@@ -144,8 +146,8 @@ def test_another_comparison_in_the_folder_is_named_with_the_ways_out(
 ) -> None:
     write_toss(folder / "hand.csv", samples=70)
     said = refused(capsys, "hand.csv", "--output", "out")
-    assert "out holds another comparison, of toss.csv; choose another folder, such as --output hand" in said
-    assert run("hand.csv", "--output", "out", "--force") == 0
+    assert "out holds another comparison, of toss.csv; choose another folder, such as --output " in said
+    assert run("hand.csv", "--output", "out", "--overwrite") == 0
     assert "hand" in (folder / "out" / "metrics.csv").read_text()
     assert "of hand.csv; choose another folder" in refused(capsys, "toss.csv", "--output", "out")
 
@@ -192,22 +194,23 @@ def folder_instead(path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
-@pytest.mark.parametrize("part", ["recordings/*.json", "recordings/*.npz", "clips/toss/5.json", "clips/toss/5.npz"])
-def test_a_damaged_part_is_made_again(
+@pytest.mark.parametrize("part", ["facts.json", "0.json", "0.npz", "result.json", "result.npz", ".index.json"])
+def test_a_damaged_result_is_made_again(
     folder: Path, part: str, damage: Callable[[Path], None], capsys: pytest.CaptureFixture
 ) -> None:
-    report = (folder / "out" / "metrics.csv").read_bytes()
-    (path,) = (folder / "out" / ".parts").glob(part)
-    damage(path)
+    table = (folder / "out" / "metrics.csv").read_bytes()
+    for path in (folder / "out" / OWN / "results").glob(f"*/{part}"):
+        damage(path)
     (folder / "out" / "metrics.csv").unlink()
-    assert run("toss.csv", "--output", "out") == 0
+    assert run("toss.csv", "--output", "out", "--rates", "5,10") == 0
     assert "Traceback" not in capsys.readouterr().err
-    assert (folder / "out" / "metrics.csv").read_bytes() == report
+    assert (folder / "out" / "metrics.csv").read_bytes().startswith(table)
 
 
-@pytest.mark.parametrize("damage", [garbage, emptied])
-def test_a_damaged_manifest_lets_the_work_be_done_again(folder: Path, damage: Callable[[Path], None]) -> None:
-    damage(folder / "out" / "manifest.json")
+@pytest.mark.parametrize("damage", [garbage, emptied, folder_instead])
+@pytest.mark.parametrize("name", ["comparison.json", "inputs.json", "latest.jsonl"])
+def test_a_damaged_record_lets_the_work_be_done_again(folder: Path, name: str, damage: Callable[[Path], None]) -> None:
+    damage(folder / "out" / OWN / name)
     assert run("toss.csv", "--output", "out") == 0
 
 
@@ -216,13 +219,15 @@ def test_a_damaged_manifest_lets_the_work_be_done_again(folder: Path, damage: Ca
 
 def test_what_would_be_done_is_explained_and_nothing_is_done(folder: Path, capsys: pytest.CaptureFixture) -> None:
     before = files(folder)
-    assert run("toss.csv", "--output", "out", "--explain") == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said[-1].startswith("To do: 1 of ")  # The report, which says by what command it was made.
-    assert said[0].startswith("report report.html: options changed (settings.command")
     assert run("toss.csv", "--output", "out", "--explain", "--radius", "0.2") == 0
-    assert "measure toss at 5 keys/s: options changed (radius: 0.1 -> 0.2)" in capsys.readouterr().out.splitlines()
+    said = capsys.readouterr().out.splitlines()
+    assert "measure toss/5: parameters changed (radii.rigid: 0.1 -> 0.2, radii.joint: 0.03 -> 0.2)" in said
+    assert said[-1].startswith("report.html: ")
     assert files(folder) == before
+    assert run("toss.csv", "--output", "out") == 0
+    capsys.readouterr()
+    assert run("toss.csv", "--output", "out", "--explain") == 0
+    assert [line.partition(":")[0] for line in capsys.readouterr().out.splitlines()] == ["report.html"]
 
 
 def test_of_recordings_that_were_never_read_it_is_explained_that_they_will_be(
@@ -230,7 +235,40 @@ def test_of_recordings_that_were_never_read_it_is_explained_that_they_will_be(
 ) -> None:
     write_toss(folder / "hand.csv", samples=70)
     assert run("hand.csv", "--output", "new", "--explain") == 0
-    said = capsys.readouterr().out
-    assert "no output yet" in said
-    assert "Yet to be read: 1 of 1 recordings" in said
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "read hand.csv: never done"
+    assert "when they have been read" in said[-1]
     assert not (folder / "new").exists()
+
+
+# -- where it goes ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, with a recording, and nothing else."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(places, "CHECKOUT", None)
+    write_toss(tmp_path / "toss.csv")
+    return tmp_path
+
+
+def printed(capsys: pytest.CaptureFixture, *arguments: object) -> str:
+    """The folder of the report that a quiet run prints."""
+    capsys.readouterr()
+    assert run(*arguments, "--quiet") == 0
+    (line,) = capsys.readouterr().out.splitlines()
+    return Path(line).parent.name
+
+
+def test_without_a_folder_every_comparison_has_one_of_its_own(free: Path, capsys: pytest.CaptureFixture) -> None:
+    write_toss(free / "hand.csv", samples=70)
+    write_toss(free / "other" / "toss.csv", samples=80)
+    assert printed(capsys, "toss.csv") == "toss"
+    assert printed(capsys, "hand.csv", "toss.csv") == "hand"
+    assert printed(capsys, "other/toss.csv") == "toss-2"
+    assert printed(capsys, "toss.csv") == "toss"
+    (free / "renders" / "toss-3").mkdir()
+    (free / "renders" / "toss-3" / "mine.txt").touch()
+    write_toss(free / "third" / "toss.csv", samples=90)
+    assert printed(capsys, "third/toss.csv") == "toss-4"

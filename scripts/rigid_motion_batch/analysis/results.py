@@ -97,6 +97,18 @@ class Motion:
     """The shell errors of a body's joints, shape (joints, n)."""
 
 
+@dataclass(frozen=True)
+class ChoiceNumbers:
+    """A clip under one choice of keys without its arrays: what many clips are compared by."""
+
+    choice: Choice
+    groups: tuple[tuple[str, ...], ...]
+    """The modes, those together that give the same motion."""
+
+    rows: tuple[Metrics, ...]
+    """One for each mode."""
+
+
 @dataclass(frozen=True, eq=False)
 class ChoiceResult:
     """A clip under one choice of keys."""
@@ -127,6 +139,11 @@ class ChoiceResult:
         """The rows of all modes, in the order of these."""
         rows = {row.mode: row for motion in self.motions for row in motion.metrics}
         return [rows[mode] for mode in self.keys]
+
+    @property
+    def numbers(self) -> ChoiceNumbers:
+        """The result without its arrays."""
+        return ChoiceNumbers(self.choice, tuple(motion.modes for motion in self.motions), tuple(self.rows))
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ COMMANDS = {
     "bake": Command("bake", "turn the in-betweens of .blend files into real keys, or back"),
     "stream": Command("stream", "send a motion over a network in real time, or show what arrives"),
     "bundle": Command("job_bundle", "write a comparison as a job for render farms"),
-    "tasks": Command(".workplan.__main__", "list or run single tasks of a comparison"),
+    "tasks": Command("tasks", "list what a comparison did, and what failed"),
     "examples": Command("examples", "make small complete cases to begin with (in a checkout)"),
     "build": Command("build_extension", "build the zip that Blender installs"),
     "completion": Command("completion", "have a shell complete commands and options"),

@@ -17,17 +17,17 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from itertools import count, groupby
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-from rigid_motion_batch.analysis.choices import Choice, Tolerance
-from rigid_motion_batch.analysis.metrics import Metrics
+from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.needed import KeysNeeded
+from rigid_motion_batch.analysis.results import ChoiceNumbers
 from rigid_motion_batch.cli.compare_options import ALL, SCRIPT, own_recordings, parse
 from rigid_motion_batch.cli.in_blender import blender_program
 from rigid_motion_batch.command_line import as_typed, complain, path_line, program_of
 from rigid_motion_batch.pipeline import comparison_steps as steps
 from rigid_motion_batch.pipeline import values
+from rigid_motion_batch.pipeline.bundle import PROGRESS, FarmProgress
 from rigid_motion_batch.pipeline.comparison import (
     DECIMATED,
     IN_BLENDER,
@@ -44,9 +44,10 @@ from rigid_motion_batch.pipeline.performing import Executor, ExecutorError
 from rigid_motion_batch.pipeline.running import Outcome, Plan, Share, State, Survey, run
 from rigid_motion_batch.pipeline.running import Progress as Listener
 from rigid_motion_batch.pipeline.steps import OWN, Task
-from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store, inputs_known
+from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
 from rigid_motion_batch.places import CHECKOUT, manifest, output_folder
 from rigid_motion_batch.progress import Progress, Stage
+from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.report import Gathering, Numbers, Verdict, verdict
@@ -61,7 +62,7 @@ PROGRAM = program_of(SCRIPT)
 TABLES = (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED)
 
 RECORD = "comparison.json"
-"""What a folder is the comparison of, among the files of the store: the paths of its recordings."""
+"""What a folder is the comparison of, among the files of the store: its recordings, as they count from there."""
 
 
 class Refused(Exception):
@@ -107,6 +108,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         shared=options.shared,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
+        beside_decimate=bool(blender),
         stage=stage,
         every_film=options.films == ALL,
         about=About(f"{manifest()['name']} {manifest()['version']}", command, details),
@@ -136,28 +138,29 @@ def _is_free(folder: Path) -> bool:
 def _is_same(folder: Path, sources: list[str]) -> bool:
     """Whether a folder holds the comparison of some of these recordings."""
     held = _held(folder)
-    return held is not None and (not held or not held.isdisjoint(map(_place, sources)))
+    return held is not None and (not held or not held.keys().isdisjoint(_places(sources, folder)))
 
 
-def _held(folder: Path) -> set[str] | None:
-    """The recordings that a folder holds the comparison of; None where it holds none."""
+def _held(folder: Path) -> dict[str, str] | None:
+    """The recordings that a folder holds the comparison of, and their digests; None where it holds none."""
     if not (folder / OWN).is_dir():
         return None
     try:
-        return {*map(str, json.loads((folder / OWN / RECORD).read_text(encoding="utf-8")))}
+        return dict(json.loads((folder / OWN / RECORD).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
-        return set()
+        return {}
 
 
-def _place(source: str) -> str:
-    """The file that a source is in, and the body."""
-    return os.path.abspath(source)
+def _places(sources: list[str], folder: Path) -> list[str]:
+    """The sources as they count from a folder, so that both can be moved."""
+    here = os.path.abspath(folder)
+    return [os.path.relpath(source, here) if Path(source).drive == folder.drive else source for source in sources]
 
 
 def _require_same_comparison(output: Path, sources: list[str]) -> None:
     """Raise OutputError where a folder holds the comparison of other recordings."""
     held = _held(output)
-    if held and not _is_same(output, sources) and not _same_content(output, sources):
+    if held and not _is_same(output, sources) and not {*held.values()} & {*_digests(sources, Store(output)).values()}:
         names = ", ".join(sorted(Path(one).name for one in held)[:3]) + (" and more" if len(held) > 3 else "")
         raise OutputError(
             f"{_short(output)} holds another comparison, of {names}; choose another folder, such as --output "
@@ -171,17 +174,13 @@ def _short(path: Path) -> str:
     return os.fspath(path.relative_to(here) if path.is_relative_to(here) else path)
 
 
-def _same_content(output: Path, sources: list[str]) -> bool:
-    """Whether one of the recordings is one that the folder knows, which was moved or renamed since."""
-    known, store = {*inputs_known(output).values()}, Store(output)
+def _digests(sources: list[str], store: Store) -> dict[str, str]:
+    """Source to the digest of its file, of those that are there."""
+    found = {}
     for source in sources:
-        try:
-            path, _ = split_source(source)
-        except ValueError:
-            continue
-        if store.input(path).sha256 in known:
-            return True
-    return False
+        with suppress(TrajectoryError):
+            found[source] = store.input(split_source(source)[0]).sha256
+    return found
 
 
 # -- what it needs ----------------------------------------------------------------------------------------------------
@@ -195,17 +194,18 @@ def _blender(options: argparse.Namespace) -> str:
     Refused, ExecutorError, SubjectError
         Where one is needed that there is not, with the way out.
     """
+    read = next((one for one in options.inputs if _suffix(one) in IN_BLENDER), None)
+    if not (options.blender or blender_program() or find_spec("bpy")):
+        if options.stage or read:
+            raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
+        return ""
+    on_screen = options.stage and options.engine != "cycles" and not options.explain
+    if on_screen and (missing := missing_for_rendering()):
+        raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
         from rigid_motion_batch.pipeline.blender import version_of
 
         return version_of(options.blender)
-    read = next((one for one in options.inputs if _suffix(one) in IN_BLENDER), None)
-    if not blender_program() and not find_spec("bpy"):
-        if options.stage or read:
-            raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
-        return ""
-    if options.stage and options.engine != "cycles" and not blender_program() and (missing := missing_for_rendering()):
-        raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.stage and options.object not in MODELS:
         # Only here is Blender loaded, which takes longer than all else before the work begins.
         from rigid_motion_batch.scenes.subject import load_subject
@@ -274,7 +274,7 @@ class _Run:
     ) -> None:
         self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
         self.progress = progress
-        self.share = Share(*options.part, stages=frozenset({options.only})) if options.only else Share()
+        self.share = Share(frozenset({options.only}), *options.part) if options.only else Share()
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = True
@@ -286,11 +286,14 @@ class _Run:
             self._do("Reading", self.plan.reading)
             if self.outcome.interrupted or self.outcome.problem or self.options.only:
                 return self._end()
-        for note in self.plan.look_into():
-            self._note(note)
-        for study in self.plan.studies:
-            for warning in study.warnings:
-                self._note("; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out))), "yellow")
+        notes = self._look_into()
+        warnings = [
+            "; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out)))
+            for study in self.plan.studies
+            for warning in study.warnings
+        ]
+        for note in dict.fromkeys([*notes, *warnings]):
+            self._note(note, "yellow" if note in warnings else "")
         if not self.plan.studies:
             self._say_nothing_to_compare()
             return 2
@@ -298,7 +301,8 @@ class _Run:
             self._do(self.options.only.capitalize(), self.plan.tasks)
             return self._end()
         self._require_tolerances()
-        self.store.note(RECORD, [_place(source) for source in self.options.inputs])
+        digests = _digests(self.options.inputs, self.store)
+        self.store.note(RECORD, dict(zip(_places([*digests], self.store.output), digests.values(), strict=True)))
         self.store.withdraw({*TABLES} - self.plan.tables)  # What an earlier run found is no finding of this.
         if self.plan.comparison.stage and Survey.of(self.plan.tasks, self.store).amounts["frame"]:
             # The numbers take seconds, and films minutes: nobody has to wait for the one to see the other.
@@ -317,7 +321,8 @@ class _Run:
 
     def _do(self, title: str, tasks: Plan) -> None:
         with self.progress.stage(title, 1.0) as stage:
-            shown = _Shown(self.progress, stage, self.options.quiet)
+            on_farm = os.environ.get(PROGRESS) == "openjd"
+            shown = FarmProgress() if on_farm else _Shown(self.progress, stage, self.options.quiet)
             outcome = run(
                 tasks,
                 self.store,
@@ -326,10 +331,21 @@ class _Run:
                 share=self.share,
                 blender=self.options.blender or "",
             )
-        self.page = shown.page
+        self.page = getattr(shown, "page", True)
         failures = self.outcome.failures | outcome.failures
         self.outcome = self.outcome.continued(outcome)
         self.outcome.failures = failures
+
+    def _look_into(self) -> list[str]:
+        """See what was read. What is damaged is read again."""
+        try:
+            return self.plan.look_into()
+        except Exception:
+            for task in self.plan.reading():
+                if not self.store.result(task.key, thoroughly=True):
+                    self.store.discard(task.key)
+            self._do("Reading", self.plan.reading)
+            return self.plan.look_into()
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)
@@ -378,9 +394,9 @@ class _Run:
                     if task.step is steps.count_keys:
                         needed.append(values.read(KeysNeeded, folder / "needed"))
                     else:
-                        choices.append(_metrics_in(folder))
+                        choices.append(values.read(ChoiceNumbers, folder / "numbers"))
             if choices:
-                gathering.add(SimpleNamespace(facts=SimpleNamespace(name=name), choices=choices))
+                gathering.add(name, choices)
         try:
             numbers = gathering.numbers()
         except ValueError:
@@ -413,6 +429,7 @@ class _Run:
 
     def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
         numbers, said = self._numbers()
+        counts = {**self.outcome.counts, State.FAILED: len(self.outcome.failures)}
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
@@ -422,18 +439,8 @@ class _Run:
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.outcome.failures,
-            "tasks": {state.value: number for state, number in self.outcome.counts.items()},
+            "tasks": {state.value: counts[state] for state in State if counts.get(state)},
         }
-
-
-def _metrics_in(folder: Path) -> SimpleNamespace:
-    """What was measured of a clip under a choice of keys, as a `ChoiceResult` without its arrays."""
-    plain = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-    motions = [
-        SimpleNamespace(modes=tuple(one["modes"]), metrics=values.from_plain(tuple[Metrics, ...], one["metrics"]))
-        for one in plain["motions"]
-    ]
-    return SimpleNamespace(choice=values.from_plain(Choice, plain["choice"]), motions=motions)
 
 
 def _explain(plan: ComparisonPlan, store: Store) -> int:

@@ -82,6 +82,9 @@ class Comparison:
     fit: bool = False
     """And how many where they may be fitted."""
 
+    beside_decimate: bool = True
+    """Whether to set adaptive keys of bodies beside those of Blender's Decimate, for which there must be a Blender."""
+
     stage: StageSettings | None = None
     """How to make the films; None for a run without."""
 
@@ -111,6 +114,7 @@ class Study:
     """How many a whole body has; 0 for a single rigid one."""
 
     warnings: tuple[ClipWarning, ...] = field(default=(), repr=False)
+    beside_decimate: bool = True
 
     @property
     def name(self) -> str:
@@ -127,7 +131,7 @@ class Study:
     @property
     def decimated(self) -> list[Choice]:
         """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
-        if self.samples * self.joints > MOST_DECIMATED:
+        if not self.beside_decimate or self.samples * self.joints > MOST_DECIMATED:
             return []
         return [choice for choice in self.choices if self.joints and choice.decimation == "adaptive"]
 
@@ -203,7 +207,8 @@ class ComparisonPlan:
                 choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
             }
             if long_enough:
-                study = Study(ClipOf(name, body), key, len(times), long_enough, len(one.joints), one.warnings)
+                clip, joints = ClipOf(name, body), len(one.joints)
+                study = Study(clip, key, len(times), long_enough, joints, one.warnings, comparison.beside_decimate)
                 self.studies.append(study)
                 notes += self._left_out(study)
         return notes
@@ -219,7 +224,9 @@ class ComparisonPlan:
                 "--slow-motion"
             )
         adaptive = any(choice.decimation == "adaptive" for choice in study.choices)
-        if study.joints and adaptive and not study.decimated:
+        if study.joints and adaptive and not self.comparison.beside_decimate:
+            yield f"{study.name}: not compared with Blender's Decimate, for there is no Blender here"
+        elif study.joints and adaptive and not study.decimated:
             yield (
                 f"{study.name}: not compared with Blender's Decimate: {study.joints} joints with {study.samples} "
                 f"samples would take too long; cut it to {MOST_DECIMATED // study.joints}"

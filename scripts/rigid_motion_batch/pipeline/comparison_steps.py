@@ -145,6 +145,7 @@ def measure(job: Job, parameters: Measure) -> None:
         raise TaskError(f"{clip.name}: too short for two keys {choice.phrase}")
     metrics.write_metrics(job.folder / ROWS, found.rows)
     values.write(job.folder / "result", found)
+    values.write(job.folder / "numbers", found.numbers)
 
 
 @dataclass(frozen=True)

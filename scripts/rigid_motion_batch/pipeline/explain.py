@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from .running import Plan
+from .running import Plan, look_through
 from .steps import Task
 from .store import OutputError, Store
 from .values import to_plain
@@ -19,19 +19,11 @@ def explain(plan: Plan, store: Store) -> Iterator[tuple[Task, str]]:
     latest = store.latest()
     changed: dict[str, str] = {}
     """Key to name, of tasks that would be done."""
-    sleeping: dict[str, Task] = {}
-    for task in plan():
-        if task.step.temporary:
-            sleeping[task.key] = task
-            continue
-        before = [sleeping.pop(key) for key in task.after if key in sleeping]
-        result = store.result(task.key)
-        if result and store.is_published(task, result):
-            continue
-        if result:
+    for found in look_through(plan, store):
+        task = found.task
+        if found.result and not found.done:
             yield task, _unpublished(task, store)
-            continue
-        for one in (*(one for one in before if not store.result(one.key)), task):
+        for one in () if found.result else (*found.missing, task):
             yield one, _reason(one, store, latest.get(one.name), changed)
             changed[one.key] = one.shown
 

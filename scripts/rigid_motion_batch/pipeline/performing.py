@@ -15,7 +15,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -84,7 +84,7 @@ class Failed:
     hopeless: bool = False
     """Whether the others will fail for the same reason: the disk is full."""
 
-    notes: Sequence[str] = field(default=())
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,7 @@ class Lost:
     """Whoever did a task is gone; nothing is known of the task itself, so it may be tried again."""
 
     message: str
+    notes: Sequence[str] = ()
 
 
 class Executor(Protocol):

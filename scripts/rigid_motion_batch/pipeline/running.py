@@ -1,9 +1,8 @@
 """Running a plan: what is missing is given to an executor, in order, kept, and published.
 
 A plan is a function that returns its tasks one by one, each after those that it reads from. So of ten thousand clips
-only those are in memory that are at work. One failure is no reason to stop: the tasks that need what failed are
-skipped, and all others are done. What ends a run before its time is Ctrl-C, and a disk that is full or must not be
-written. Nothing is printed here.
+only those are in memory that are at work. Where a task fails those that need it are skipped, and all others are done.
+What ends a run is Ctrl-C, and a disk that is full or must not be written. Nothing is printed here.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from .performing import FULL_OR_FORBIDDEN, Executor, Failed, Lost, Made, Order, Told, perform
@@ -123,6 +122,36 @@ class Share:
 EVERYTHING = Share()
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Found:
+    """A task as it is found in a store, and the temporary ones that are for it alone."""
+
+    task: Task
+    chosen: bool
+    result: Result | None
+    temporary: tuple[Task, ...]
+    missing: tuple[Task, ...]
+    """Those of them that are to be done before it."""
+
+    done: bool
+
+
+def look_through(plan: Plan, store: Store, share: Share = EVERYTHING) -> Iterator[Found]:
+    """All tasks of a plan but the temporary ones."""
+    chosen = share.chooser()
+    sleeping: dict[str, tuple[Task, bool]] = {}
+    for task in plan():
+        wanted = chosen(task)
+        if task.step.temporary:
+            sleeping[task.key] = task, wanted
+            continue
+        own = [sleeping.pop(key) for key in task.after if key in sleeping]
+        result = store.result(task.key)
+        done = bool(result) and (not wanted or store.is_published(task, result))
+        missing = () if result else tuple(one for one, also in own if also and not store.result(one.key))
+        yield Found(task, wanted, result, tuple(one for one, _ in own), missing, done)
+
+
 @dataclass
 class Survey:
     """What there is to do."""
@@ -141,36 +170,25 @@ class Survey:
         OutputError
             Where something would be replaced that must not be, or two tasks publish one file.
         """
-        found, strangers, chosen = cls(), [], share.chooser()
+        survey, strangers = cls(), []
         places: set[int] = set()
-        sleeping: dict[str, tuple[Task, bool]] = {}
-        for task in plan():
-            for path in task.publish.values():
-                place = hash(path.casefold())
-                if place in places:
+        for found in look_through(plan, store, share):
+            for path in found.task.publish.values():
+                if (place := hash(path.casefold())) in places:
                     raise OutputError(f"{path}: two results would go here; choose other names")
                 places.add(place)
-            wanted = chosen(task)
-            if task.step.temporary:
-                sleeping[task.key] = task, wanted
+            if found.done:
+                survey.up_to_date += found.chosen
                 continue
-            before = [sleeping.pop(key) for key in task.after if key in sleeping]
-            result = store.result(task.key)
-            if result and (not wanted or store.is_published(task, result)):
-                found.up_to_date += wanted
-                continue
-            to_do = [task] if wanted else []
-            if wanted:
-                strangers += store.strangers(task, result)
-            if not result:
-                to_do += [one for one, also in before if also and not store.result(one.key)]
-            for one in to_do:
-                found.weight += one.weight
-                found.tasks += 1
-                found.amounts[one.unit] += one.amount
+            if found.chosen:
+                strangers += store.strangers(found.task, found.result)
+            for task in (*found.missing, *([found.task] if found.chosen else [])):
+                survey.weight += task.weight
+                survey.tasks += 1
+                survey.amounts[task.unit] += task.amount
         if strangers and not store.overwrite:
             raise OutputError(not_written([os.fspath(store.output / path) for path in strangers]))
-        return found
+        return survey
 
 
 def run(
@@ -189,10 +207,8 @@ def run(
     ----------
     plan : callable
         Returns its tasks, the same each time.
-    store : Store
-        Opened.
-    executor : Executor
-        Opened. One may do several plans, one after the other.
+    store, executor
+        Opened. An executor may do several plans, one after the other.
     progress : Progress, optional
     share : Share
         What is to be done here; of the rest, what is there is used.
@@ -219,8 +235,7 @@ def run(
     outcome = attempt.run()
     if not attempt.damaged or outcome.interrupted or outcome.problem:
         return outcome
-    again = _Run(plan, store, executor, progress or Progress(), share, retries, blender, Survey.of(plan, store, share))
-    again.mends = False
+    again = replace(attempt, survey=Survey.of(plan, store, share), mends=False)
     return outcome.continued(again.run())
 
 
@@ -236,8 +251,8 @@ class _Hopeless(Exception):
 class _Open:
     """A task that is not settled."""
 
-    number: int
     task: Task
+    number: int = 0
     waits: int = 0
     """For how many others."""
 
@@ -248,128 +263,111 @@ class _Open:
     losses: int = 0
 
 
+@dataclass(eq=False)
 class _Run:
     """A run that is under way."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        store: Store,
-        executor: Executor,
-        progress: Progress,
-        share: Share,
-        retries: int,
-        blender: str,
-        survey: Survey,
-    ) -> None:
-        self.plan, self.store, self.executor, self.progress = plan, store, executor, progress
-        self.share, self.retries, self.blender = share, retries, blender
-        self.survey, self.chosen = survey, share.chooser()
-        self.mends, self.damaged = True, False
-        """Whether what turns out to be damaged will be made again, and whether anything did."""
-        self.outcome = Outcome()
+    plan: Plan
+    store: Store
+    executor: Executor
+    progress: Progress
+    share: Share
+    retries: int
+    blender: str
+    survey: Survey
+    mends: bool = True
+    """Whether what turns out to be damaged will be made again."""
+
+    def __post_init__(self) -> None:
+        self.outcome, self.damaged = Outcome(), False
         self.details: dict[str, str] = {}
         self.settled: dict[str, str | None] = {}
         """Key of a task to that of its result; None where it has none."""
-        self.sleeping: dict[str, tuple[Task, bool]] = {}
-        """Temporary tasks that nobody has asked for, by their keys, and whether they are in the share."""
         self.open: dict[int, _Open] = {}
-        """What is not settled, by its place in the plan."""
+        """By their places in the plan."""
         self.readers: dict[str, list[_Open]] = {}
-        """Key of a task that is not settled to those that wait for it."""
+        """Key of an open task to those that wait for it."""
         self.ready: list[tuple[int, _Open]] = []
         self.temporary: set[str] = set()
-        """Keys of temporary tasks whose reader was opened."""
         self.at_work: dict[str, _Open] = {}
         """By the folder of the order."""
-        self.number = 0
-        self.weight_done = 0.0
+        self.number, self.weight_done = 0, 0.0
         self.amounts_done: Counter[str] = Counter()
-        self.shown: dict[str, int] = {}
-        self.rest: Iterator[Task] = iter(())
-
-    # -- doing it -----------------------------------------------------------------------------------------------------
+        self.shown: Counter[str] = Counter()
+        self.rest = look_through(self.plan, self.store, self.share)
 
     def run(self) -> Outcome:
         self.progress.begin(self.survey.weight)
-        self.rest = iter(self.plan())
+        outcome = self.outcome
         try:
             self._work()
-            if self.share == EVERYTHING and not self.outcome.failures:
+            if self.share == EVERYTHING and not outcome.failures:
                 self.store.sweep(key for key in self.settled.values() if key)
         except _Hopeless as error:
-            self.outcome.problem = str(error)
-            self.executor.stop()
-            self._drop_scratch()
+            outcome.problem = str(error)
+            self._stop()
         except KeyboardInterrupt:
             self._interrupted()
-        counts = self.outcome.counts
-        if self.outcome.problem or self.outcome.interrupted:
-            over = counts[State.DONE] + counts[State.FAILED] + counts[State.SKIPPED]
-            counts[State.STOPPED] = max(0, self.survey.tasks - over)
+        if outcome.problem or outcome.interrupted:
+            over = sum(outcome.counts[state] for state in (State.DONE, State.FAILED, State.SKIPPED))
+            outcome.counts[State.STOPPED] = max(0, self.survey.tasks - over)
         if self.share == EVERYTHING:
-            self._write_failures()
-        return self.outcome
+            failures = {
+                name: {"message": said, "details": self.details[name]} for name, said in outcome.failures.items()
+            }
+            with suppress(OSError):
+                self.store.note("failures.json", failures)
+        return outcome
 
     def _work(self) -> None:
         more = True
-        while True:
+        while more or self.ready or self.at_work:
             while more and len(self.ready) < self.executor.capacity:
-                task = next(self.rest, None)
-                if more := task is not None:
-                    self._meet(task, self.chosen(task))
+                found = next(self.rest, None)
+                if more := found is not None:
+                    self._meet(found)
             while self.ready and len(self.at_work) < self.executor.capacity:
                 self._begin(heapq.heappop(self.ready)[1])
             if self.at_work:
                 self.executor.wait(self._hear, PATIENCE)
-            elif not (more or self.ready):
-                return
 
-    def _meet(self, task: Task, chosen: bool) -> None:
+    def _meet(self, found: Found) -> None:
         """Take a task from the plan: it is up to date, or ready, or waits for others."""
-        if task.step.temporary:
-            self.sleeping[task.key] = task, chosen
-            return
-        before = [self.sleeping.pop(key) for key in task.after if key in self.sleeping]
-        is_open = task.key in self.readers
-        result = None if is_open else self.store.result(task.key)
-        if result and (not chosen or self.store.is_published(task, result)):
-            for one, _ in before:
+        if found.done and found.task.key not in self.readers:
+            for one in found.temporary:
                 self.store.discard(one.key)
-            self.settled[task.key] = task.key
-            if chosen:
-                self._count(task, State.UP_TO_DATE)
+            self.settled[found.task.key] = found.task.key
+            if found.chosen:
+                self._count(found.task, State.UP_TO_DATE)
             return
-        if not (result or is_open):
-            for one, also in before:
-                if also and not self.store.result(one.key):
-                    self._open(one)
-        if chosen:
-            self.temporary.update(one.key for one, _ in before)
+        for task in found.missing:
             self._open(task)
+        if found.chosen:
+            self.temporary.update(one.key for one in found.temporary)
+            self._open(found.task)
 
     def _open(self, task: Task) -> None:
         self.number += 1
-        self.open[self.number] = opened = _Open(self.number, task)
+        self.open[self.number] = opened = _Open(task, self.number)
         # A task that is there twice waits for itself.
-        for key in {*task.after, task.key}:
-            if key in self.readers:
-                self.readers[key].append(opened)
-                opened.waits += 1
+        for key in {*task.after, task.key} & self.readers.keys():
+            self.readers[key].append(opened)
+            opened.waits += 1
         self.readers.setdefault(task.key, [])
         if not opened.waits:
             heapq.heappush(self.ready, (opened.number, opened))
 
-    def _result_of(self, key: str) -> str | None:
-        """The key of the result of a task before; of earlier plans too."""
-        if key not in self.settled:
-            self.settled[key] = key if self.store.result(key) else None
-        return self.settled[key]
+    def _before(self, task: Task) -> list[str | None]:
+        """The keys of the results of the tasks before one, also of earlier plans; None where there is none."""
+        for key in task.after:
+            if key not in self.settled:
+                self.settled[key] = key if self.store.result(key) else None
+        return [self.settled[key] for key in task.after]
 
     def _begin(self, opened: _Open) -> None:
         """Begin a task whose predecessors are settled, or settle it if there is nothing to do."""
         task = opened.task
-        before = [self._result_of(key) for key in task.after]
+        before = self._before(task)
         opened.key = task.key_after(before)
         if result := self.store.result(opened.key):
             is_new = not self.store.is_published(task, result)
@@ -379,21 +377,19 @@ class _Run:
             self.store.withdraw(task.publish.values())
             self._close(opened, State.SKIPPED)
         else:
-            self._submit(opened, before)
+            self._submit(opened)
 
-    def _submit(self, opened: _Open, before: Iterable[str | None]) -> None:
-        task = opened.task
-        order = self._order(task, before)
-        self.at_work[order.folder] = opened
-        opened.share = 0.0
-        self._show(task.shown)
+    def _submit(self, opened: _Open) -> None:
+        order = self._order(opened.task)
+        self.at_work[order.folder], opened.share = opened, 0.0
+        self._show(opened.task.shown)
         self.executor.submit(order)
 
-    def _order(self, task: Task, before: Iterable[str | None]) -> Order:
+    def _order(self, task: Task) -> Order:
         return Order(
             step=task.step,
             parameters=task.parameters,
-            before=tuple(os.fspath(self.store.folder_of(key)) if key else None for key in before),
+            before=tuple(os.fspath(self.store.folder_of(key)) if key else None for key in self._before(task)),
             inputs=task.inputs,
             wanted={name: os.fspath(self.store.output / path) for name, path in task.publish.items()},
             output=os.fspath(self.store.output),
@@ -405,30 +401,35 @@ class _Run:
         opened = self.at_work.get(order.folder)
         if opened is None:
             return
-        task = opened.task
+        shown = opened.task.shown
         if isinstance(message, Told):
             opened.share = message.share
-            self._show(f"{task.shown}: {message.doing}" if message.doing else task.shown)
+            self._show(f"{shown}: {message.doing}" if message.doing else shown)
             return
         del self.at_work[order.folder]
-        if isinstance(message, Lost):
-            self._lost(opened, order, message)
-            return
         for note in message.notes:
             self.progress.note(note)
-        if isinstance(message, Failed):
+        if isinstance(message, Made):
+            if self._kept(opened, message):
+                self._close(opened, State.DONE)
+        elif isinstance(message, Failed):
             self._failed(opened, message)
-        elif self._kept(opened, message):
-            self._close(opened, State.DONE)
+        else:
+            shutil.rmtree(order.folder, ignore_errors=True)
+            opened.losses += 1
+            if opened.losses <= self.retries:
+                self.progress.note(f"{shown}: {message.message}; trying again")
+                self._submit(opened)
+            else:
+                self._failed(opened, Failed(f"{shown}: {message.message}; given up after {opened.losses} attempts"))
 
     def _kept(self, opened: _Open, made: Made) -> bool:
-        """Whether what was made could be kept and published."""
+        """Keep and publish what was made, and return whether that could be."""
         try:
             result = self.store.keep(opened.task, opened.key, Path(made.folder), made.index)
         except OSError as error:
             shutil.rmtree(made.folder, ignore_errors=True)
-            self._failed(opened, self._of_system(error))
-            return False
+            return self._failed(opened, _of_system(error))
         self.outcome.seconds += made.index["seconds"]
         facts = made.index["facts"].items()
         self.outcome.facts.update({name: fact for name, fact in facts if isinstance(fact, (int, float))})
@@ -439,59 +440,39 @@ class _Run:
             self.store.publish(opened.task, result)
             return True
         except OutputError as error:
-            self._failed(opened, Failed(str(error)))
+            return self._failed(opened, Failed(str(error)))
         except OSError as error:
-            self._failed(opened, self._of_system(error))
-        return False
+            return self._failed(opened, _of_system(error))
 
-    def _of_system(self, error: OSError) -> Failed:
-        where = error.filename2 or error.filename or self.store.output
-        return Failed(f"{where}: {error.strerror or error}", hopeless=error.errno in FULL_OR_FORBIDDEN)
-
-    def _lost(self, opened: _Open, order: Order, lost: Lost) -> None:
-        shutil.rmtree(order.folder, ignore_errors=True)
-        opened.losses += 1
-        shown = opened.task.shown
-        if opened.losses <= self.retries:
-            self.progress.note(f"{shown}: {lost.message}; trying again")
-            self._submit(opened, [self._result_of(key) for key in opened.task.after])
-        else:
-            self._failed(opened, Failed(f"{shown}: {lost.message}; given up after {opened.losses} attempts"))
-
-    def _failed(self, opened: _Open, failed: Failed) -> None:
+    def _failed(self, opened: _Open, failed: Failed) -> bool:
         # An error that nobody foresaw does not say by itself what it is about.
         task = opened.task
         said = f"{task.shown}: {failed.message}" if failed.details else failed.message
-        self.outcome.failures[task.name] = said
-        self.details[task.name] = failed.details
+        self.outcome.failures[task.name], self.details[task.name] = said, failed.details
         if failed.hopeless:
             self._close(opened, State.FAILED, said)
             raise _Hopeless(said)
-        keys = [key for key in map(self._result_of, task.after) if key]
-        damaged = [key for key in keys if self.mends and not self.store.result(key, thoroughly=True)]
-        for key in damaged:
+        keys = [key for key in self._before(task) if key and self.mends]
+        for key in (key for key in keys if not self.store.result(key, thoroughly=True)):
             self.store.discard(key)
-        if damaged:
             self.damaged = True
             self.progress.note(f"{task.shown}: what it reads is damaged; it is made again")
         # What is there under its name was made of something else.
         self.store.withdraw(task.publish.values())
         self._close(opened, State.FAILED, said)
+        return False
 
     def _close(self, opened: _Open, state: State, problem: str = "") -> None:
-        """A task that was opened has come to its end: those after it may begin."""
-        task = opened.task
-        there = state in (State.DONE, State.UP_TO_DATE)
+        """An open task has come to its end: those after it may begin."""
+        task, there = opened.task, state in (State.DONE, State.UP_TO_DATE)
         self.open.pop(opened.number, None)
         waiting = self.readers.pop(task.key, [])
         self.settled[task.key] = opened.key if there else None
         self.weight_done += task.weight
         self.amounts_done[task.unit] += task.amount
         self._count(task, state, problem)
-        if there:
-            for key in task.after:
-                if key in self.temporary:
-                    self.store.discard(key)
+        for key in self.temporary.intersection(task.after) if there else ():
+            self.store.discard(key)
         for one in waiting:
             if one.task.key == task.key:
                 self.readers.setdefault(task.key, [])
@@ -503,70 +484,53 @@ class _Run:
         self.outcome.counts[state] += 1
         self.progress.finish(task, state, problem)
 
+    def _show(self, doing: str) -> None:
+        by_now, weight = Counter(self.amounts_done), self.weight_done
+        for one in self.at_work.values():
+            by_now[one.task.unit] += one.share * one.task.amount
+            weight += one.share * one.task.weight
+        del by_now[""]
+        # What a worker that died had done does not make the count go back.
+        self.shown |= Counter({unit: int(number) for unit, number in by_now.items()})
+        counts = {unit: (number, self.survey.amounts[unit]) for unit, number in self.shown.items()}
+        self.progress.reach(min(weight, self.survey.weight), doing, counts)
+
     # -- Ctrl-C -------------------------------------------------------------------------------------------------------
+
+    def _stop(self) -> None:
+        self.executor.stop()
+        for folder in self.at_work:
+            shutil.rmtree(folder, ignore_errors=True)
+        self.at_work.clear()
 
     def _interrupted(self) -> None:
         self.outcome.interrupted = True
         deadline = time.monotonic() + AFTER_CTRL_C
         with suppress(KeyboardInterrupt, _OutOfTime, _Hopeless, OSError):  # The next run will do the rest.
-            self.executor.stop()
-            self._drop_scratch()
-            for opened in [*self.open.values()]:
-                if opened.task.step.partial:
+            self._stop()
+            rest = (_Open(found.task) for found in self.rest if found.chosen and not found.done)
+            for opened in (*self.open.values(), *rest):
+                if opened.task.step.partial and any(before := self._before(opened.task)):
+                    opened.key = opened.task.key_after(before)
                     self._do_at_once(opened, deadline)
-            for task in self.rest:
-                if task.step.partial and self.chosen(task):
-                    self.number += 1
-                    self._do_at_once(_Open(self.number, task), deadline)
-                if time.monotonic() > deadline:
-                    return
 
     def _do_at_once(self, opened: _Open, deadline: float) -> None:
         """Do a partial task in this process, with what there is."""
-        before = [self._result_of(key) for key in opened.task.after]
-        opened.key = opened.task.key_after(before)
-        if not any(before):
-            return
 
         def tell(share: float, doing: str) -> None:
             if time.monotonic() > deadline:
                 raise _OutOfTime
 
         tell(0.0, "")
-        self.readers.setdefault(opened.task.key, [])
         if result := self.store.result(opened.key):
             made = self._publish(opened, result)
         else:
-            message = perform(self._order(opened.task, before), tell)
+            message = perform(self._order(opened.task), tell)
             made = isinstance(message, Made) and self._kept(opened, message)
         if made:
-            self.settled[opened.task.key] = opened.key
-            self._count(opened.task, State.DONE)
+            self._close(opened, State.DONE)
 
-    def _drop_scratch(self) -> None:
-        for folder in self.at_work:
-            shutil.rmtree(folder, ignore_errors=True)
-        self.at_work.clear()
 
-    # -- saying it ----------------------------------------------------------------------------------------------------
-
-    def _show(self, doing: str) -> None:
-        begun = self.at_work.values()
-        by_now = Counter(self.amounts_done)
-        for one in begun:
-            by_now[one.task.unit] += one.share * one.task.amount
-        for unit in filter(None, by_now):
-            # What a worker that died had done does not make the count go back.
-            self.shown[unit] = max(int(by_now[unit]), self.shown.get(unit, 0))
-        counts = {unit: (shown, self.survey.amounts[unit]) for unit, shown in self.shown.items()}
-        done = self.weight_done + sum(one.task.weight * one.share for one in begun)
-        self.progress.reach(min(done, self.survey.weight), doing, counts)
-
-    def _write_failures(self) -> None:
-        """Write what went wrong for who looks closer: with what Python said of errors that nobody foresaw."""
-        path = self.store.own / "failures.json"
-        failures = {
-            name: {"message": said, "details": self.details[name]} for name, said in self.outcome.failures.items()
-        }
-        with suppress(OSError):
-            self.store.note(path.name, failures) if failures else path.unlink(missing_ok=True)
+def _of_system(error: OSError) -> Failed:
+    where = error.filename2 or error.filename
+    return Failed(f"{where}: {error.strerror or error}", hopeless=error.errno in FULL_OR_FORBIDDEN)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import importlib.metadata
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -224,6 +226,15 @@ def digest_of(place: Path) -> str:
     """Of the content of a file, or of all files of a folder, once in the life of this process."""
     files = sorted(path for path in place.rglob("*") if _is_source(path)) if place.is_dir() else [place]
     return _digest([[path.relative_to(place).as_posix(), sha256_of(path)] for path in files])[:12]
+
+
+def version_here() -> str:
+    """What all who work at one plan must have, as it was when this process asked first."""
+    found = [f"program {places.manifest()['version']} {digest_of(places.PACKAGE)} {digest_of(places.EXTENSION)}"]
+    for module in ("numpy", "bpy"):
+        with suppress(importlib.metadata.PackageNotFoundError):
+            found.append(f"{module} {importlib.metadata.version(module)}")
+    return ", ".join(found)
 
 
 def sha256_of(path: Path | str) -> str:

@@ -152,9 +152,12 @@ class Store:
         return self.scratch / str(self._number)
 
     def note(self, name: str, content: Any) -> None:
-        """Write a file of the store's own, of JSON."""
+        """Write a file of the store's own, of JSON; of nothing there is none."""
         _clear(self.own / name)
-        write_text(self.own / name, json.dumps(content, indent=1))
+        if content:
+            write_text(self.own / name, json.dumps(content, indent=1))
+        else:
+            (self.own / name).unlink(missing_ok=True)
 
     def _clear_dead_sessions(self) -> None:
         for path in self._scratch.glob("*.lock"):
@@ -418,11 +421,6 @@ def not_written(paths: list[str]) -> str:
         f"{some} {were} not written by this program, or edited since; choose another folder with --output, or replace "
         f"{them} with --overwrite"
     )
-
-
-def inputs_known(output: Path) -> dict[str, str]:
-    """The inputs of the runs into a folder: path to SHA-256."""
-    return {path: seen[-1] for path, seen in _inputs_known(output).items()}
 
 
 def _inputs_known(output: Path) -> dict[str, list[Any]]:

@@ -5,7 +5,7 @@ Values are in the units that the report shows: millimetres, degrees, keys and by
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import floor, isfinite, log10
 from typing import Any
@@ -16,7 +16,7 @@ from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Unifo
 from rigid_motion_batch.analysis.metrics import NOTHING, Metrics, geometric_mean
 from rigid_motion_batch.analysis.modes import REFERENCE, label_of
 from rigid_motion_batch.analysis.reconstructions import Groups, joint_groups
-from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.analysis.results import ChoiceNumbers
 
 
 @dataclass(frozen=True)
@@ -116,16 +116,16 @@ class Gathering:
         self._groupings: list[frozenset[Groups]] = []
         self._known: dict[Any, Any] = {}
 
-    def add(self, clip: ClipResult) -> None:
-        """Take the numbers of a clip, and nothing that is as long as it."""
-        choices = tuple(result.choice for result in clip.choices)
-        modes = tuple(dict.fromkeys(row.mode for result in clip.choices for row in result.rows))
+    def add(self, clip: str, results: Sequence[ChoiceNumbers]) -> None:
+        """Take the numbers of a clip of this name."""
+        choices = tuple(result.choice for result in results)
+        modes = tuple(dict.fromkeys(row.mode for result in results for row in result.rows))
         values = np.full((len(MEASURES), len(choices), len(modes)), np.nan)
-        for place, result in enumerate(clip.choices):
+        for place, result in enumerate(results):
             for row in result.rows:
                 values[:, place, modes.index(row.mode)] = [measure.of(row) for measure in MEASURES]
-        groupings = frozenset(tuple(motion.modes for motion in result.motions) for result in clip.choices)
-        self._clips.append(clip.facts.name)
+        groupings = frozenset(result.groups for result in results)
+        self._clips.append(clip)
         self._rows.append((self._same(choices), self._same(modes), values))
         self._groupings.append(self._same(groupings))
 

@@ -142,7 +142,7 @@ def write_report(
     for clip in clips:
         page.facts.append(clip.facts)
         if clip.choices:
-            gathering.add(clip)
+            gathering.add(clip.facts.name, [result.numbers for result in clip.choices])
             page.add(clip, settings.names)
         advance()
     numbers = gathering.numbers(dict(settings.names))
@@ -201,7 +201,7 @@ def write_overview(
     warnings: list[int] = []
     for clip in clips:
         if clip.choices:
-            gathering.add(clip)
+            gathering.add(clip.facts.name, [result.numbers for result in clip.choices])
             facts.append(clip.facts)
             warnings.append(len(clip.warnings))
         if clip.needed:
@@ -245,7 +245,7 @@ class _Clips:
     def add(self, clip: ClipResult, names: Mapping[str, str]) -> None:
         name, place = clip.facts.name, len(self.places)
         numbers = Gathering()
-        numbers.add(clip)
+        numbers.add(clip.facts.name, [result.numbers for result in clip.choices])
         own = numbers.numbers(dict(names))
         self.choices.append((name, tuple(result.choice for result in clip.choices)))
         self.rows += tables.every_row(clip)

@@ -26,8 +26,8 @@ from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Unifo
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors
-from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 
 MODES = ("lerp_slerp", "dq_sclerp", "motor_spline")
 

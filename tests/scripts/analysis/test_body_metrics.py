@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_motion.motion import KEYFRAME_MODES
 from rigid_motion_batch.analysis import bodies
 from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import (
@@ -25,9 +24,8 @@ from rigid_motion_batch.analysis.body_metrics import (
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import body_table_names, write_metrics
-from rigid_motion_batch.comparison.body_storage import read_body_keys, write_body_keys
 from rigid_motion_batch.rows import meant
-from tests.scripts.comparison.bodies import JOINTS, swinging_body
+from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 HEADER = (
     "clip,joint,mode,rate_hz,keys,samples,rms_shell_m,p95_shell_m,max_shell_m,worst_s,"
@@ -213,16 +211,3 @@ def test_keys_are_tables_of_poses_in_parents_space_and_read_back_exactly(
             for number in range(len(joints))
             for key in keys[number]
         ]
-
-
-@pytest.mark.parametrize("shared", [False, True])
-@pytest.mark.parametrize("choice", CHOICES, ids=str)
-def test_keys_are_read_back_from_their_file_as_they_were(tmp_path: Path, choice: Choice, shared: bool) -> None:
-    made = measured(choice, tuple(KEYFRAME_MODES), shared=shared).made
-    write_body_keys(tmp_path / "keys.npz", made)
-    again = read_body_keys(tmp_path / "keys.npz", made.clip, choice, shared=shared)
-    assert again.shared == made.shared
-    assert list(again.keys) == list(made.keys)
-    for mode, keys in made.keys.items():
-        assert [own.tolist() for own in again.keys[mode]] == [own.tolist() for own in keys]
-    assert measure_modes(again, RADII).rows == measure_modes(made, RADII).rows

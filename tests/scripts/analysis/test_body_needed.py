@@ -10,7 +10,7 @@ from rigid_motion_batch.analysis.body_needed import NEAR, OfBody
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, evenly_spaced, from_json, keys_needed, to_json
 from tests.motion.bodies import body_errors
-from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
+from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
 
 MODES = ("lerp_slerp", "dq_sclerp", "cga_slerp", "motor_spline")
 

@@ -12,7 +12,7 @@ from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.recordings.clips import Clip
 from tests.balls import largest_displacements
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.recordings import swinging_clip
 
 
 def shell_errors(clip: Clip, keys: np.ndarray, mode: str, radius: float = 0.1) -> np.ndarray:

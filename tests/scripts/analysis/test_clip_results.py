@@ -11,7 +11,7 @@ from rigid_motion_batch.analysis.radii import Radii
 from rigid_motion_batch.analysis.results import clip_result, compare_clip
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_source
-from tests.scripts.comparison.bodies import swinging_body
+from tests.scripts.clips.bodies import swinging_body
 
 MODES = ("lerp_slerp", "dq_sclerp", "pga_slerp", "motor_spline")
 

@@ -14,7 +14,7 @@ from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.recordings.clips import Clip
-from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.scripts.clips.recordings import reconstruct, swinging_clip
 
 COLUMNS = (
     "clip,mode,rate_hz,keys,samples,duration_s,bytes_per_s,"

@@ -20,7 +20,7 @@ from rigid_motion_batch.analysis.needed import (
 )
 from rigid_motion_batch.recordings.clips import Clip
 from tests.scripts.analysis.test_choices import shell_errors
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.recordings import swinging_clip
 
 GROUPS = (("lerp_slerp",), ("dq_sclerp", "pga_slerp", "cga_slerp"), ("pga_lerp", "cga_lerp"), ("motor_spline",))
 

@@ -11,16 +11,14 @@ import time
 from dataclasses import astuple
 from pathlib import Path
 from random import Random
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from rigid_motion.motion import KEYFRAME_MODES
-from rigid_motion_batch.analysis.bodies import reconstruct_body
-from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
-from rigid_motion_batch.comparison.report.body_charts import body_charts, body_curves
+from rigid_motion_batch.analysis.radii import Radii
+from rigid_motion_batch.analysis.results import clip_result, compare_clip
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
@@ -39,11 +37,6 @@ PARTS = 4
 
 MEASURED = 3
 """Of so many that can be read one is measured and shown, and of so many of these one gets keys by its motion."""
-
-DRAWN = frozenset(("d", "x", "y", "cx", "cy", "width", "height", "viewBox", "style", "stroke", "fill"))
-"""Attributes of SVG that no name gets into."""
-
-NO_NUMBER = re.compile("nan|inf", re.IGNORECASE)
 
 LONGEST = 200
 """Samples of what is measured: a line that is there 300 times over is no short recording any more."""
@@ -84,18 +77,18 @@ SEEDS = (
 
 
 def assert_can_be_shown(clip: Clip, choice: Choice, mode: str) -> None:
-    """Measured by the program, and drawn: with numbers that are some, and markup that is well-formed."""
-    made = reconstruct_body(clip, choice, (mode,), 0.03)
-    if made is None:
+    """Measured by the program, with numbers that are some, in tables and in all that a page shows."""
+    found = compare_clip(clip, choice, (mode,), Radii(), shared=False)
+    if found is None:
         return
-    measured = measure_modes(made, 0.03)
-    for row in (*measured.rows, *measured.joints):
+    for row in (*found.rows, *found.joints):
         assert all(np.isfinite(cell) for cell in astuple(row) if isinstance(cell, float)), row
-    assert measured.rows[0].max_shell_m == max(row.max_shell_m for row in measured.joints)
-    for markup in (body_charts(measured), body_curves(measured)):
-        for drawn in ElementTree.fromstring(f"<div>{markup}</div>").iter():
-            for name in DRAWN.intersection(drawn.attrib):
-                assert not NO_NUMBER.search(drawn.attrib[name]), f"{name}={drawn.attrib[name]}"
+    assert found.rows[0].max_shell_m == max(row.max_shell_m for row in found.joints)
+    whole = clip_result(clip, [found])
+    assert np.isfinite(whole.truth.positions).all()
+    for motion in found.motions:
+        assert np.isfinite(motion.poses.positions).all()
+        assert np.isfinite(motion.errors).all()
 
 
 def fuzz(folder: Path, seeds: tuple[bytes, ...], numbers: range) -> int:

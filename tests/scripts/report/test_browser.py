@@ -13,8 +13,8 @@ import pytest
 from rigid_motion_batch.analysis.choices import Budget, Tolerance
 from rigid_motion_batch.recordings.clips import ClipWarning
 from rigid_motion_batch.report import Settings, pages, write_overview, write_report
-from tests.scripts.comparison.bodies import swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.chromium import Browser, browser
 from tests.scripts.report.javascript import require
 from tests.scripts.report.runs import RATES, result_of

@@ -16,8 +16,8 @@ from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.report import data
 from rigid_motion_batch.report.data import Block, clip_data, json_in_page, mesh_data
 from rigid_motion_batch.report.mesh import MOST_TRIANGLES, Mesh, drill
-from tests.scripts.comparison.bodies import swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.javascript import value_of
 from tests.scripts.report.runs import result_of
 

@@ -28,8 +28,8 @@ from rigid_motion_batch.report.colours import BACKGROUNDS, MODE_COLOURS, OTHER_C
 from rigid_motion_batch.report.numbers import ERROR, KEYS
 from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of
 from rigid_motion_batch.report.tables import grids
-from tests.scripts.comparison.bodies import swinging_body
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.bodies import swinging_body
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.runs import MODES, result_of
 
 ASSETS = Path(__file__).resolve().parents[3] / "assets"
@@ -223,7 +223,7 @@ def test_the_lowest_number_is_underlined_with_all_its_ties_but_not_where_all_are
         for motion in result.motions
     )
     numbers = Gathering()
-    numbers.add(replace(clip, choices=(replace(result, motions=motions),)))
+    numbers.add("clip", [replace(result, motions=motions).numbers])
     by_measure = {grid.column: [row.cells[0] for row in grid.rows] for grid in grids(numbers.numbers(), 0)}
     assert [(cell.text, cell.best) for cell in by_measure[ERROR]] == [("2.00", True), ("2.00", True), ("3.00", False)]
     assert [cell.small for cell in by_measure[ERROR]] == ["reference", "same", "+50\u00a0%"]

@@ -24,7 +24,7 @@ from rigid_motion_batch.scenes.film import save_blend
 from rigid_motion_batch.scenes.physique import BONE
 from rigid_motion_batch.scenes.settings import StageSettings
 from rigid_motion_batch.scenes.timeline import Timeline
-from tests.scripts.comparison.dancers import JOINTS, dancing_clip
+from tests.scripts.clips.dancers import JOINTS, dancing_clip
 from tests.scripts.scenes.test_scene import evaluated_points
 from tests.thoroughness import sample
 

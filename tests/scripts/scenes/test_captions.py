@@ -15,8 +15,8 @@ from rigid_motion_batch.scenes import captions
 from rigid_motion_batch.scenes.materials import ink
 from rigid_motion_batch.scenes.scene import build_stage, make_camera, set_up_render
 from rigid_motion_batch.scenes.settings import StageSettings
-from tests.scripts.comparison.dancers import dancing_clip
-from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.scripts.clips.dancers import dancing_clip
+from tests.scripts.clips.recordings import reconstruct, swinging_clip
 from tests.scripts.scenes.stills import pixels_of, render_still
 from tests.scripts.scenes.test_body_scene import RADII, made_of
 

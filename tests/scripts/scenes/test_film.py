@@ -11,7 +11,7 @@ import pytest
 from rigid_motion_batch.scenes.film import join_pieces, render_film, render_piece, save_blend
 from rigid_motion_batch.scenes.scene import build_stage
 from rigid_motion_batch.scenes.settings import StageSettings
-from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.scripts.clips.recordings import reconstruct, swinging_clip
 from tests.scripts.scenes.stills import pixels_of, render_still
 
 SETTINGS = StageSettings(resolution=(160, 90), fps=10)

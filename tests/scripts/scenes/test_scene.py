@@ -23,7 +23,7 @@ from rigid_motion_batch.scenes.scene import build_stage
 from rigid_motion_batch.scenes.settings import StageSettings
 from rigid_motion_batch.scenes.subject import vertices_of
 from rigid_motion_batch.scenes.timeline import Timeline
-from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.scripts.clips.recordings import reconstruct, swinging_clip
 from tests.thoroughness import sample
 
 SETTINGS = StageSettings(resolution=(160, 90), fps=12)

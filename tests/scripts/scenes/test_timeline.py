@@ -10,7 +10,7 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.modes import BEST_OF
 from rigid_motion_batch.analysis.reconstructions import reconstruct as choose
 from rigid_motion_batch.scenes.timeline import ShownMotion, Timeline, peaks
-from tests.scripts.comparison.recordings import reconstruct, swinging_clip
+from tests.scripts.clips.recordings import reconstruct, swinging_clip
 
 
 @pytest.fixture(scope="module")

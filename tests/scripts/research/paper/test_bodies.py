@@ -19,7 +19,7 @@ from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clips import Clip
 from tests.motion.bodies import body_errors, in_root_space
 from tests.scripts.bvh_bodies import write_body
-from tests.scripts.comparison.bodies import JOINTS, PARENTS, still_body, swinging_body
+from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
 
 NAMES = ("Hips", "Spine", "Head", "LeftArm", "LeftHand", "Glove", "RightLeg", "RightFoot")
 

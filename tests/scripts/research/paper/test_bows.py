@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from research.paper.bows import FORMULA, RATES, bows_of
-from tests.scripts.comparison.recordings import swinging_clip
+from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.research.paper.clips import circling, spinning_straight
 
 

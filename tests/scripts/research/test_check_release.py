@@ -11,7 +11,7 @@ import pytest
 from research import check_release
 from research.check_release import CHANGELOG, CHECKS, LISTING, MANIFEST, MANUAL
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 WEBSITE = "https://motion.dev/rigid"
 
 

@@ -13,7 +13,7 @@ from rigid_motion_batch.recordings import Trajectory
 from rigid_motion_batch.recordings.clip_reading import make_clip
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import IN_METRES, TYPICAL, UNITS, Skin, repaired, size_of, unit_of
-from tests.scripts.comparison.bodies import JOINTS, swinging_body
+from tests.scripts.clips.bodies import JOINTS, swinging_body
 
 
 @pytest.fixture

@@ -1,0 +1,60 @@
+"""The tasks of a comparison that was made, which are done, and what was wrong with those that failed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from rigid_motion_batch.command_line import complain, parser_of, printable, program_of
+from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.store import Store
+
+SCRIPT = "tasks"
+
+EPILOG = """
+examples:
+  rigid-motion tasks list renders/hand
+  rigid-motion tasks list renders/hand --failed
+
+To do a part of a comparison, as the workers of a farm do, give its command --only STAGE and --part K/N. --explain says
+what it would do and why.
+Exit code: 0 all tasks are done, 1 some failed, 2 there is no comparison.
+"""
+
+
+def main(arguments: list[str]) -> int:
+    """List tasks, and return the exit code."""
+    options = _parse(arguments)
+    if not (options.output / OWN).is_dir():
+        complain(program_of(SCRIPT), f"{options.output}: no comparison was made in this folder")
+        return 2
+    store = Store(options.output, alone=False)
+    failures = _failures(options.output / OWN / "failures.json")
+    for name, key in store.latest().items():
+        result = store.result(key)
+        if name in failures or options.failed:
+            continue
+        state = f"done in {result.index.get('seconds', 0.0):.1f} s" if result else "not done"
+        print(printable(f"{name}: {state}"))
+    for name, failure in failures.items():
+        print(printable(f"{name}: failed: {failure['message']}"))
+        if options.failed and failure.get("details"):
+            print(failure["details"])
+    return int(bool(failures))
+
+
+def _failures(path: Path) -> dict[str, dict[str, str]]:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+
+
+def _parse(arguments: list[str]) -> argparse.Namespace:
+    parser = parser_of(SCRIPT, __doc__, EPILOG)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    listing = commands.add_parser("list", help="the tasks, and which are done")
+    listing.add_argument("output", type=Path, metavar="OUTPUT", help="the output folder")
+    listing.add_argument("--failed", action="store_true", help="only those that failed, with what Python said")
+    return parser.parse_args(arguments)

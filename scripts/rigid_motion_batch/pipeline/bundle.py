@@ -1,0 +1,175 @@
+"""A comparison as a job bundle of Open Job Description, for render farms: no list of tasks, but shares of each stage.
+
+A task of the job runs the command of the comparison with `--only STAGE --part K/N`: it plans anew, and does its share.
+What was done is kept, so a task may fail, be killed, be run twice, or have less to do than others.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from rigid_motion_batch.files import write_text
+from rigid_motion_batch.places import PACKAGE
+
+from .running import Progress
+from .steps import version_here
+
+STAGES = ("read", "measure", "build", "render", "encode", "report")
+"""Of a comparison; each begins when all before it have ended."""
+
+COMPARE = ("-m", "rigid_motion_batch", "compare")
+
+MOST_PARTS = 1024
+"""Values of a parameter, in Open Job Description."""
+
+PROGRESS = "RIGID_MOTION_PROGRESS"
+"""Of the environment: "openjd" where a farm listens."""
+
+
+class FarmProgress(Progress):
+    """Says how far a run is in the lines that Open Job Description knows."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream, self._total = stream or sys.stdout, 0.0
+
+    def begin(self, total: float) -> None:
+        self._total = total
+
+    def reach(self, done: float, doing: str, counts: Mapping[str, tuple[int, int]]) -> None:
+        counted = "".join(f", {unit} {number} of {total}" for unit, (number, total) in counts.items())
+        share = 100.0 * done / self._total if self._total else 100.0
+        print(f"openjd_progress: {share:.1f}\nopenjd_status: {doing}{counted}", file=self._stream, flush=True)
+
+    def note(self, text: str) -> None:
+        print(text, file=self._stream, flush=True)
+
+
+def write_bundle(
+    folder: Path,
+    arguments: Sequence[str],
+    output: Path,
+    parts: Mapping[str, int],
+    name: str,
+    command: Sequence[str] = COMPARE,
+) -> dict[str, str]:
+    """Write the files of a bundle, and return the parameters of the job for a farm on which all is where it is here.
+
+    Parameters
+    ----------
+    folder : Path
+    arguments : sequence of str
+        Of the comparison, but for `--output`. The files that they name are looked for in the job's folder of inputs.
+    output : Path
+    parts : mapping
+        Of the stages that there are to how many tasks they are split into.
+    name : str
+        Of the job.
+    command : sequence of str
+        What Python runs.
+
+    Raises
+    ------
+    ValueError
+        Where an argument would be taken for an expression of the template, or no folder has all inputs, on Windows.
+    OSError
+    """
+    if braced := next((one for one in arguments if "{{" in one), None):
+        raise ValueError(f"{braced!r}: a job cannot have this name, for its braces; rename it")
+    arguments, inputs = below_inputs(arguments)
+    values = {
+        "Program": str(PACKAGE.parent),
+        "Python": sys.executable,
+        "Inputs": str(inputs),
+        "Output": str(output.absolute()),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    given = [{"name": parameter, "value": value} for parameter, value in values.items()]
+    write_text(folder / "parameter_values.json", _json({"parameterValues": given}))
+    write_text(folder / "template.json", _json(_template([*command, *arguments], parts, name)))
+    return values
+
+
+def below_inputs(arguments: Iterable[str]) -> tuple[list[str], Path]:
+    """Arguments with the files that they name, FILE, FILE:BODY or --option=FILE, as the job finds them, and where."""
+    found = [(one, *_file_in(one)) for one in arguments]
+    files = [os.path.abspath(file) for _, _, file, _ in found if file]
+    inputs = Path(os.path.commonpath([os.path.dirname(file) for file in files])) if files else Path.cwd()
+
+    def moved(option: str, file: str, rest: str) -> str:
+        return f"{option}{{{{Param.Inputs}}}}/{Path(os.path.abspath(file)).relative_to(inputs).as_posix()}{rest}"
+
+    return [moved(*parts) if parts[1] else one for one, *parts in found], inputs
+
+
+def _file_in(argument: str) -> tuple[str, str, str]:
+    """What stands before the file in an argument, the file, and what is behind it; no file where there is none."""
+    option, equals, value = argument.partition("=") if argument.startswith("-") else ("", "", argument)
+    ends = [len(value), *(place for place in range(len(value) - 1, 0, -1) if value[place] == ":")]
+    # A number is no file, whatever lies in the current folder.
+    there = (end for end in ends if not value.replace(".", "").isdigit() and os.path.exists(value[:end]))
+    end = next(there, 0) if "\0" not in value else 0
+    return option + equals, value[:end], value[end:]
+
+
+def _template(command: Sequence[str], parts: Mapping[str, int], name: str) -> dict[str, Any]:
+    stages = [stage for stage in STAGES if stage in parts]
+    return {
+        "specificationVersion": "jobtemplate-2023-09",
+        "name": name,
+        "description": "Interpolation modes compared on recorded trajectories. docs/farm.md says what it needs.",
+        "parameterDefinitions": [
+            _path("Program", "The folder that has rigid_motion_batch.", "NONE"),
+            {"name": "Python", "type": "STRING", "default": "python", "description": "With what the program needs."},
+            _path("Inputs", "The folder of the recordings.", "IN"),
+            _path("Output", "The folder to write to, the same for all tasks.", "OUT"),
+        ],
+        "jobEnvironments": [
+            {
+                "name": "Rigid Motion",
+                "variables": {"PYTHONPATH": "{{Param.Program}}", PROGRESS: "openjd"},
+                "script": {"actions": {"onEnter": _action(["-m", __name__, version_here()])}},
+            }
+        ],
+        "steps": [
+            _step(stage, before, min(max(parts[stage], 1), MOST_PARTS), command)
+            for stage, before in zip(stages, [None, *stages], strict=False)
+        ],
+    }
+
+
+def _step(stage: str, before: str | None, parts: int, command: Sequence[str]) -> dict[str, Any]:
+    share = ["--output", "{{Param.Output}}", "--only", stage, "--part", f"{{{{Task.Param.Part}}}}/{parts}"]
+    return {
+        "name": stage.capitalize(),
+        **({"dependencies": [{"dependsOn": before.capitalize()}]} if before else {}),
+        "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{parts}"}]},
+        "script": {"actions": {"onRun": _action([*command, *share])}},
+    }
+
+
+def _action(arguments: Iterable[str]) -> dict[str, Any]:
+    return {"command": "{{Param.Python}}", "args": [*arguments]}
+
+
+def _path(name: str, description: str, flow: str) -> dict[str, Any]:
+    return {"name": name, "type": "PATH", "objectType": "DIRECTORY", "dataFlow": flow, "description": description}
+
+
+def _json(content: Any) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def main(wanted: str) -> int:
+    """Make sure that this is the version of the program that wrote a bundle."""
+    if (found := version_here()) != wanted:
+        print(f"openjd_fail: this machine has {found}, and the bundle is of {wanted}", flush=True)
+    return int(found != wanted)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,110 @@
+"""Job bundles, and what Open Job Description's own tools make of them."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rigid_motion_batch.pipeline import bundle
+from rigid_motion_batch.pipeline.bundle import FarmProgress, below_inputs, write_bundle
+from rigid_motion_batch.pipeline.executors import ProcessExecutor
+from tests.scripts.comparing import write_toss
+from tests.scripts.pipeline.test_comparison import ABOUT, STAGE, compared, published, wanted
+
+PARTS = {"read": 2, "measure": 2, "build": 1, "render": 3, "encode": 1, "report": 1}
+
+
+def openjd(*command: object, cwd: Path) -> subprocess.CompletedProcess:
+    line = [sys.executable, "-m", "openjd", *map(str, command)]
+    return subprocess.run(line, capture_output=True, text=True, timeout=300, cwd=cwd)
+
+
+def test_a_job_on_a_farm_makes_the_same_as_a_run_on_one_machine(tmp_path: Path) -> None:
+    takes = tmp_path / "takes"
+    sources = [write_toss(takes / "toss.csv"), write_toss(takes / "other.csv", samples=70)]
+    command = ("-m", "tests.scripts.pipeline.part_of_comparison")
+    given = write_bundle(
+        tmp_path / "bundle", [*map(str, sources), "--rates", "5"], tmp_path / "out", PARTS, "Two clips", command
+    )
+    template = tmp_path / "bundle" / "template.json"
+    checked = openjd("check", template, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout
+    # On the farm the recordings are in another folder, and the steps of the tests are found beside the program.
+    there = tmp_path / "mounted" / "takes"
+    there.parent.mkdir()
+    takes.rename(there)
+    rule = {"source_path_format": "POSIX", "source_path": str(takes), "destination_path": str(there)}
+    rules = json.dumps({"version": "pathmapping-1.0", "path_mapping_rules": [rule]})
+    given["Program"] = os.environ["PYTHONPATH"]
+    values = [part for name, value in given.items() for part in ("-p", f"{name}={value}")]
+    ran = openjd("run", template, *values, "--path-mapping-rules", rules, cwd=tmp_path)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    outcome, _ = compared(
+        tmp_path / "here",
+        wanted(*(there / source.name for source in sources), stage=STAGE, about=ABOUT),
+        ProcessExecutor(2),
+    )
+    assert outcome.failures == {}
+    assert published(tmp_path / "out") == published(tmp_path / "here")
+
+
+def test_stages_follow_one_another_and_their_parts_are_a_parameter(tmp_path: Path) -> None:
+    write_bundle(tmp_path, ["a.csv"], tmp_path / "out", {"read": 4, "measure": 2000, "report": 1}, "One")
+    template = json.loads((tmp_path / "template.json").read_text())
+    steps = template["steps"]
+    assert [step["name"] for step in steps] == ["Read", "Measure", "Report"]
+    assert [step.get("dependencies") for step in steps] == [None, [{"dependsOn": "Read"}], [{"dependsOn": "Measure"}]]
+    ranges = [step["parameterSpace"]["taskParameterDefinitions"][0]["range"] for step in steps]
+    assert ranges == ["1-4", "1-1024", "1-1"]
+    arguments = steps[0]["script"]["actions"]["onRun"]["args"]
+    assert arguments == [
+        *("-m", "rigid_motion_batch", "compare", "a.csv", "--output", "{{Param.Output}}"),
+        *("--only", "read", "--part", "{{Task.Param.Part}}/4"),
+    ]
+
+
+def test_files_are_named_from_the_folder_that_has_all_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for path in ("takes/day/a.csv", "takes/b.csv", "takes/radii.csv", "takes/5"):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).touch()
+    given = [
+        "takes/day/a.csv:left",
+        "takes/b.csv",
+        "--rates",
+        "5",
+        "--radius=takes/radii.csv",
+        "--no-video",
+        "takes/day",
+    ]
+    arguments, inputs = below_inputs(given)
+    assert inputs == tmp_path / "takes"
+    assert arguments == [
+        *("{{Param.Inputs}}/day/a.csv:left", "{{Param.Inputs}}/b.csv", "--rates", "5"),
+        *("--radius={{Param.Inputs}}/radii.csv", "--no-video", "{{Param.Inputs}}/day"),
+    ]
+
+
+def test_a_name_that_is_an_expression_of_templates_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="for its braces; rename it"):
+        write_bundle(tmp_path, ["{{a}}.csv"], tmp_path / "out", PARTS, "One")
+
+
+def test_a_machine_with_another_version_is_told_so(capsys: pytest.CaptureFixture) -> None:
+    assert bundle.main(bundle.version_here()) == 0
+    assert bundle.main("program 0") == 1
+    assert "and the bundle is of program 0" in capsys.readouterr().out
+
+
+def test_progress_is_said_as_farms_hear_it() -> None:
+    stream = io.StringIO()
+    progress = FarmProgress(stream)
+    progress.begin(8.0)
+    progress.reach(2.0, "toss at 5 keys/s", {"frame": (3, 12)})
+    assert stream.getvalue() == "openjd_progress: 25.0\nopenjd_status: toss at 5 keys/s, frame 3 of 12\n"
