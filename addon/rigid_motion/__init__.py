@@ -4,19 +4,7 @@
 `translations` is that in other languages. Imports go down only: each knows those before it, and `motion` none.
 """
 
-
-def __getattr__(name: str) -> str:
-    """Read `__version__` from the manifest, which lies in this folder, or at the top of a checkout."""
-    if name != "__version__":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import tomllib
-    from pathlib import Path
-
-    package = Path(__file__).resolve().parent
-    for folder in (package, package.parents[1]):
-        if (manifest := folder / "blender_manifest.toml").is_file():
-            return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
-    raise AttributeError(f"{package} has no blender_manifest.toml, which tells the version: install it again")
+__version__ = "0.1.0"
 
 
 def glTF2ExportUserExtension() -> object:

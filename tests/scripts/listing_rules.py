@@ -25,7 +25,10 @@ OF_BLENDER = {
 """Modules that come with Blender, beside Python's own."""
 
 NETWORK = {"asyncio", "ftplib", "http", "imaplib", "requests", "smtplib", "socket", "socketserver", "ssl", "urllib"}
-PROCESSES = {"concurrent", "ctypes", "multiprocessing", "pty", "signal", "subprocess", "threading", "_thread"}
+PROCESSES = {"concurrent", "ctypes", "multiprocessing", "pty", "signal", "subprocess", "_thread"}
+
+STARTING = ("threading.Thread", "threading.Timer", "Thread", "Timer")
+"""What starts a thread; a handler may ask which one it is called on."""
 LOADING = {"ensurepip", "imp", "importlib", "pip", "pkgutil", "runpy", "site", "zipimport"}
 FILES = {"fileinput", "glob", "io", "os", "pathlib", "pickle", "shelve", "shutil", "sqlite3", "tempfile"}
 DEBUGGING = {"cProfile", "code", "debugpy", "faulthandler", "pdb", "profile", "trace", "tracemalloc"}
@@ -97,8 +100,11 @@ def no_network(files: Files) -> Iterable[str]:
     return without(NETWORK, files)
 
 
-def no_processes_and_no_threads(files: Files) -> Iterable[str]:
-    return without(PROCESSES, files)
+def no_processes_and_no_threads(files: Files) -> Iterator[str]:
+    yield from without(PROCESSES, files)
+    for name, node, function in called(files):
+        if function in STARTING:
+            yield f"{name}:{node.lineno} starts a thread"
 
 
 def no_debug_code(files: Files) -> Iterator[str]:

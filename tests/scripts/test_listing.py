@@ -35,7 +35,7 @@ def test_the_zip_keeps_the_rule(rule, files):
 BROKEN = [
     ("no_network", "import urllib.request"),
     ("no_network", "def fetch():\n    from http import client"),
-    ("no_processes_and_no_threads", "import threading"),
+    ("no_processes_and_no_threads", "import threading\nthreading.Thread(target=print).start()"),
     ("no_processes_and_no_threads", "from subprocess import run"),
     ("no_debug_code", "breakpoint()"),
     ("no_debug_code", "import pdb"),

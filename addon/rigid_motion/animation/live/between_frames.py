@@ -19,8 +19,11 @@ def shows_between_frames() -> bool:
 
 
 def on_main_thread(work: Callable[[], object]) -> None:
-    """Do something on Blender's main thread, and wait for it. A render that is watched begins on a thread of its own,
-    while the main thread evaluates and draws what would be changed."""
+    """Do something on Blender's main thread, and wait for it.
+
+    A render that is watched begins on a thread of its own, while the main thread evaluates and draws what would be
+    changed.
+    """
     if threading.current_thread() is threading.main_thread():
         work()
         return
@@ -35,4 +38,6 @@ def on_main_thread(work: Callable[[], object]) -> None:
 
     bpy.app.timers.register(run)
     if not done.wait(PATIENCE):
+        if bpy.app.timers.is_registered(run):
+            bpy.app.timers.unregister(run)
         run()

@@ -64,8 +64,9 @@ def _take_out_between_frames(place: SlotTransform) -> None:
 
 
 def is_draft(action: bpy.types.Action) -> bool:
-    """Whether an Action is in draft."""
-    return action.rigid_motion.is_draft
+    """Return whether an Action is in draft; none is while the extension is off."""
+    motion = getattr(action, "rigid_motion", None)
+    return motion is not None and motion.is_draft
 
 
 def drafts_among(actions: Iterable[bpy.types.Action]) -> set[bpy.types.Action]:
