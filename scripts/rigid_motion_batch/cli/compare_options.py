@@ -91,13 +91,15 @@ what is written:
   OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
   numbers, with adaptive keys also OUTPUT/keys_needed.csv, and for whole bodies OUTPUT/decimated.csv, which compares
   their keys with Blender's Decimate. Every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
-  /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend. The
-  last line printed is the path of the report.
+  /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend.
+  OUTPUT/.rigid-motion has the results that are kept. On the terminal come a table of errors, one sentence, and last the
+  path of the report; with --json all of that as data.
 
 one folder, one comparison:
-  You can run again into the same folder with the same recordings, with more of them or fewer. The program refuses a
-  folder that holds another comparison, and does not replace files that it has not written: choose another --output, or
-  replace them with --force. It never replaces inputs. --explain says what a run would do and why, and does nothing.
+  Without --output it is renders/NAME, by the first recording. You can run again into the same folder with the same
+  recordings, with more of them or fewer. The program refuses a folder that holds another comparison, and does not
+  replace files that it has not written or that were edited since: choose another --output, or replace them with
+  --overwrite. It never replaces inputs. --explain says what a run would do and why, and does nothing.
 
 many clips:
   The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
@@ -226,7 +228,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="for workbench: FXAA or a number of samples; 8 for a talk (FXAA for small pictures, OFF for others)",
+        help="for workbench: FXAA or a number of samples; 8 for a talk (edges are smoothed afterwards)",
     )
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
