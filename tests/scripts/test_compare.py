@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import errno
+import json
 import os
 import re
 import shlex
@@ -22,10 +23,10 @@ from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
 from rigid_motion_batch.cli import compare
+from rigid_motion_batch.pipeline.steps import OWN
+from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.scenes import film
-from rigid_motion_batch.workplan import Workspace
-from rigid_motion_batch.workplan import __main__ as workplan
 from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
 
@@ -39,8 +40,9 @@ COLUMNS = (
 SMALL = ["--resolution", "160x90", "--fps", "6"]
 
 
-OWN = (".parts", ".workplan")
-"""Folders of the program's own in an output folder."""
+def tasks_of(capsys: pytest.CaptureFixture) -> dict[str, int]:
+    """What became of the tasks of a run with --json."""
+    return json.loads(capsys.readouterr().out)["tasks"]
 
 
 def run(*arguments: object) -> int:
@@ -50,7 +52,7 @@ def run(*arguments: object) -> int:
 
 def shown(folder: Path) -> list[Path]:
     """What lies in an output folder for people."""
-    return sorted(path for path in folder.iterdir() if path.name not in (*OWN, "manifest.json"))
+    return sorted(path for path in folder.iterdir() if path.name != OWN)
 
 
 def exit_code(*arguments: object) -> int:
@@ -239,11 +241,9 @@ def test_screws_are_pytransform3ds_between_the_written_keys(measured):
 def test_the_video_its_blend_and_the_report_are_written_and_nothing_else(short_clip, tmp_path, capsys):
     assert run(short_clip, "--output", tmp_path, "--rates", "10", *SMALL) == 0
     files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
-    written = {str(path) for path in files if path.parts[0] not in OWN}
+    written = {str(path) for path in files if path.parts[0] != OWN}
     tables = {f"toss/10/{name}.csv" for name in ("keys", *KEYFRAME_MODES)}
-    assert written == tables | {
-        *("manifest.json", "metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend")
-    }
+    assert written == tables | {*("metrics.csv", "report.html", "toss/10/comparison.mp4", "toss/10/comparison.blend")}
     assert capsys.readouterr().out.splitlines()[-1] == str((tmp_path / "report.html").resolve())
 
 
@@ -258,11 +258,7 @@ def test_all_numbers_are_in_the_report_before_the_first_frame_is_rendered(short_
     monkeypatch.setattr(film, "render_piece", render_piece)
     assert run(short_clip, "--output", tmp_path, "--rates", "5,10", *SMALL) == 0
     assert pages
-    assert all(
-        "The video is being rendered" in page and 'data-coming="toss/5/comparison.mp4"' in page for page in pages
-    )
-    assert pages[0].count("<table") == (tmp_path / "report.html").read_text(encoding="utf-8").count("<table") > 2
-    assert "The video is being rendered" not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all('src="toss/5/comparison.mp4"' in page and "Smooth Screw" in page for page in pages)
     assert [path.parent.name for path in tmp_path.glob("toss/*/comparison.mp4")] == ["5"]
     assert f"films come as they are made: {tmp_path / 'report.html'}" in capsys.readouterr().err
     assert run(short_clip, "--output", tmp_path, "--rates", "5,10", *SMALL) == 0
@@ -470,7 +466,7 @@ def test_the_printed_examples_work_as_printed(page, capsys):
 
 def rendering(output: Path) -> bool:
     """Whether a piece of a film is being rendered."""
-    return any(name.endswith(".mkv") for _, _, names in os.walk(output / ".workplan" / "scratch") for name in names)
+    return any(name.endswith(".mkv") for _, _, names in os.walk(output / OWN / "scratch") for name in names)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for another process")
@@ -491,13 +487,8 @@ def test_ctrl_c_while_rendering_leaves_a_report_and_no_half_video(tmp_path):
             process.kill()
     assert process.returncode == 130
     assert Path(printed.splitlines()[-1]).is_file()
-    assert not [path for path in tmp_path.rglob(".*") if path.is_file()]
-    assert not (tmp_path / ".workplan" / "scratch").exists()
+    assert not (tmp_path / OWN / "scratch").exists()
     assert not list(tmp_path.rglob("*.mp4"))
-
-
-def tasks_of(said: str) -> str:
-    return next(line for line in said.splitlines() if line.startswith("Tasks: "))
 
 
 def poses_and_metrics(folder: Path) -> dict[str, bytes]:
@@ -508,54 +499,134 @@ def test_workers_write_what_one_process_writes_to_the_byte(measured, tmp_path, c
     asked = ("--no-video", "--output", str(tmp_path), "--rates", "5,7.5,20")
     assert compare.main([*asked, "--jobs", "2"]) == 0
     assert poses_and_metrics(tmp_path) == poses_and_metrics(measured)
-    assert capfd.readouterr().out == f"{tmp_path / 'report.html'}\n"
+    assert capfd.readouterr().out.splitlines()[-1] == str(tmp_path / "report.html")
 
 
 def test_a_second_run_does_nothing_and_another_rate_only_what_it_asks_for(short_clip, tmp_path, capsys):
-    asked = (short_clip, "--no-video", "--output", tmp_path)
+    asked = (short_clip, "--no-video", "--output", tmp_path, "--json")
     assert run(*asked, "--rates", "10") == 0
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 done."
+    assert tasks_of(capsys) == {"done": 4}
     assert run(*asked, "--rates", "10") == 0
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 up to date."
+    assert tasks_of(capsys) == {"up to date": 4}
     written = (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns
     assert run(*asked, "--rates", "10,20") == 0
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 3 done, 2 up to date."
+    assert tasks_of(capsys) == {"done": 3, "up to date": 2}
     assert (tmp_path / "toss" / "10" / "keys.csv").stat().st_mtime_ns == written
     assert {row["rate_hz"] for row in rows_of(tmp_path / "metrics.csv")} == {"10", "20"}
-    assert run(*asked, "--rates", "10,20", "--force") == 0
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 5 done."
 
 
 def test_a_recording_that_changed_is_read_and_measured_anew_and_the_others_are_not(short_clip, tmp_path, capsys):
     other = tmp_path / "other.csv"
     other.write_text(short_clip.read_text())
-    asked = (short_clip, other, "--no-video", "--output", tmp_path / "out", "--rates", "10")
+    asked = (short_clip, other, "--no-video", "--output", tmp_path / "out", "--rates", "10", "--json")
     assert run(*asked) == 0
     capsys.readouterr()
     other.write_text("\n".join(short_clip.read_text().splitlines()[:60]))
     assert run(*asked) == 0
     # Read, measured, and the two tables of all clips.
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 done, 2 up to date."
+    assert tasks_of(capsys) == {"done": 4, "up to date": 2}
 
 
 def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, capsys):
     bad = tmp_path / "bad.csv"
     bad.write_text("t,x,y,z\n1,2,3,4\n")
-    asked = ("--no-video", "--output", tmp_path / "out", "--rates", "10")
+    asked = ("--no-video", "--output", tmp_path / "out", "--rates", "10", "--json")
     assert run(bad, short_clip, tmp_path / "nowhere.csv", *asked) == 1
     said = capsys.readouterr()
     complaints = [line.split(": ")[1] for line in said.err.splitlines() if line.startswith("compare.py:")]
-    assert complaints == [f"{bad}:1", str(tmp_path / "nowhere.csv")]
-    assert tasks_of(said.err) == "Tasks: 4 done, 2 failed."
-    assert said.out.splitlines()[-1] == str(tmp_path / "out" / "report.html")
+    assert complaints == [f"{bad}:1", str(tmp_path / "nowhere.csv"), "2 failed, as said above"]
+    found = json.loads(said.out)
+    assert found["tasks"] == {"done": 4, "failed": 2}
+    assert found["report"] == str(tmp_path / "out" / "report.html")
+    assert [*found["failures"]] == [f"read {bad}", f"read {tmp_path / 'nowhere.csv'}"]
+    assert found["exit_code"] == 1
     assert {row["clip"] for row in rows_of(tmp_path / "out" / "metrics.csv")} == {"toss"}
 
 
+def test_the_terminal_ends_with_a_table_a_sentence_and_the_path(short_clip, tmp_path, capsys):
+    asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "5,10")
+    assert run(*asked) == 0
+    *table, sentence, path = capsys.readouterr().out.splitlines()
+    assert path == str(tmp_path / "report.html")
+    assert sentence.endswith(".")
+    assert "keys" in sentence
+    assert max(map(len, table)) <= 100
+    errors = {(row["rate_hz"], row["mode"]): row for row in rows_of(tmp_path / "metrics.csv")}
+    (smooth,) = [line.split() for line in table if "Smooth Screw" in line and "10 keys/s" not in line][1:]
+    assert float(smooth[2]) == pytest.approx(1e3 * float(errors["10", "motor_spline"]["rms_shell_m"]), rel=5e-3)
+    assert float(smooth[3]) == pytest.approx(1e3 * float(errors["10", "motor_spline"]["max_shell_m"]), rel=5e-3)
+
+
+def test_the_table_is_data_for_programs(short_clip, tmp_path, capsys):
+    asked = (short_clip, "--no-video", "--output", tmp_path, "--tolerance", "5mm", "--json")
+    assert run(*asked) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"].endswith(".")
+    errors = {row["mode"]: row for row in rows_of(tmp_path / "metrics.csv")}
+    for line in found["table"]:
+        row = errors[line["modes"][0]]
+        assert line["choice"] == "within 5 mm"
+        assert line["rms_mm"] == pytest.approx(1e3 * float(row["rms_shell_m"]), rel=1e-6)
+        assert line["keys_per_s"] == pytest.approx(float(row["keys_per_s"]), rel=1e-6)
+    least = min(line["keys_per_s"] for line in found["table"])
+    assert [line["keys_per_s"] for line in found["table"] if line["best"]] == [least]
+
+
+def test_a_quiet_run_prints_the_path_alone(short_clip, tmp_path, capsys):
+    assert run(short_clip, "--no-video", "--output", tmp_path, "--rates", "5", "--quiet") == 0
+    said = capsys.readouterr()
+    assert (said.out, said.err) == (f"{tmp_path / 'report.html'}\n", "")
+
+
+def test_the_report_is_opened_where_that_is_asked_for(short_clip, tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "5")
+    assert run(*asked) == 0
+    assert opened == []
+    assert run(*asked, "--open") == 0
+    assert opened == [(tmp_path / "report.html").as_uri()]
+
+
+@pytest.mark.parametrize(("tolerance", "said"), [("5", "as in 5mm"), ("90m", "give a smaller one")])
+def test_a_tolerance_larger_than_the_motion_is_refused_with_the_way_out(short_clip, tmp_path, capsys, tolerance, said):
+    assert run(short_clip, "--no-video", "--output", tmp_path, "--tolerance", tolerance) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_every_machine_of_a_farm_does_its_share(short_clip, tmp_path, measured):
+    asked = (ROOT / "assets" / "throw.csv", ROOT / "assets" / "reach.csv", "--no-video", "--output", tmp_path / "out")
+    asked = (*asked, "--rates", "5,20")
+    for stage in ("read", "measure"):
+        for part in ("2/2", "1/2"):
+            assert run(*asked, "--only", stage, "--part", part) == 0
+    assert not (tmp_path / "out" / "metrics.csv").exists()
+    assert run(*asked, "--only", "report") == 0
+    wanted = [row for row in rows_of(measured / "metrics.csv") if row["clip"] in ("reach", "throw")]
+    wanted = [row for row in wanted if row["rate_hz"] in ("5", "20")]
+    found = rows_of(tmp_path / "out" / "metrics.csv")
+    assert sorted(found, key=str) == sorted(wanted, key=str)
+
+
+def test_without_blender_films_are_refused_and_numbers_are_not(short_clip, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(compare, "find_spec", lambda name: None)
+    monkeypatch.setattr(compare, "blender_program", lambda: "")
+    assert run(short_clip, "--output", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert "Videos are made by Blender, which is not here" in said
+    assert "--no-video" in said
+    assert not (tmp_path / "out").exists()
+    assert run("walk.fbx:Hand", "--no-video", "--output", tmp_path / "out") == 2
+    assert "walk.fbx:Hand is read by Blender" in capsys.readouterr().err
+    assert run(short_clip, "--no-video", "--rates", "5", "--output", tmp_path / "out") == 0
+
+
 def test_of_many_clips_each_has_a_page_and_one_leads_to_them(short_clip, tmp_path, monkeypatch):
-    monkeypatch.setattr("rigid_motion_batch.comparison.planning.ON_ONE_PAGE", 1)
+    monkeypatch.setattr("rigid_motion_batch.pipeline.comparison.ON_ONE_PAGE", 1)
     assert run(short_clip, short_clip, "--no-video", "--output", tmp_path, "--rates", "10,20") == 0
     overview = (tmp_path / "report.html").read_text()
-    assert "2 recorded clips" in overview
+    assert "2 clips" in overview
     for clip in ("toss", "toss-2"):
         assert f'href="{clip}/report.html"' in overview
         page = (tmp_path / clip / "report.html").read_text()
@@ -564,7 +635,7 @@ def test_of_many_clips_each_has_a_page_and_one_leads_to_them(short_clip, tmp_pat
 
 
 def test_two_runs_at_once_into_one_folder_are_refused(short_clip, tmp_path, capsys):
-    with Workspace(tmp_path / "out"):
+    with Store(tmp_path / "out"):
         assert run(short_clip, "--no-video", "--output", tmp_path / "out", "--rates", "10") == 2
         assert "another run is at work in this folder" in capsys.readouterr().err
     assert run(short_clip, "--no-video", "--output", tmp_path / "out", "--rates", "10") == 0
@@ -581,27 +652,14 @@ def test_a_full_disk_is_said_and_the_next_run_goes_on(short_clip, tmp_path, caps
     said = capsys.readouterr()
     assert "No space left on device; nothing that is done is lost" in said.err
     assert said.out == ""
-    assert run(*asked) == 0
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 2 done, 2 up to date."
+    assert run(*asked, "--json") == 0
+    assert tasks_of(capsys) == {"done": 3, "up to date": 1}
 
 
 def test_an_output_folder_that_cannot_be_made_is_said(short_clip, tmp_path, capsys):
     (tmp_path / "file").touch()
     assert run(short_clip, "--no-video", "--output", tmp_path / "file" / "out") == 2
     assert f"compare.py: {tmp_path / 'file'}" in capsys.readouterr().err
-
-
-def test_a_task_of_a_run_can_be_done_alone(short_clip, tmp_path, capsys):
-    asked = (short_clip, "--no-video", "--output", tmp_path, "--rates", "10")
-    assert run(*asked) == 0
-    keys = tmp_path / "toss" / "10" / "keys.csv"
-    content = keys.read_bytes()
-    keys.unlink()
-    assert workplan.main(["run", str(tmp_path), "measure toss/10"]) == 0
-    assert keys.read_bytes() == content
-    capsys.readouterr()
-    assert run(*asked) == 0
-    assert tasks_of(capsys.readouterr().err) == "Tasks: 4 up to date."
 
 
 AXES = {

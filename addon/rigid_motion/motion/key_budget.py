@@ -1,6 +1,7 @@
 """The search for so many keys that are as near to a recording as can be.
 
-Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times;
+Keys are taken out until so many are left. For the largest error they are laid out anew and moved together, a few times,
+or, where there are few samples for each, some are taken out and put in elsewhere;
 for its mean square some more are put in, moved, and as many taken out.
 """
 
@@ -21,21 +22,24 @@ SPREAD = 6, 8
 SPARSER = 3
 """How many times as few candidates there are from then on."""
 
-MIDDLE = 10, 50
-"""Samples for each key, between which there is time for every step.
+LENGTHS = 5, 10, 50
+"""Samples for each key that settings change at. In the middle, from 10 to 50, there is time for every step.
 
 Where there are fewer, what is done for each key takes longer than looking at samples; where there are more, looking
 at samples takes so long that another try is worth more.
 """
 
-ENOUGH = 7.5, 10.0, 15.0
-"""Times the poses that the first keys have taken, after which no try begins: below the middle, there and above."""
+ENOUGH = 10.0, 15.0
+"""Times the poses that the first keys have taken, after which no try begins: in the middle and above."""
 
 TOGETHER = {0: ((5, 6), (5, 12), (5, 24)), 1: ((2, 6), (3, 12), (2, 24), (2, 48)), 2: ((2, 6), (2, 12))}
-"""How keys are moved together, by the reach of the mode: places for each, and how near to one another.
+"""How keys are moved together, by the reach of the mode: places for each, and how near to one another."""
 
-Outside the middle the first two are done.
-"""
+STEPS = slice(1, 2), slice(2), slice(None), slice(2)
+"""Which of these are done, by the lengths."""
+
+KEPT = 0.9
+"""Of the keys: what is left of them when some are taken out, for others to be put in elsewhere."""
 
 SWAPPED = 1.15
 """How many times the budget keys may be in between, for the mean square, to find better places."""
@@ -47,6 +51,9 @@ class BudgetSearch(Search):
     def __init__(self, recording: Recording, budget: int, *, rms: bool = False) -> None:
         super().__init__(recording, rms=rms)
         self.budget = budget
+        self._length = int(np.searchsorted(LENGTHS, len(recording.times) / budget, side="right"))
+        self._is_short = self._length < 2
+        """Whether there are few samples for each key."""
 
     def least(self, tries: int) -> np.ndarray:
         """So many samples that are keys with as small an error as can be found."""
@@ -61,15 +68,19 @@ class BudgetSearch(Search):
 
     def _least_peak(self, keys: Keys, candidates: np.ndarray, tries: int) -> np.ndarray:
         """The keys with the smallest largest error of all that tries lead to from some."""
-        length = int(np.searchsorted(MIDDLE, len(self.recording.times) / self.budget, side="right"))
-        enough, is_middle = ENOUGH[length] * self.costs.looked, length == 1
-        best = samples = (self.moved(keys, math.inf) if is_middle else keys).indices
-        for number in range(tries):
+        enough = math.inf if self._is_short else ENOUGH[self._length - 2] * self.costs.looked
+        best = samples = (self.moved(keys, math.inf) if self._length == 2 else keys).indices
+        for number in range(min(tries, 1 + self.reach) if self._is_short else tries):
             if self.costs.peak(best) == 0.0 or self.costs.looked > enough:
                 break
-            laid_out = spread_keys(self.costs, candidates[:: SPARSER if number else 1], samples, self.budget)
-            samples = self._filled(self.measured(laid_out)).indices
-            for ways, part in TOGETHER[self.reach][: None if is_middle else 2]:
+            if number and self._is_short:
+                # Those that matter least go where the motion is off most.
+                fewest = max(2, int(KEPT * self.budget))
+                samples = self.thinned(self.measured(best), math.inf, fewest).indices
+            else:
+                samples = spread_keys(self.costs, candidates[:: SPARSER if number else 1], samples, self.budget)
+            samples = self._filled(self.measured(samples)).indices
+            for ways, part in TOGETHER[self.reach][STEPS[self._length]]:
                 samples = moved_together(self.costs, samples, ways, part)
                 best = min(best, samples, key=self.costs.peak)
         return best

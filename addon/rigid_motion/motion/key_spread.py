@@ -36,8 +36,8 @@ ALIVE = 1.5, 1.2
 
 Where it depends on its two keys alone, and where on more."""
 
-LONGEST = 4
-"""Times the mean number of candidates from key to key: the most that a segment may reach over."""
+LONGEST = 4, 36
+"""The most candidates that a segment may reach over: so many times the mean from key to key, and at least so many."""
 
 EFFORT = 200
 """Times that every sample may be looked at for segments, on average."""
@@ -101,7 +101,7 @@ class _Ways:
 
     def __init__(self, costs: Costs, candidates: np.ndarray, keys: np.ndarray) -> None:
         self._costs, self._candidates, self._alive = costs, candidates, ALIVE[min(costs.reach, 1)]
-        self._longest = LONGEST * -(-len(candidates) // len(keys))
+        self._longest = max(LONGEST[0] * -(-len(candidates) // len(keys)), LONGEST[1])
         self._left = float(EFFORT * len(costs.recording.times) * costs.recording.poses_each)
         # The samples of keys 1, 2... further, before each candidate and after it, -1 beyond the ends.
         number = np.arange(len(keys))

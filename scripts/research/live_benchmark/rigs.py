@@ -66,8 +66,8 @@ def rigs(size: RigSize, rounds: int) -> Iterator[str]:
 
     yield f"## A rig of {size}, turned by QUATERNION"
     yield ""
-    yield "Edits are as in a window, where so large a rig has one sample a frame until more are needed; the others are made"
-    yield "before the rig is saved, rendered, or shown between frames. Everything else is with all samples."
+    yield "Edits are as in a window, where so large a rig has one sample a frame until more are needed; the others are"
+    yield "made before the rig is saved, rendered, or shown between frames. Everything else is with all samples."
     yield ""
     yield from MILLISECONDS
     for what, ours, peer, theirs in (

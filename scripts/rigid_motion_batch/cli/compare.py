@@ -429,6 +429,7 @@ class _Run:
 
     def _as_data(self, page: Path | None, code: int) -> dict[str, Any]:
         numbers, said = self._numbers()
+        counts = {**self.outcome.counts, State.FAILED: len(self.outcome.failures)}
         return {
             "report": os.fspath(page) if page else None,
             "exit_code": code,
@@ -438,7 +439,7 @@ class _Run:
             "clips": list(numbers.clips) if numbers else [],
             "notes": self.notes,
             "failures": self.outcome.failures,
-            "tasks": {state.value: number for state, number in self.outcome.counts.items()},
+            "tasks": {state.value: counts[state] for state in State if counts.get(state)},
         }
 
 

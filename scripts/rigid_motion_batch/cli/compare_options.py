@@ -14,6 +14,7 @@ from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, r
 from rigid_motion_batch.axes import AXES
 from rigid_motion_batch.command_line import did_you_mean, folder_path, number, parser_of
 from rigid_motion_batch.palette import THEMES
+from rigid_motion_batch.pipeline.bundle import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
 from rigid_motion_batch.recordings import files_of
 from rigid_motion_batch.recordings.arguments import add_reading_options, reading_options
@@ -33,9 +34,6 @@ STREAM_MODES = tuple(mode for mode in MODES if mode not in KEYFRAME_MODES)
 
 ALL, DISTINCT = "all", "distinct"
 """Stand for all modes that keyframes can have, with a lane in the film for each, or for each motion that comes out."""
-
-STAGES = ("read", "measure", "build", "render", "encode", "report")
-"""Of the work, each after those before it."""
 
 SCRIPT = "compare.py"
 
@@ -92,20 +90,31 @@ what is written:
   numbers, with adaptive keys also OUTPUT/keys_needed.csv, and for whole bodies OUTPUT/decimated.csv, which compares
   their keys with Blender's Decimate. Every clip and choice of keys has a folder (OUTPUT/CLIP/10, /budget-10,
   /tolerance-5mm) with keys.csv (MODE.keys.csv for adaptive keys), MODE.csv, comparison.mp4 and comparison.blend.
-  OUTPUT/.rigid-motion has the results that are kept. On the terminal come a table of errors, one sentence, and last the
-  path of the report; with --json all of that as data.
+
+what is printed:
+  As soon as the numbers are there: for every choice of keys the RMS and the largest shell error of each motion in
+  millimetres, and its keys a second; modes that give the same motion are one, and the best has a star. Then a sentence
+  that says what it comes to, and as the last line the path of the report. --json prints all of that for programs,
+  --quiet the path alone, --open opens the report. Everything else goes to standard error.
 
 one folder, one comparison:
-  Without --output it is renders/NAME, by the first recording. You can run again into the same folder with the same
-  recordings, with more of them or fewer. The program refuses a folder that holds another comparison, and does not
-  replace files that it has not written or that were edited since: choose another --output, or replace them with
-  --overwrite. It never replaces inputs. --explain says what a run would do and why, and does nothing.
+  Without --output, a comparison goes to renders/NAME, by its first recording, with a number where that folder holds
+  another comparison. You can run again with the same recordings, with more of them or fewer: what the program wrote
+  before is replaced. Into a folder that holds another comparison, and over files that were edited or that it has not
+  written, it writes only with --overwrite, and over inputs never. --explain says what a run would do and why, and does
+  nothing.
+
+without Blender:
+  --no-video needs no Blender but for FBX, glTF and .blend files, and runs on any Python from 3.11 on. --blender PROGRAM
+  films with a Blender that is installed. Started in a Blender, the program runs in a Python that has its libraries:
+  that of --environment DIR, as `python scripts/bootstrap.py environment DIR` makes it, or of .venv in the checkout.
 
 many clips:
   The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full
   disk or a crash, the same command continues from there; with other options it does only what these change. A recording
   that cannot be read, or a video that cannot be rendered, is reported, and the others go on. With --scheduler, the
   processes of all machines that a Dask scheduler knows do the work; docs/farm.md says how.
+
 Exit code: 0 done, 1 some recordings or videos could not be done, 2 nothing could be done, or a wrong option, 130
 stopped by Ctrl-C, and 143 by SIGTERM; the report then holds what was ready.
 """
@@ -228,7 +237,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument(
         "--antialiasing",
         choices=ANTIALIASING,
-        help="for workbench: FXAA or a number of samples; 8 for a talk (edges are smoothed afterwards)",
+        help="for workbench: OFF, FXAA or a number of samples; 8 for a talk (edges smoothed by the compositor)",
     )
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)

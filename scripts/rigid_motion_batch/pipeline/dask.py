@@ -18,8 +18,6 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import replace
-from importlib.machinery import ModuleSpec
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Self
 
@@ -45,8 +43,6 @@ PROGRESS = 0.2
 ANSWER = 10.0
 """Seconds for the result of a task that is done."""
 
-START = "start the scheduler and the workers with this program on their module path: see docs/farm.md"
-
 UNREACHABLE = (OSError, RuntimeError, TimeoutError, CancelledError)
 """What Dask raises where its scheduler does not answer."""
 
@@ -61,9 +57,9 @@ _idle: dict[str, list[ProcessExecutor]] = {}
 _lock = threading.Lock()
 
 
-def identify(folder: str) -> tuple[str, bool]:
-    """The version of the program here, and whether a folder of the run is seen."""
-    return LOADED, os.path.isdir(folder)
+def identify(folder: str) -> str:
+    """The version of the program here; where a folder of the run is not seen, that."""
+    return LOADED if os.path.isdir(folder) else f"it does not see {folder}; choose one on a disk that all share"
 
 
 def retire(session: str) -> None:
@@ -200,17 +196,15 @@ class DaskExecutor:
                 "address that it prints"
             ) from None
         try:
-            self._client.run_on_scheduler(find_spec, __name__)
+            if (said := self._client.run_on_scheduler(_asker(), "")).startswith("No module"):
+                raise ExecutorError(f"{self._address}: the scheduler: {said}")
             ends = time.monotonic() + FIRST_WORKER
             while not (self._workers or self._alone) and time.monotonic() < ends:
                 self._look(lambda *_: None)
                 if self._unfit and not self._workers:
                     raise ExecutorError(f"{self._address}: none of its workers is fit")
-        except BaseException as error:
+        except BaseException:
             self.__exit__()
-            if isinstance(error, Exception) and not isinstance(error, ExecutorError):
-                said = f"{self._address}: the scheduler: {_first_sentence(error)}; {START}"
-                raise ExecutorError(said) from None
             raise
         return self
 
@@ -252,27 +246,19 @@ class DaskExecutor:
 
     def _welcome(self, threads: dict[str, int]) -> None:
         """Ask workers who have come who they are, and take those that fit."""
-        for address, number in threads.items():
-            try:
-                # A worker that was sent a function it cannot import would die of that.
-                spec = self._client.run(find_spec, __name__, workers=[address], on_error="return")[address]
-                if isinstance(spec, OSError):
-                    continue  # It is seen again at the next look, or gone.
-                if not isinstance(spec, ModuleSpec):
-                    unfit = f"it cannot import {__name__}; {START}"
-                else:
-                    version, sees = self._client.run(identify, str(self._folder), workers=[address])[address]
-                    unfit = "" if sees else f"it does not see {self._folder}; choose one on a disk that all share"
-                    unfit = unfit if version == LOADED else f"it has {version}, and this is {LOADED}"
-            except UNREACHABLE:
-                continue
-            except Exception as error:  # Whatever went wrong over there, that worker is not to be had.
-                unfit = _first_sentence(error)
-            if unfit:
+        try:
+            asked = {"workers": [*threads], "on_error": "return"}
+            answers = self._client.run(_asker(), str(self._folder), **asked) if threads else {}
+        except UNREACHABLE:
+            return  # They are seen again at the next look, or gone.
+        for address, answer in answers.items():
+            if answer == LOADED:
+                self._workers[address] = threads[address]
+            elif not isinstance(answer, OSError):
                 self._unfit.add(address)
-                self._note(f"worker {address}: {unfit}; it is left out")
-            else:
-                self._workers[address] = number
+                said = _first_sentence(answer) if isinstance(answer, BaseException) else answer
+                said = f"it has {said}, and this is {LOADED}" if said.startswith("program") else said
+                self._note(f"worker {address}: {said}; it is left out")
 
     def _distribute(self) -> None:
         """Give Dask the orders that are waiting, if there is anybody to do them."""
@@ -304,6 +290,19 @@ async def _knock(address: str) -> None:
     async with asyncio.timeout(CONNECTING + 1.0):  # Someone else's server may keep it waiting.
         comm = await connect(address, timeout=CONNECTING, **Security().get_connection_args("client"))
     comm.abort()
+
+
+def _asker() -> Callable[[str], str]:
+    """`identify`, in a function that is sent whole: a worker that cannot import what it is sent would die of that."""
+
+    def ask(folder: str) -> str:
+        try:
+            from rigid_motion_batch.pipeline.dask import identify
+        except ImportError as error:
+            return f"{error}; start scheduler and workers with this program on their module path: see docs/farm.md"
+        return identify(folder)
+
+    return ask
 
 
 def _first_sentence(error: BaseException) -> str:

@@ -423,11 +423,6 @@ def not_written(paths: list[str]) -> str:
     )
 
 
-def inputs_known(output: Path) -> dict[str, str]:
-    """The inputs of the runs into a folder: path to SHA-256."""
-    return {path: seen[-1] for path, seen in _inputs_known(output).items()}
-
-
 def _inputs_known(output: Path) -> dict[str, list[Any]]:
     try:
         content = json.loads(_read(output / OWN / "inputs.json"))

@@ -201,8 +201,9 @@ class HeaderLine:
 
     def of_rows(self, path: Path) -> HeaderLine:
         """Return the header as the first row below it has it."""
-        rows = self.table(path, {}).rows()
-        names = expanded(self.cells, next(rows, (0, ""))[1], self.separator)
+        below = (line.strip() for _, line in islice(lines_of(path, after=self.number), MOST_COMMENTS))
+        row = next((line for line in below if line and not line.startswith("#")), "")
+        names = expanded(self.cells, row, self.separator)
         return self if names is None else HeaderLine(self.number, self.separator, names, vectors=True)
 
 

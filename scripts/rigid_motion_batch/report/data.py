@@ -25,6 +25,7 @@ import numpy as np
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
 from rigid_motion_batch.recordings.figures import carrying, short_names
 
@@ -137,7 +138,7 @@ def _choice_data(
         "seen": [int(np.searchsorted(seen, first)), len(within)],
         "keyed": keyed,
         "worst": largest,
-        "factor": next(factor for factor in FACTORS if factor * largest <= SEEN_AS[body] * size or factor == 1),
+        "factor": _factor(largest, SEEN_AS[body] * size),
         "joint": int(np.argmax(by_joint)),
         "top": full_colour(of_joints) if of_joints else 0.0,
         "motions": [
@@ -224,6 +225,11 @@ def _peaks(errors: np.ndarray, every: int) -> np.ndarray:
 def _drawn_from(parents: np.ndarray) -> list[int]:
     """The parents to draw lines from: none from a root that only carries the body about."""
     return np.where((parents >= 0) & carrying(parents)[parents], -1, parents).tolist()
+
+
+def _factor(largest: float, seen_as: float) -> int:
+    """By how much to magnify so that the largest deviation is seen, and looks no larger than this."""
+    return next(factor for factor in FACTORS if factor * largest <= seen_as or factor == 1) if largest > NOTHING else 1
 
 
 def _nice(length: float) -> float:

@@ -275,7 +275,7 @@ def _flashes_group() -> bpy.types.NodeTree:
     dark = group.math("LESS_THAN", flash, 0.02)
     points = group.add("GeometryNodeDeleteGeometry", group.inputs["Geometry"], dark, settings={"domain": "POINT"})
     points = _shifted(group, points)
-    ball = group.add("GeometryNodeMeshIcoSphere", 1.0, 2)
+    ball = group.add("GeometryNodeMeshIcoSphere", 1.0, 1)
     ball = group.add("GeometryNodeSetMaterial", ball, Material=group.inputs["Material"])
     radius = group.math("MULTIPLY", group.inputs["Radius"], flash)
     return group.finish(group.add("GeometryNodeInstanceOnPoints", points, Instance=ball, Scale=radius))

@@ -218,6 +218,7 @@ def set_up_render(
     render.resolution_percentage = 100
     render.fps, render.fps_base = settings.fps, 1.0
     render.engine = _engine_id(settings.engine)
+    render.dither_intensity = 0.0  # Flat colours need none, and are encoded sooner.
     scene.view_settings.view_transform = "Standard"
     _set_background(scene, background)
     _set_up_video(scene)

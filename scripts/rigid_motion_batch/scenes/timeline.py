@@ -16,7 +16,7 @@ from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.axes import to_blender
 
-PATH_RATE = 120.0
+PATH_RATE = 60.0
 """At least so many points of a path are drawn for a second of the film."""
 
 

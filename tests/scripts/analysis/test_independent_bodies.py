@@ -24,6 +24,7 @@ from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.hushing import hushed
 from rigid_motion_batch.recordings.clip_reading import read_source
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.options import ReadingOptions
 from tests.blank import blank
 from tests.recordings import RECORDINGS
 from tests.thoroughness import THOROUGH
@@ -49,6 +50,9 @@ METRES = {"cmu_01_01": 0.0254 / 0.45, "freebvh": 0.01, "beat_saber_body": 1.0, "
 """In a unit of each, as their authors say; Blender's importer has FBX in metres."""
 
 MODES = ("lerp_slerp", "dq_sclerp")
+
+WHOLE = ReadingOptions(start=0.0)
+"""With the T-pose in front, which the others read as well."""
 
 EXACT = 1e-9
 """Metres, radians, and metres a second."""
@@ -334,7 +338,7 @@ def measured_by_the_program(
     name: str, choice: Choice, modes: tuple[str, ...], *, shared: bool = False
 ) -> tuple[Clip, MeasuredBody, np.ndarray]:
     """As the program does it, with a ball of another size at every joint."""
-    (clip,), _ = read_source(str(PLACES[name]), None)
+    (clip,), _ = read_source(str(PLACES[name]), None, WHOLE)
     radii = np.linspace(0.02, 0.2, len(clip.figure.joints))
     made = reconstruct_body(clip, choice, modes, radii, shared=shared)
     return clip, measure_modes(made, radii), radii
@@ -360,7 +364,7 @@ def test_no_point_of_a_ball_moves_further_than_the_formula_says_and_one_as_far()
 
 @pytest.mark.parametrize("name", PLACES)
 def test_bodies_are_read_alike(bodies: dict[str, Body], name: str) -> None:
-    (clip,), _ = read_source(str(PLACES[name]), None)
+    (clip,), _ = read_source(str(PLACES[name]), None, WHOLE)
     body = bodies[name]
     assert clip.figure.joints == tuple(body.joints)
     assert clip.figure.parents.tolist() == body.parents

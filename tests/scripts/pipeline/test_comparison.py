@@ -162,6 +162,10 @@ def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Pa
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
         *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4")),
     }
+    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), beside_decimate=False))
+    assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
+    assert {*published(tmp_path / "without")} >= {"metrics.csv", "metrics_joints.csv"}
+    assert "decimated.csv" not in published(tmp_path / "without")
 
 
 def test_more_clips_than_fit_on_a_page_have_a_page_each(
@@ -354,3 +358,32 @@ def test_a_clip_takes_two_kilobytes_at_most_between_two_plans(output: Path, toss
     assert len(plan.studies) == 60
     assert (after - before) / 60 < 2000
     assert all(isinstance(task, Task) for task in plan.tasks())
+
+
+# -- without Blender --------------------------------------------------------------------------------------------------
+
+WITHOUT = """
+import sys
+from pathlib import Path
+
+sys.modules["bpy"] = sys.modules["mathutils"] = None
+from rigid_motion_batch.analysis.choices import Tolerance
+from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
+from rigid_motion_batch.pipeline.comparison_steps import About
+from rigid_motion_batch.pipeline.executors import SerialExecutor
+from rigid_motion_batch.pipeline.running import run
+from rigid_motion_batch.pipeline.store import Store
+
+with Store(Path(sys.argv[2])) as store, SerialExecutor() as executor:
+    choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
+    plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=About("x", "y")), store)
+    plan.read(lambda tasks: run(tasks, store, executor))
+    outcome = run(plan.tasks, store, executor)
+sys.exit(str(outcome.failures) if outcome.failures else 0)
+"""
+
+
+def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", WITHOUT, toss, output], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert {"metrics.csv", "keys_needed.csv", "report.html"} <= {*published(output)}

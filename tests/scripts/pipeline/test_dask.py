@@ -197,7 +197,7 @@ def test_a_worker_without_this_program_is_left_out_and_lives(cluster: Cluster, t
 
         def left_out() -> bool:
             executor.wait(lambda *_: None, 0.1)
-            return any("it cannot import rigid_motion_batch.pipeline.dask" in note for note in connecting.notes)
+            return any("No module named 'rigid_motion_batch'; start" in note for note in connecting.notes)
 
         wait_for(lambda: left_out() and len(executor.workers) == 2)
         assert stranger.poll() is None

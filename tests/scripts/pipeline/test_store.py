@@ -17,7 +17,7 @@ from rigid_motion_batch.pipeline import steps as pipeline_steps
 from rigid_motion_batch.pipeline.executors import SerialExecutor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.steps import OWN, Task
-from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store, inputs_known
+from rigid_motion_batch.pipeline.store import FolderInUse, OutputError, Store
 from tests.scripts.pipeline import steps
 from tests.scripts.pipeline.plans import Listener, contents, joining, run_in, states, task, writing
 from tests.scripts.pipeline.steps import FILE, Nothing, Write
@@ -121,14 +121,6 @@ def test_what_this_program_wrote_is_no_input_of_the_next_run(output: Path, tmp_p
     with pytest.raises(OutputError, match="where the program works"):
         copying(output, output / OWN / "latest.jsonl", "d")
     assert copying(tmp_path / "other", output / "c.txt", "d") == {"done": 1}
-
-
-def test_the_folder_of_a_comparison_tells_what_it_is_of(output: Path, tmp_path: Path) -> None:
-    source = tmp_path / "in.csv"
-    source.write_text("1")
-    assert inputs_known(output) == {}
-    copying(output, source)
-    assert [*inputs_known(output)] == [str(source)]
 
 
 @pytest.mark.parametrize(

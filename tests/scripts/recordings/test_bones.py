@@ -376,3 +376,9 @@ def test_what_is_open_stays_as_it_is_and_can_be_read_itself(saved) -> None:
     assert len(read(f"{path}:Rig/Hand").times) == 9
     after = [(obj.name, len(obj.constraints)) for obj in bpy.data.objects], bpy.context.scene.frame_current
     assert after == before
+
+
+@pytest.mark.parametrize("wanted", ["rig/hand.l", "RIG/Hand.L"])
+def test_objects_and_bones_have_their_names_in_any_case(saved, wanted: str) -> None:
+    rig("Rig", {"Hand.L": ((0, 0, 0), (0, 1, 0), None), "Hand.R": ((1, 0, 0), (1, 1, 0), None)})
+    assert read_trajectories(f"{saved()}:{wanted}").trajectories[0].name == "Rig/Hand.L"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ WARNING = ClipWarning("A gap of 183 ms.", "Record again.", 101.25, 101.5)
 PATIENCE = 30.0
 """Seconds."""
 
+HOSTILE = "</script><img src=x onerror='broken = 1'><script>broken = 1</script>{{ 7 * 7 }}"
 NOISE = "GL Driver Message"
 """What Chromium says of its own drawing without a graphics card."""
 
@@ -45,6 +47,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_report(folder / "two.html", two, SETTINGS)
     write_report(folder / "body.html", [result_of(swinging_body(), RATES[1:2])], SETTINGS)
     write_report(folder / "adaptive.html", [result_of(swinging_clip(), (Tolerance("20mm"),))], SETTINGS)
+    named = result_of(swinging_clip(), RATES[1:2], warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
+    named = replace(named, facts=replace(named.facts, name=HOSTILE))
+    write_report(folder / "hostile.html", [named, two[0]], replace(SETTINGS, names={"lerp_slerp": HOSTILE}))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pages, "IN_THE_PAGE", 1)
         write_report(folder / "large.html", two, SETTINGS)
@@ -245,6 +250,13 @@ def test_the_keyboard_moves_in_time(page: Browser, folder: Path) -> None:
     shows(page, near(1.2))
     page.press("w")
     shows(page, f"{LIVE} === {WORST}")
+
+
+def test_names_are_nothing_but_text(page: Browser, folder: Path) -> None:
+    opened(page, folder / "hostile.html")
+    for place in (".warn a", "[name=clip]:checked + span", "#modes .chip", "#lanes div"):
+        assert HOSTILE in page.run(f"document.querySelector({place!r}).textContent"), place
+    assert page.run("typeof window.broken") == "undefined"
 
 
 def test_the_table_shows_the_clip_and_the_measure_that_are_chosen(page: Browser, folder: Path) -> None:

@@ -100,9 +100,10 @@ paint("view", () => {
   if (!pen || !width || !height) return;
   steer();
   const truth = poseAt(S.recording, S.choice, S.t), all = lanes(), { size, cell, box } = S.clip;
-  const line = { now: S.t, faint: end - begin > 15 ? 0.06 : 0.34, wide: 1.2 * ratio, trail: 0.5 };
-  const ground = { centre: [...camera.to.slice(0, 2), box[0][2] - (isBody() ? 0 : 0.75 * size)],
-    colour: colours["--lines"], reach: Math.max(camera.far, 4 * size), cell };
+  const faint = 0.34 * (S.follow ? Math.min(1, 10 / (end - begin)) ** 2 : 0.7);
+  const line = { now: S.t, faint, wide: 1.2 * ratio, trail: 0.5 };
+  const ground = { centre: [...camera.to.slice(0, 2), box[0][2] - (isBody() ? 0 : 0.75 * size)], cell,
+    colour: colours["--lines"], reach: Math.max(camera.far, 4 * size) };
   pen.begin(width, height);
   all.forEach((motions, place) => {
     const x = Math.round((width * place) / all.length), across = Math.round((width * (place + 1)) / all.length) - x;
@@ -135,10 +136,7 @@ export function nameLanes() {
   }));
 }
 
-function move(change) {
-  [goal, camera] = [null, { ...camera, ...change }];
-  changed("view");
-}
+const move = (change) => [goal = null, camera = { ...camera, ...change }, changed("view")];
 function pan(dx, dy) {
   const [right, up] = axesOf(camera), each = (2 * NARROW * camera.far) / canvas.clientHeight;
   S.follow = $("follow").checked = false;
