@@ -22,7 +22,7 @@ TITLE = re.compile(r"(?m)^(\w[\w ,-]*):\n(?=  )")
 
 
 class Command(SphinxDirective):
-    """A command of a script or a package of this checkout: `{command} scripts/stream.py send`, or `rigid_motion_batch tasks`."""
+    """A command of a script or a package: `{command} scripts/stream.py send`, `{command} rigid_motion_batch tasks`."""
 
     required_arguments = 1
     final_argument_whitespace = True
