@@ -15,8 +15,11 @@ import pytest
 from rigid_motion_batch.cli.commands import COMMANDS
 from rigid_motion_batch.places import CHECKOUT, manifest
 
-BESIDES = ("bpy", "numpy")
-"""What the extra `blender` brings along. The environment of these tests lends it."""
+BESIDES = (
+    *("bpy", "filelock", "jinja2", "markdown-it-py", "markupsafe", "mdurl", "numpy", "pebble", "pygments", "rich"),
+    *("shtab", "vl-convert-python"),
+)
+"""What the extra `blender` brings along, and the dependencies. The environment of these tests lends it."""
 
 WITHOUT_BLENDER = """
 import sys

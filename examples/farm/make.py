@@ -35,7 +35,7 @@ RATES, PARTS = "5,10", "3"
 
 PICTURE = 960, 300
 
-WIDTH, STEP, CARD, SQUARE = 10.0, 1.17, (1.07, 1.3), 0.2
+WIDTH, STEP, CARD, SQUARE = 10.0, 1.56, (1.46, 1.3), 0.2
 """Of the picture; from card to card; of a card, and of a task on it."""
 
 
@@ -62,11 +62,11 @@ def picture(takes: Path, output: Path) -> None:
     for number, (step, count) in enumerate(counts.items()):
         x = left + STEP * number
         lay(captions.card(step, *CARD, card, 0.06), x, 0.0, 0.0)
-        staging.write(camera, step, (x - 0.44) / WIDTH, 0.036, 0.022, palette.DARK.ink)
+        staging.write(camera, step, (x - 0.64) / WIDTH, 0.036, 0.022, palette.DARK.ink)
         for task in range(count):
             row, column = divmod(task, 3)
             mesh = captions.card("Task", SQUARE, SQUARE, square, 0.04)
-            lay(mesh, x - 0.34 + 0.3 * column, 0.05 - 0.3 * row, 0.1)
+            lay(mesh, x - 0.54 + 0.3 * column, 0.05 - 0.3 * row, 0.1)
     heading = f"{len(TAKES)} takes, {sum(counts.values())} tasks"
     staging.write(camera, heading, (left - CARD[0] / 2.0) / WIDTH, 0.1, 0.03, palette.DARK.ink)
     says = "A card is a step, which waits for the one before it. A square is a task, which any machine may take."

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from rigid_motion_batch.pipeline.steps import OWN
 from tests.scripts.comparing import outputs, write_toss
 from tests.thoroughness import THOROUGH
 
@@ -90,4 +91,4 @@ def test_a_run_that_was_killed_again_and_again_ends_like_one_that_was_not(
     _, said = process.communicate(timeout=300)
     assert process.returncode == 0, said
     assert outputs(tmp_path) == wanted
-    assert sorted(os.listdir(tmp_path / ".workplan")) == ["plan.json"]
+    assert not (tmp_path / OWN / "scratch").exists()

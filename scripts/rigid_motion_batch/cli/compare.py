@@ -282,7 +282,7 @@ class _Run:
 
     def run(self) -> int:
         """Read the recordings, see what there is to do, do it, and say what it came to."""
-        report(summary="Stopped; there is no new report yet. The same command goes on from here.")
+        report(summary="Stopped. There is no new report yet; the same command goes on from here.")
         if not self.options.only or self.options.only == "read":
             self._do("Reading", self.plan.reading)
             if self.outcome.interrupted or self.outcome.problem or self.options.only:
@@ -313,7 +313,7 @@ class _Run:
             if self.outcome.interrupted or self.outcome.problem:
                 return self._end()
             self._show_numbers()
-            report(summary="Stopped; the report holds what was ready. The same command goes on from here.")
+            report(summary="Stopped. The report holds what was ready; the same command goes on from here.")
             report(written=os.fspath(self.store.output / PAGE))
             self._note(f"All numbers are there, and films come as they are made: {self.store.output / PAGE}")
             self._do("Filming", self.plan.tasks)
@@ -431,8 +431,8 @@ class _Run:
         if outcome.failures and not self.options.quiet:
             print(f"{PROGRAM}: {len(outcome.failures)} failed, as said above", file=sys.stderr)
         if outcome.interrupted:
-            holds = "the report holds what was ready" if there else "there is no new report yet"
-            print(f"Stopped; {holds}. The same command goes on from here.", file=sys.stderr)
+            holds = "The report holds what was ready" if there else "There is no new report yet"
+            print(f"Stopped. {holds}; the same command goes on from here.", file=sys.stderr)
         # After a failure a farm would not begin the stages behind it: what is missing is the report's to say.
         failed = outcome.failures and not (self.on_farm and self.options.only != "report")
         code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(failed))

@@ -107,7 +107,7 @@ one folder, one comparison:
 without Blender:
   --no-video needs no Blender but for FBX, glTF and .blend files, and runs on any Python from 3.11 on. --blender PROGRAM
   films with a Blender that is installed. Started in a Blender, the program runs in a Python that has its libraries:
-  that of --environment DIR, as `python scripts/bootstrap.py environment DIR` makes it, or of .venv in the checkout.
+  that of --environment DIR, as `bootstrap.py environment DIR` makes it, or of .venv in the checkout.
 
 many clips:
   The work is split into small tasks, done by as many processes as --jobs says. Results are kept: after Ctrl-C, a full

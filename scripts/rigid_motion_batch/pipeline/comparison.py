@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -148,7 +149,12 @@ class ComparisonPlan:
 
     def reading(self) -> Iterator[Task]:
         """The tasks that read the sources."""
-        yield from {task.key: task for task in map(self._reader, self.comparison.sources)}.values()
+        yield from {task.key: task for task in self._readers}.values()
+
+    @cached_property
+    def _readers(self) -> list[Task]:
+        """For every source, in their order; for one that is named twice the same one twice."""
+        return [*map(self._reader, self.comparison.sources)]
 
     def _reader(self, source: str) -> Task:
         comparison = self.comparison
@@ -183,7 +189,7 @@ class ComparisonPlan:
     def look_into(self) -> list[str]:
         """See what clips there are in the recordings that were read, and return what the user should know of them."""
         comparison = self.comparison
-        readers = [task.key for task in map(self._reader, comparison.sources)]
+        readers = [task.key for task in self._readers]
         folders = {key: result.folder for key in dict.fromkeys(readers) if (result := self.store.result(key))}
         facts = {key: values.read(SourceFacts, folder / "facts") for key, folder in folders.items()}
         bodies = [(key, body) for key in readers if key in facts for body in range(len(facts[key].bodies))]

@@ -26,6 +26,7 @@ import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -92,6 +93,8 @@ class Store:
         self._cache = _inputs_known(self.output)
         self._identities: dict[tuple[int, int], str] = {}
         """Of inputs, in the file system, to their paths."""
+        self._real = cache(os.path.realpath)
+        """Of folders: asking the system for those of all inputs takes long."""
         self._session: FileLock | None = None
         self._number = 0
 
@@ -185,17 +188,14 @@ class Store:
         """
         shown = os.fspath(path)
         try:
-            found = os.stat(path)
+            found, link = os.stat(path), os.lstat(path)
         except (OSError, ValueError):
             return Input(shown, "")
-        self._require_no_output(shown)
+        place = os.path.abspath(path)
+        self._require_no_output(shown, place, is_link=stat.S_ISLNK(link.st_mode))
         if not stat.S_ISREG(found.st_mode):
             return Input(shown, "")
-        place = os.path.abspath(path)
-        self._identities |= {(found.st_dev, found.st_ino): place}
-        with suppress(OSError):
-            link = os.lstat(path)
-            self._identities |= {(link.st_dev, link.st_ino): place}
+        self._identities[found.st_dev, found.st_ino] = self._identities[link.st_dev, link.st_ino] = place
         seen = [found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino]
         known = self._cache.get(place)
         if known and known[:-1] == seen:
@@ -209,11 +209,12 @@ class Store:
             self._cache[place] = [*(seen if settled else [0, 0, 0, 0]), digest]
         return Input(shown, digest, found.st_size, found.st_mtime_ns)
 
-    def _require_no_output(self, path: str) -> None:
-        real, output = os.path.realpath(path), os.path.realpath(self.output)
-        if not real.startswith(output + os.sep):
+    def _require_no_output(self, path: str, place: str, *, is_link: bool) -> None:
+        folder, name = os.path.split(os.path.realpath(place) if is_link else place)
+        real, output = self._real(folder), self._real(os.fspath(self.output))
+        if real != output and not real.startswith(output + os.sep):
             return
-        inside = Path(real).relative_to(output)
+        inside = Path(real, name).relative_to(output)
         if inside.parts[0] == OWN:
             raise OutputError(f"{path}: this input lies in {self.own}, where the program works; move it elsewhere")
         if any(self._published(inside.as_posix())):

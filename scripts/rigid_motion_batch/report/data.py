@@ -32,8 +32,8 @@ from rigid_motion_batch.recordings.figures import carrying, short_names
 from .joints import full_colour
 from .mesh import Mesh
 
-MOST_SEEN = 4_000_000
-"""Bytes that the poses of all modes of a clip may take before they are thinned for the view."""
+MOST_SEEN = {True: 4_000_000, False: 12_000_000}
+"""Bytes that the poses of all modes of a whole body, or of a single one, may take before the view has fewer of them."""
 
 FEWEST_SEEN = 300
 """Samples that the view has at least."""
@@ -131,7 +131,7 @@ def _choice_data(
     return {
         "name": result.choice.name,
         "title": result.choice.title,
-        "about": _about(result, keyed, every),
+        "about": _about(result, keyed, every, thinned=len(within) < count),
         "first": first,
         "count": count,
         "every": every,
@@ -206,8 +206,9 @@ def _joints(poses: Poses) -> np.ndarray:
 def _seen(clip: ClipResult) -> np.ndarray:
     """The samples of the clip that the view has."""
     count, motions = len(clip.times), [motion for result in clip.choices for motion in result.motions]
-    a_sample = (7 if clip.parents is not None else 12) * len(_joints(clip.truth)) * max(len(motions), 1)
-    every = -(-count // max(MOST_SEEN // a_sample, FEWEST_SEEN))
+    body = clip.parents is not None
+    a_sample = (7 if body else 12) * len(_joints(clip.truth)) * max(len(motions), 1)
+    every = -(-count // max(MOST_SEEN[body] // a_sample, FEWEST_SEEN))
     if every == 1:
         return np.arange(count)
     kept = [np.arange(0, count, every)]
@@ -243,7 +244,7 @@ def _extent(places: np.ndarray) -> float:
     return float(np.median(np.linalg.norm(np.ptp(places, axis=0), axis=1)))
 
 
-def _about(result: ChoiceResult, keyed: bool, every: int) -> str:
+def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> str:
     row = result.motions[0].metrics[0]
     if keyed:
         counts = sorted({motion.metrics[0].keys for motion in result.motions})
@@ -253,4 +254,5 @@ def _about(result: ChoiceResult, keyed: bool, every: int) -> str:
         keys = f"{row.key_frames} key poses" if row.joints else f"{row.keys} keys"
     sent = "" if keyed else f", {row.bytes_per_s:.0f} bytes/s"
     peaks = f"; in the chart the largest of every {every}" if every > 1 else ""
-    return f"{keys} in {row.duration_s:.2f} s{sent}, {row.samples} samples{peaks}"
+    fewer = "; fewer in the view" if thinned else ""
+    return f"{keys} in {row.duration_s:.2f} s{sent}, {row.samples} samples{fewer}{peaks}"

@@ -391,6 +391,7 @@ def _templates() -> jinja2.Environment:
 
 def _write(path: Path, template: str, context: Mapping[str, Any]) -> None:
     with replacing(path) as stream:
+        stream.reconfigure(errors="backslashreplace")  # Names of files may be no text.
         stream.writelines(_templates().get_template(template).generate(context))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import select
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,9 @@ from typing import Any
 NAMES = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome")
 PROGRAM = next((path for name in NAMES if (path := shutil.which(name))), None)
 
+
+PATIENCE = 90.0
+"""Seconds that an answer may take."""
 
 WITH_PIPE = """
 import fcntl, os, sys
@@ -31,8 +35,8 @@ os.execv(sys.argv[3], sys.argv[3:])
 class Browser:
     """One page. `problems` has what its console complained of, `requests` the addresses that it asked for."""
 
-    def __init__(self, sent: Any, answers: Any) -> None:
-        self._sent, self._answers, self._number, self._session = sent, answers, 0, {}
+    def __init__(self, sent: Any, answers: int) -> None:
+        self._sent, self._answers, self._number, self._session, self._read = sent, answers, 0, {}, b""
         self.problems: list[str] = []
         self.requests: list[str] = []
         self.loaded = False
@@ -55,10 +59,13 @@ class Browser:
                 return answer["result"]
 
     def _receive(self) -> dict[str, Any]:
-        line = bytearray()
-        while not line.endswith(b"\0"):
-            line += self._answers.read(1) or _ended()
-        message = json.loads(line[:-1])
+        while b"\0" not in self._read:
+            assert select.select([self._answers], [], [], PATIENCE)[0], "Chromium does not answer"
+            piece = os.read(self._answers, 1 << 16)
+            assert piece, "Chromium ended"
+            self._read += piece
+        line, _, self._read = self._read.partition(b"\0")
+        message = json.loads(line)
         event, details = message.get("method"), message.get("params", {})
         if event == "Runtime.exceptionThrown":
             self.problems.append(json.dumps(details["exceptionDetails"])[:600])
@@ -87,12 +94,12 @@ class Browser:
         calm = {"name": "prefers-reduced-motion", "value": "reduce"}
         self.call("Emulation.setEmulatedMedia", features=[scheme, calm])
         self.call("Emulation.setScriptExecutionDisabled", value=not script)
+        self.loaded = False
         # A page that differs in the fragment alone would not be loaded anew.
-        for place in ("about:blank", address):
-            self.loaded = False
-            self.call("Page.navigate", url=place)
-            while not self.loaded:
-                self._receive()
+        place, mark, fragment = address.partition("#")
+        self.call("Page.navigate", url=f"{place}?{self._number}{mark}{fragment}")
+        while not self.loaded:
+            self._receive()
 
     def run(self, expression: str) -> Any:
         """The value of an expression of JavaScript, awaited."""
@@ -102,9 +109,7 @@ class Browser:
 
     def settle(self) -> None:
         """Wait until what was asked for is on the screen."""
-        self.run(
-            "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 450))"
-        )
+        self.run("new Promise((done) => setTimeout(() => [requestAnimationFrame(done), setTimeout(done, 3000)], 450))")
 
     def mouse(self, *moves: tuple[str, float, float]) -> None:
         """Moves of the left button: ("pressed" | "moved" | "released", x, y), in pixels of the page."""
@@ -126,10 +131,6 @@ class Browser:
         path.write_bytes(base64.b64decode(shot["data"]))
 
 
-def _ended() -> bytes:
-    raise AssertionError("Chromium ended")
-
-
 @contextmanager
 def browser() -> Iterator[Browser]:
     """Start a Chromium, which ends with the block."""
@@ -148,7 +149,7 @@ def browser() -> Iterator[Browser]:
         os.close(to_us)
         with os.fdopen(to_it, "wb") as sent, os.fdopen(from_it, "rb") as answers:
             try:
-                page = Browser(sent, answers)
+                page = Browser(sent, answers.fileno())
                 yield page
                 page.close()
                 process.wait(timeout=20)

@@ -129,14 +129,14 @@ def test_the_joints_of_a_whole_body_are_where_its_mode_puts_them() -> None:
 
 
 def test_a_long_recording_keeps_the_worst_moments_in_view_and_chart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(data, "MOST_SEEN", 8000)
+    monkeypatch.setitem(data.MOST_SEEN, False, 8000)
     monkeypatch.setattr(data, "MOST_CHARTED", 100)
     clip = result_of(swinging_clip(seconds=20.0), TEN)
-    found = read(
-        clip, "{ moments: choice.moments, times: choice.times, errors: choice.motions.map((m) => m.errors[0]) }"
-    )
+    shown = "about: choice.about, moments: choice.moments, times: choice.times"
+    found = read(clip, f"{{ {shown}, errors: choice.motions.map((motion) => motion.errors[0]) }}")
     (result,) = clip.choices
     assert len(found["moments"]) < len(clip.times) / 4
+    assert found["about"].endswith("samples; fewer in the view; in the chart the largest of every 19")
     assert len(found["times"]) == len(found["errors"][0]) <= 100
     for motion, errors in zip(result.motions, found["errors"], strict=True):
         worst = clip.times[result.first + motion.errors[0].argmax()] - clip.times[0]
