@@ -13,19 +13,22 @@ import tempfile
 from pathlib import Path
 
 import bpy
-import numpy as np
+import matplotlib.pyplot as plt
+from matplotlib.colors import LinearSegmentedColormap
 
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS.parent / folder) for folder in ("", "addon", "scripts")]
 
 from rigid_motion import animation
-from rigid_motion_batch.analysis.bodies import reconstruct_body
-from rigid_motion_batch.analysis.body_metrics import measure_modes
 from rigid_motion_batch.analysis.choices import Uniform
-from rigid_motion_batch.analysis.radii import JOINT
+from rigid_motion_batch.analysis.radii import EVERYWHERE
+from rigid_motion_batch.analysis.results import ChoiceResult, compare_clip
 from rigid_motion_batch.cli import compare
-from rigid_motion_batch.comparison.report.body_charts import heat_map_alone
 from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.figures import short_names
+from rigid_motion_batch.report.colours import ERROR_COLOURS
+from rigid_motion_batch.report.joints import full_colour
 from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.materials import surface
 from tests.rigs import dancer, figure
@@ -47,7 +50,7 @@ def main() -> None:
         source = f"{recording}:Dancer"
         output = Path(folder) / "out"
         options = ["--rates", RATE, "--modes", ",".join(MODES), "--antialiasing", "5", "--output", str(output)]
-        compare.main([source, *options])
+        compare.main([source, *options, "--jobs", "0"])  # Others could not start in a program that has loaded Blender.
         (film,) = output.glob(f"*/{RATE}/comparison.mp4")
         shutil.copy(film, DOCS / "bodies.mp4")
 
@@ -57,9 +60,25 @@ def main() -> None:
         render_still(scene, DOCS / "bodies.png")
 
         (clip,), _ = read_clips([source], None)
-        made = reconstruct_body(clip, Uniform(RATE), MODES, JOINT)
-        measured = measure_modes(made, np.full(len(clip.figure.joints), JOINT))
-        (DOCS / "bodies-heat.svg").write_text(heat_map_alone(measured, MAPPED), encoding="utf-8")
+        draw_errors(clip, compare_clip(clip, Uniform(RATE), MODES, EVERYWHERE, shared=False), DOCS / "bodies-heat.svg")
+
+
+def draw_errors(clip: Clip, result: ChoiceResult, path: Path) -> None:
+    """Draw the error of each joint over time under the mode `MAPPED`, in the colours of the report."""
+    top = 1e3 * full_colour(motion.joint_errors for motion in result.motions)
+    errors = 1e3 * next(motion.joint_errors for motion in result.motions if MAPPED in motion.modes)
+    joints, samples = errors.shape
+    times = clip.times[result.first :][:samples] - clip.times[0]
+    grey = dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), "#768390")
+    with plt.rc_context({**grey, "svg.fonttype": "none", "svg.hashsalt": path.stem, "font.size": 7.5}):
+        figure, axes = plt.subplots(figsize=(9.0, 3.0), layout="constrained")
+        colours = LinearSegmentedColormap.from_list("errors", ERROR_COLOURS)
+        place = (times[0], times[-1], joints - 0.5, -0.5)
+        drawn = axes.imshow(errors, colours, vmin=0.0, vmax=top, aspect="auto", interpolation="nearest", extent=place)
+        axes.set_yticks(range(joints), short_names(clip.figure.joints))
+        axes.set_xlabel("seconds")
+        figure.colorbar(drawn, label="shell error, mm", pad=0.01)
+        figure.savefig(path, transparent=True, metadata={"Date": None})
 
 
 def save_dancer(path: Path) -> None:

@@ -60,7 +60,7 @@ def main() -> None:
     still = STILLS["smooth.png"]
     with tempfile.TemporaryDirectory() as folder:
         options = ["--rates", still.rate, "--modes", ",".join(still.modes), "--object", still.subject]
-        options += ["--resolution", "960x360", "--slow-motion", "2", "--output", folder]
+        options += ["--resolution", "960x360", "--slow-motion", "2", "--jobs", "0", "--output", folder]
         compare.main([str(DOCS.parent / "assets" / f"{still.asset}.csv"), *options])
         shutil.copy(Path(folder) / still.asset / still.rate / "comparison.mp4", DOCS / "smooth.mp4")
 

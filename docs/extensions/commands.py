@@ -22,7 +22,7 @@ TITLE = re.compile(r"(?m)^(\w[\w ,-]*):\n(?=  )")
 
 
 class Command(SphinxDirective):
-    """A script or a package of this checkout, or one of its subcommands: `{command} scripts/stream.py send`."""
+    """A command of a script or a package: `{command} scripts/stream.py send`, `{command} rigid_motion_batch tasks`."""
 
     required_arguments = 1
     final_argument_whitespace = True
@@ -33,7 +33,7 @@ class Command(SphinxDirective):
         if asked.endswith(".py"):
             self.env.note_dependency(str(root / asked))
         told = help_of(root, asked, *subcommands)
-        name = "-".join([re.split(r"[./]", asked.removesuffix(".py"))[-1], *subcommands])
+        name = "-".join([*([Path(asked).stem] if asked.endswith(".py") else []), *subcommands])
         usage = re.sub(r"\n\s+", "\n    ", told["usage"])
         found = [*prose(told["description"]), nodes.literal_block(usage, usage, language="text")]
         for group in told["groups"]:

@@ -1,4 +1,4 @@
-"""Three takes of a tool, to be compared as a job of many small tasks, as a render farm runs them."""
+"""Three takes of a tool, to be compared as a job of several tasks, as a render farm runs them."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ TAKES = {"drill": "screw", "probe": "pivot", "toss": "throw"}
 
 SEED, SECONDS = 5, 2.0
 
-RATES = "5,10"
-"""Of the picture's job, in keys a second."""
+RATES, PARTS = "5,10", "3"
+"""Of the picture's job: keys a second, and the tasks of a step."""
 
 PICTURE = 960, 300
 
-WIDTH, STEP, CARD, SQUARE = 10.0, 1.17, (1.07, 1.3), 0.2
+WIDTH, STEP, CARD, SQUARE = 10.0, 1.56, (1.46, 1.3), 0.2
 """Of the picture; from card to card; of a card, and of a task on it."""
 
 
@@ -62,14 +62,14 @@ def picture(takes: Path, output: Path) -> None:
     for number, (step, count) in enumerate(counts.items()):
         x = left + STEP * number
         lay(captions.card(step, *CARD, card, 0.06), x, 0.0, 0.0)
-        staging.write(camera, step, (x - 0.44) / WIDTH, 0.036, 0.022, palette.DARK.ink)
+        staging.write(camera, step, (x - 0.64) / WIDTH, 0.036, 0.022, palette.DARK.ink)
         for task in range(count):
             row, column = divmod(task, 3)
             mesh = captions.card("Task", SQUARE, SQUARE, square, 0.04)
-            lay(mesh, x - 0.34 + 0.3 * column, 0.05 - 0.3 * row, 0.1)
+            lay(mesh, x - 0.54 + 0.3 * column, 0.05 - 0.3 * row, 0.1)
     heading = f"{len(TAKES)} takes, {sum(counts.values())} tasks"
     staging.write(camera, heading, (left - CARD[0] / 2.0) / WIDTH, 0.1, 0.03, palette.DARK.ink)
-    says = "A card is a step, which waits for what it builds on. A square is a task, which any machine may take."
+    says = "A card is a step, which waits for the one before it. A square is a task, which any machine may take."
     staging.write(camera, says, (left - CARD[0] / 2.0) / WIDTH, -0.11, 0.02, palette.DARK.faint)
     render_still(scene, output / "farm.png")
 
@@ -87,15 +87,16 @@ def tasks_of_steps(takes: Path) -> dict[str, int]:
         job = Path(scratch) / "job"
         recordings = [str(path) for path in sorted(takes.glob("*.csv"))]
         with redirect_stdout(StringIO()):  # It names the command that runs a job which is gone in a moment.
-            job_bundle.main([*recordings, "--rates", RATES, "--output", f"{scratch}/out", "--bundle", str(job)])
+            own = ["--parts", PARTS, "--output", f"{scratch}/out", "--bundle", str(job)]
+            job_bundle.main([*recordings, "--rates", RATES, *own])
         template = json.loads((job / "template.json").read_text(encoding="utf-8"))
     return {step["name"]: count_of(step) for step in template["steps"]}
 
 
 def count_of(step: dict) -> int:
-    """The tasks of a step of a job template: its parameters have a value for each."""
-    parameters = step.get("parameterSpace", {}).get("taskParameterDefinitions", [])
-    return len(parameters[0]["range"]) if parameters else 1
+    """The tasks of a step of a job template: its parameter goes from 1 to their number."""
+    (part,) = step["parameterSpace"]["taskParameterDefinitions"]
+    return int(part["range"].removeprefix("1-"))
 
 
 if __name__ == "__main__":

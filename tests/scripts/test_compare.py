@@ -22,7 +22,7 @@ from pytransform3d.trajectories import dual_quaternions_from_pqs, dual_quaternio
 from scipy.spatial.transform import Rotation
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES, Poses, decimate, interpolate, shell_error
-from rigid_motion_batch.cli import compare
+from rigid_motion_batch.cli import compare, tasks
 from rigid_motion_batch.pipeline.steps import OWN
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.recordings.clip_reading import folder_names
@@ -541,6 +541,8 @@ def test_one_bad_recording_is_said_and_the_others_go_on(short_clip, tmp_path, ca
     assert [*found["failures"]] == [f"read {bad}", f"read {tmp_path / 'nowhere.csv'}"]
     assert found["exit_code"] == 1
     assert {row["clip"] for row in rows_of(tmp_path / "out" / "metrics.csv")} == {"toss"}
+    assert tasks.main(["list", str(tmp_path / "out"), "--failed"]) == 1
+    assert [line.split(": failed")[0] for line in capsys.readouterr().out.splitlines()] == [*found["failures"]]
 
 
 def test_the_terminal_ends_with_a_table_a_sentence_and_the_path(short_clip, tmp_path, capsys):

@@ -32,6 +32,21 @@ def test_the_command_that_is_printed_runs_the_job(clip: Path, tmp_path: Path, ca
     assert {"metrics.csv", "report.html", "toss/5/keys.csv"} <= set(outputs(tmp_path / "out"))
 
 
+def test_one_bad_clip_is_named_and_the_others_get_their_report(
+    clip: Path, tmp_path: Path, capfd: pytest.CaptureFixture
+) -> None:
+    clip.with_name("bad.csv").write_text("junk\n", encoding="utf-8")
+    given = ["takes/toss.csv", "takes/bad.csv", *OPTIONS, "--jobs", "0", "--parts", "1"]
+    assert job_bundle.main([*given, "--bundle", "bundle", "--output", "out"]) == 0
+    command = shlex.split(capfd.readouterr().out.splitlines()[-1])
+    ran = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, timeout=240)
+    said = ran.stdout + ran.stderr
+    assert ran.returncode != 0, said
+    assert "bad.csv:1: no column has a known name" in said
+    assert "bad.csv: not done" in said
+    assert {"metrics.csv", "report.html", "toss/5/keys.csv"} <= set(outputs(tmp_path / "out"))
+
+
 def test_stages_of_films_are_in_the_job_where_there_are_films(clip: Path, tmp_path: Path) -> None:
     def steps(*options: str) -> dict[str, str]:
         assert job_bundle.main(["takes/toss.csv", "--bundle", "bundle", *options]) == 0

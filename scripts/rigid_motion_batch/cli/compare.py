@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
-from itertools import count, groupby
+from itertools import chain, count, groupby
 from pathlib import Path
 from typing import Any
 
@@ -275,6 +275,7 @@ class _Run:
         self.options, self.plan, self.store, self.executor = options, plan, plan.store, executor
         self.progress = progress
         self.share = Share(frozenset({options.only}), *options.part) if options.only else Share()
+        self.on_farm = os.environ.get(PROGRESS) == "openjd"
         self.notes: list[str] = []
         self.outcome = Outcome()
         self.page = True
@@ -299,6 +300,8 @@ class _Run:
             return 2
         if self.options.only:
             self._do(self.options.only.capitalize(), self.plan.tasks)
+            if self.options.only == "report":
+                self._name_missing()
             return self._end()
         self._require_tolerances()
         digests = _digests(self.options.inputs, self.store)
@@ -321,8 +324,7 @@ class _Run:
 
     def _do(self, title: str, tasks: Plan) -> None:
         with self.progress.stage(title, 1.0) as stage:
-            on_farm = os.environ.get(PROGRESS) == "openjd"
-            shown = FarmProgress() if on_farm else _Shown(self.progress, stage, self.options.quiet)
+            shown = FarmProgress() if self.on_farm else _Shown(self.progress, stage, self.options.quiet)
             outcome = run(
                 tasks,
                 self.store,
@@ -332,9 +334,11 @@ class _Run:
                 blender=self.options.blender or "",
             )
         self.page = getattr(shown, "page", True)
-        failures = self.outcome.failures | outcome.failures
-        self.outcome = self.outcome.continued(outcome)
-        self.outcome.failures = failures
+        before, self.outcome = self.outcome, self.outcome.continued(outcome)
+        self.outcome.failures = before.failures | outcome.failures
+        self.outcome.details = before.details | outcome.details
+        if not self.options.only:
+            self.outcome.note_failures(self.store)
 
     def _look_into(self) -> list[str]:
         """See what was read. What is damaged is read again."""
@@ -353,9 +357,20 @@ class _Run:
             self.progress.note(text, style)
 
     def _say_nothing_to_compare(self) -> None:
-        if not self.outcome.failures:
+        if not any(self.store.result(task.key) for task in self.plan.reading()):
+            if self.options.only or not self.outcome.failures:
+                complain(PROGRAM, "none of the recordings has been read; that is done by --only read")
+        elif not self.outcome.failures:
             higher = "--budget" if self.options.budget else "--rates"
             complain(PROGRAM, f"every clip is too short for two keys at these rates; give higher {higher}")
+
+    def _name_missing(self) -> None:
+        """Name what the stages before the report have not done."""
+        tasks = (task for task in chain(self.plan.reading(), self.plan.tasks()) if task.step.stage != "report")
+        for task in tasks:
+            if not (task.step.temporary or self.store.result(task.key)):
+                self.outcome.failures[task.name] = "not done: its own stage said why"
+                complain(PROGRAM, f"{task.shown}: {self.outcome.failures[task.name]}")
 
     def _require_tolerances(self) -> None:
         """Raise Refused where a tolerance is larger than the motion of every clip."""
@@ -418,7 +433,9 @@ class _Run:
         if outcome.interrupted:
             holds = "The report holds what was ready" if there else "There is no new report yet"
             print(f"Stopped. {holds}; the same command goes on from here.", file=sys.stderr)
-        code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(outcome.failures))
+        # After a failure a farm would not begin the stages behind it: what is missing is the report's to say.
+        failed = outcome.failures and not (self.on_farm and self.options.only != "report")
+        code = 130 if outcome.interrupted else 2 if outcome.problem else int(bool(failed))
         if self.options.json:
             print(json.dumps(self._as_data(page if there else None, code), indent=1, ensure_ascii=False), flush=True)
         elif there:

@@ -16,8 +16,8 @@ from typing import Any, TextIO
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.places import PACKAGE
 
-from .running import Progress
-from .steps import version_here
+from .running import Progress, State
+from .steps import Task, version_here
 
 STAGES = ("read", "measure", "build", "render", "encode", "report")
 """Of a comparison; each begins when all before it have ended."""
@@ -47,6 +47,10 @@ class FarmProgress(Progress):
 
     def note(self, text: str) -> None:
         print(text, file=self._stream, flush=True)
+
+    def finish(self, task: Task, state: State, problem: str) -> None:
+        if problem:
+            self.note(problem)
 
 
 def write_bundle(

@@ -70,6 +70,9 @@ class Outcome:
     failures: dict[str, str] = field(default_factory=dict)
     """Task to what was wrong, in one line."""
 
+    details: dict[str, str] = field(default_factory=dict)
+    """And to what Python said of it; empty where that is known."""
+
     seconds: float = 0.0
     """Of work, by all workers together."""
 
@@ -89,6 +92,12 @@ class Outcome:
         later.seconds += self.seconds
         later.facts.update(self.facts)
         return later
+
+    def note_failures(self, store: Store) -> None:
+        """Have the store keep what failed, for whoever asks later."""
+        failures = {name: {"message": said, "details": self.details[name]} for name, said in self.failures.items()}
+        with suppress(OSError):
+            store.note("failures.json", failures)
 
     def __str__(self) -> str:
         """How many of each: "12 done, 3 up to date, 1 failed"."""
@@ -280,7 +289,6 @@ class _Run:
 
     def __post_init__(self) -> None:
         self.outcome, self.damaged = Outcome(), False
-        self.details: dict[str, str] = {}
         self.settled: dict[str, str | None] = {}
         """Key of a task to that of its result; None where it has none."""
         self.open: dict[int, _Open] = {}
@@ -312,11 +320,7 @@ class _Run:
             over = sum(outcome.counts[state] for state in (State.DONE, State.FAILED, State.SKIPPED))
             outcome.counts[State.STOPPED] = max(0, self.survey.tasks - over)
         if self.share == EVERYTHING:
-            failures = {
-                name: {"message": said, "details": self.details[name]} for name, said in outcome.failures.items()
-            }
-            with suppress(OSError):
-                self.store.note("failures.json", failures)
+            outcome.note_failures(self.store)
         return outcome
 
     def _work(self) -> None:
@@ -448,7 +452,7 @@ class _Run:
         # An error that nobody foresaw does not say by itself what it is about.
         task = opened.task
         said = f"{task.shown}: {failed.message}" if failed.details else failed.message
-        self.outcome.failures[task.name], self.details[task.name] = said, failed.details
+        self.outcome.failures[task.name], self.outcome.details[task.name] = said, failed.details
         if failed.hopeless:
             self._close(opened, State.FAILED, said)
             raise _Hopeless(said)
