@@ -18,7 +18,7 @@ from rigid_motion_batch.files import replacing
 from rigid_motion_batch.rows import write_rows
 
 from .choices import Choice
-from .modes import BEST_OF
+from .modes import BEST_OF, single_modes
 from .reconstructions import Reconstruction
 
 BYTES_PER_KEY = 7 * 8
@@ -29,6 +29,9 @@ NOTHING = 1e-9
 
 BLOCK = 10_000
 """Rows of a table that are made at a time."""
+
+FORMS = ("csv", "tum")
+"""Formats of the tables of poses."""
 
 BYTES_PER_MODE = 1
 """What a key has in addition where every segment has a mode of its own."""
@@ -153,6 +156,9 @@ def write_poses(
 ) -> None:
     """Write a table of poses: `t,x,y,z,qw,qx,qy,qz`, and `s` where the poses have scales.
 
+    Under a name that ends in `.tum` the table is as evo and others read it, `t x y z qx qy qz qw`, without scales and
+    modes.
+
     Parameters
     ----------
     path : Path
@@ -163,6 +169,9 @@ def write_poses(
     overwrite : bool
         Whether to replace what is there. Otherwise FileExistsError is raised.
     """
+    if path.suffix == ".tum":
+        _write_tum(path, times, poses, overwrite)
+        return
     columns = [times, *poses.positions.T, *poses.quaternions.T]
     header = "t,x,y,z,qw,qx,qy,qz"
     if poses.scales is not None:
@@ -178,6 +187,14 @@ def write_poses(
             stream.write("\n".join([*lines, ""]))
 
 
+def _write_tum(path: Path, times: np.ndarray, poses: Poses, overwrite: bool) -> None:
+    columns = [times, *poses.positions.T, *poses.quaternions.T[[1, 2, 3, 0]]]
+    with replacing(path, overwrite=overwrite) as stream:
+        stream.write("# timestamp tx ty tz qx qy qz qw\n")
+        for _, lines in lines_of_poses(columns):
+            stream.writelines(line.replace(",", " ") + "\n" for line in lines)
+
+
 def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[str]]]:
     """The rows of a table of numbers, columns of shape (n,), some at a time with the number of the first.
 
@@ -188,13 +205,12 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
         yield first, [",".join(map(repr, row)) for row in rows]
 
 
-def table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
+def table_names(choice: Choice, modes: Iterable[str], form: str = "csv") -> list[str]:
     """The files that `write_reconstruction` writes for a choice of keys."""
     modes = tuple(modes)
-    keys = {f"{mode}.keys.csv": mode for mode in modes}
-    if choice.decimation == "uniform":
-        keys = {"keys.csv": ""} | ({f"{BEST_OF}.keys.csv": BEST_OF} if BEST_OF in modes else {})
-    return [*(f"{mode}.csv" for mode in modes), *keys]
+    single = [] if choice.decimation == "uniform" else [f"{mode}.keys.{form}" for mode in single_modes(modes)]
+    best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
+    return [*(f"{mode}.{form}" for mode in modes), *(single or [f"keys.{form}"]), *best]
 
 
 def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
@@ -202,18 +218,18 @@ def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
     return ["keys.csv"] if choice.decimation == "uniform" else [f"{mode}.keys.csv" for mode in modes]
 
 
-def write_reconstruction(folder: Path, reconstruction: Reconstruction) -> None:
-    """Write a `MODE.csv` for every mode into `folder`, and the keys.
+def write_reconstruction(folder: Path, reconstruction: Reconstruction, form: str = "csv") -> None:
+    """Write a `MODE.csv`, or another of `FORMS`, for every mode into `folder`, and the keys.
 
     Keys that were chosen evenly are those of all modes, in `keys.csv`; others are in a `MODE.keys.csv` for each. Those
     of `best_of` are in a table of their own in any case, with the mode of each segment.
     """
     clip = reconstruction.clip
     for mode, poses in reconstruction.poses.items():
-        write_poses(folder / f"{mode}.csv", reconstruction.times, poses)
-    tables = {f"{mode}.keys.csv": keys for mode, keys in reconstruction.keys.items() if mode != BEST_OF}
+        write_poses(folder / f"{mode}.{form}", reconstruction.times, poses)
+    tables = {f"{mode}.keys.{form}": keys for mode, keys in reconstruction.keys.items() if mode != BEST_OF}
     if reconstruction.choice.decimation == "uniform":
-        tables = {"keys.csv": next(iter(tables.values()))}
+        tables = {f"keys.{form}": next(iter(tables.values()))}
     for name, keys in tables.items():
         write_poses(folder / name, clip.times[keys], clip.poses[keys])
     if BEST_OF in reconstruction.keys:

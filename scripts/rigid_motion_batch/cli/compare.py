@@ -106,6 +106,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         reading=options.reading,
         radii=options.radius,
         shared=options.shared,
+        form=options.format,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
         beside_decimate=bool(blender),

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
+from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
 from rigid_motion_batch.axes import AXES
@@ -172,6 +173,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     output = parser.add_argument_group("output")
     output.add_argument("--open", action="store_true", help="open the report in the browser")
     output.add_argument("--quiet", action="store_true", help="print the path of the report alone, and what fails")
+    output.add_argument(
+        "--format",
+        choices=FORMS,
+        default="csv",
+        help="of the poses of each mode and of the keys: csv, or tum, which evo reads (%(default)s)",
+    )
     output.add_argument("--json", action="store_true", help="print verdict, table, notes and failures as JSON")
     farm = parser.add_argument_group("farms", "One of many machines that share the folder; docs/farm.md has more.")
     farm.add_argument("--only", choices=STAGES, metavar="STAGE", help=f"do this part alone: {', '.join(STAGES)}")

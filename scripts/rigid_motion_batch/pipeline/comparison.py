@@ -74,6 +74,9 @@ class Comparison:
 
     reading: ReadingOptions = AS_THE_FILE_SAYS
     radii: Radii = EVERYWHERE
+    form: str = "csv"
+    """Of the tables of poses of rigid bodies, of `metrics.FORMS`."""
+
     shared: bool = False
     """Whether the joints of a body have their keys at the same samples where the motion chooses them."""
 
@@ -299,11 +302,11 @@ class ComparisonPlan:
                 tables = body_table_names(choice, modes)
                 weight = 0.1 + 5e-6 * study.samples * study.joints * len(modes) * (1.0 if evenly else 40.0)
             else:
-                tables = table_names(choice, modes)
+                tables = table_names(choice, modes, comparison.form)
                 weight = 0.02 + 8e-6 * study.samples * len(modes) * (1.0 if evenly else 50.0)
             measuring = Task(
                 steps.measure,
-                steps.Measure(study.clip, choice, tuple(modes), comparison.radii, comparison.shared),
+                steps.Measure(study.clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form),
                 f"measure {name}/{choice.name}",
                 after=(study.reader,),
                 publish={table: f"{name}/{choice.name}/{table}" for table in tables},

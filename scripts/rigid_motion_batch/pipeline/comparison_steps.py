@@ -121,6 +121,8 @@ class Measure:
     modes: tuple[str, ...]
     radii: Radii
     shared: bool = False
+    form: str = "csv"
+    """Of the tables of poses."""
 
 
 @step(rooms=ANALYSIS, stage="measure")
@@ -133,7 +135,7 @@ def measure(job: Job, parameters: Measure) -> None:
     clip, choice, modes = parameters.clip.read(job.before[0]), parameters.choice, parameters.modes
     if clip.figure is None:
         if made := reconstruct(clip, choice, modes, parameters.radii.rigid):
-            metrics.write_reconstruction(job.folder, made)
+            metrics.write_reconstruction(job.folder, made, parameters.form)
             found = results.of_rigid_body(made)
     else:
         radii = parameters.radii.of(clip.figure.joints)
