@@ -53,8 +53,13 @@ def goes_on(obj: Carrier) -> bool:
     return any(
         fcurve.extrapolation == "LINEAR"
         for (path, _), fcurve in curves
-        if path in WIDTHS and len(fcurve.keyframe_points)
+        if path in WIDTHS and len(fcurve.keyframe_points) and not fcurve.mute
     )
+
+
+def segment_start(keys: np.ndarray, frame: float) -> float:
+    """The key that the segment of a frame begins on: that of the first or the last one outside of all."""
+    return float(keys[np.clip(np.searchsorted(keys, frame) - 1, 0, len(keys) - 2)])
 
 
 def mode_channel(carrier: Carrier) -> bpy.types.FCurve | None:
@@ -233,6 +238,7 @@ class Editing(RuleBasedStateMachine):
         keys = key_frames(obj)
         held, settable = self._holds_pose(obj, frame), self._has_keys_for_any_pose(obj)
         goes_on_as_before = held and not posed and is_timed_together(obj, frame) and not shapes_path(obj, frame)
+        goes_on_as_before = goes_on_as_before and mode_at(obj, frame) == mode_at(obj, segment_start(keys, frame))
         goes_by = np.arange(keys[0], keys[-1], 0.5) if goes_on_as_before and is_seen_exactly(obj, frame) else ()
         before = expected_bases(obj, goes_by, self.owns.get(name))
         moved = self._is_posed(obj)
@@ -269,11 +275,11 @@ class Editing(RuleBasedStateMachine):
         self._edit(insert, settle)
 
     def _holds_pose(self, obj: Carrier, frame: float) -> bool:
-        """Whether a key inserted now falls into a segment that is filled in."""
+        """Whether a key inserted now falls where a mode acts: into a segment, or where the outermost ones go on."""
         keys = key_frames(obj)
-        if len(keys) < 2 or not keys[0] < frame < keys[-1] or np.abs(keys - frame).min() < 0.01:
+        if len(keys) < 2 or np.abs(keys - frame).min() < 0.01:
             return False
-        return mode_at(obj, keys[keys < frame][-1]) != "BLENDER"
+        return (keys[0] < frame < keys[-1] or goes_on(obj)) and mode_at(obj, segment_start(keys, frame)) != "BLENDER"
 
     def _pose(self, obj: Carrier, seed: int) -> None:
         for path in transform_paths(obj)[:2]:

@@ -262,6 +262,22 @@ def test_a_key_outside_of_the_keys_keeps_the_pose_where_the_motion_goes_on(live_
     assert np.abs(seen() - before).max() < 2e-5 * max(1.0, np.abs(before).max())
 
 
+@pytest.mark.parametrize(("frame", "last"), [(20, 13), (47, 37)])
+def test_a_key_keeps_the_pose_of_its_segment_where_the_mode_has_ended(live_file, frame, last):
+    live_file.scene.frame_end = 60
+    obj = key(new_object())
+    set_mode(obj, "dq_sclerp")
+    obj.keyframe_insert("rigid_motion.mode", frame=1)
+    obj.rigid_motion.mode = "BLENDER"
+    obj.keyframe_insert("rigid_motion.mode", frame=last)
+    goes_on(obj, "LINEAR")
+    live_file.view_layer.update()
+    live_file.scene.frame_set(frame)
+    before = seen()
+    obj.keyframe_insert("location")
+    assert np.abs(seen() - before).max() < 2e-5 * max(1.0, np.abs(before).max())
+
+
 def test_a_key_of_a_bone_outside_of_the_keys_keeps_the_pose(live_file):
     live_file.scene.frame_end = 60
     rig = key_all(new_rig())

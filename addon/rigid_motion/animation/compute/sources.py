@@ -277,9 +277,12 @@ class Source:
         return np.rint(modes).astype(int)
 
     def mode_at(self, frame: float) -> int:
-        """Return the number of the mode on a frame, on that of the original where cycles repeat it."""
-        frames = np.array([frame])
-        return int(self.modes_at(frames if self.cyclic is None else cycled(self.cyclic, frames)[0])[0])
+        """Return the number of the mode of the segment that a frame is in: of the first or the last one outside of all.
+
+        A mode that begins within a segment does not act there.
+        """
+        segment = np.searchsorted(self.key_frames, frame, side="right") - 1
+        return int(self.modes[np.clip(segment, 0, len(self.modes) - 1)])
 
     @cached_property
     def segment_turns(self) -> np.ndarray:

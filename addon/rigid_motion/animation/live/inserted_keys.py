@@ -274,7 +274,9 @@ def _is_inserted(old: Source, new: Source, frame: float) -> bool:
     if not (before[0] < frame < before[-1] or old.goes_on) or np.abs(before - frame).min() < SAME_FRAME:
         return False
     others = after[np.abs(after - frame) >= SAME_FRAME]
-    return len(others) < len(after) and np.array_equal(others, before) and bool(old.mode_at(frame))
+    if len(others) == len(after) or not np.array_equal(others, before):
+        return False
+    return old.is_live and old.mode_at(frame) != 0
 
 
 def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
