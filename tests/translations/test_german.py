@@ -45,6 +45,7 @@ UNSEEN = {
     "What the constraint of a bone is called, where that is not its usual name",
     "Whether the manual frame range was set for samples that lie behind the keys",
     "Whether samples lie outside of the keys that they are for, within those of others or not",
+    "Whether in-betweens of bones have one sample a frame, until more are needed",
     "It has keys for in-betweens too",
     "It has few of the keys",
     "How far the reduced motion is off where it is furthest, in Blender's units",

@@ -200,7 +200,8 @@ def _blender(options: argparse.Namespace) -> str:
         if options.stage or read:
             raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
         return ""
-    on_screen = options.stage and options.engine != "cycles" and not options.explain
+    # Another program has libraries of its own.
+    on_screen = options.stage and options.engine != "cycles" and not (options.explain or options.blender)
     if on_screen and (missing := missing_for_rendering()):
         raise Refused(f"{way_out(missing)}\nOr go without videos: --no-video")
     if options.blender:
