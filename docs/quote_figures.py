@@ -24,7 +24,6 @@ sys.path[:0] = [str(DOCS.parent / folder) for folder in ("addon", "scripts")]
 
 from research.markdown_tables import numbers, tables, tables_of, titled
 from research.paper.table import RADIUS
-from research.phrases import listed
 from research.summaries import SUMMARIES, with_summary
 from research.summaries.paper import TABLE_1, percent_saved
 from rigid_motion.motion import KEYFRAME_MODES
@@ -35,6 +34,7 @@ from rigid_motion_batch.analysis.reconstructions import reconstruct
 from rigid_motion_batch.files import write_text
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings.clip_reading import read_clips
+from rigid_motion_batch.report.numbers import listed
 
 QUOTE = re.compile(r"(<!-- quote ([a-z0-9-]+) -->)(.*?)(<!-- end -->)", re.DOTALL)
 

@@ -6,7 +6,6 @@ Text is UTF-8 with LF line ends on every system, so that two runs can be compare
 from __future__ import annotations
 
 import os
-import re
 import secrets
 import zlib
 from collections.abc import Iterator
@@ -96,15 +95,6 @@ def replacing(path: Path, *, overwrite: bool = True) -> Iterator[TextIO]:
         beside.open("w", encoding="utf-8", newline="\n") as stream,
     ):
         yield stream
-
-
-def clear_beside(path: Path) -> None:
-    """Delete what processes that were killed left of `path`: nobody may be writing it."""
-    remains = re.compile(rf"\.[0-9a-f]{{8}}{re.escape(ending_beside(path))}")
-    for name in os.listdir(path.parent) if path.parent.is_dir() else ():
-        if remains.fullmatch(name):
-            with suppress(OSError):
-                path.with_name(name).unlink()
 
 
 def write_text(path: Path, text: str) -> None:

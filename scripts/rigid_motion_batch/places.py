@@ -55,16 +55,6 @@ def place_of(name: str) -> Path:
 
 
 @cache
-def name_of(place: Path) -> str | None:
-    """The name of a file or folder of the program; None for any other."""
-    for part, root in NAMED.items():
-        if place.is_relative_to(root):
-            rest = place.relative_to(root).as_posix()
-            return part if rest == "." else f"{part}/{rest}"
-    return None
-
-
-@cache
 def manifest() -> dict[str, Any]:
     """What the extension's manifest says: its name, its version."""
     return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rigid_motion_batch.files import clear_beside, replacing, write_text, written_beside
+from rigid_motion_batch.files import replacing, write_text, written_beside
 
 
 def test_a_text_is_written_as_utf_8_with_lf_line_ends_and_folders_on_the_way_are_made(tmp_path: Path) -> None:
@@ -50,21 +50,6 @@ def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
     assert (tmp_path / "link.html").is_symlink()
     assert (tmp_path / "real.html").read_text() == "new"
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_what_dead_processes_left_of_a_file_is_cleared_away_and_nothing_else(tmp_path: Path) -> None:
-    with written_beside(tmp_path / "plan.json") as beside:
-        name = beside.name
-        beside.touch()
-    with written_beside(tmp_path / "plan.csv") as other:
-        other.touch()
-    dead = {f".{number:08x}{name[9:]}" for number in (0, 7, 0xFFFFFFFF)}
-    others = {"plan.json", "plan.csv", f"{name}.old", f".x{name[9:]}", f".0000000{name[9:]}", name[1:], other.name}
-    for made in (*others, *dead):
-        (tmp_path / made).touch()
-    clear_beside(tmp_path / "plan.json")
-    assert {path.name for path in tmp_path.iterdir()} == others
-    clear_beside(tmp_path / "nowhere" / "plan.json")
 
 
 def test_the_name_beside_is_short_however_long_the_name_is(tmp_path: Path) -> None:

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from research.phrases import listed
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.modes import REFERENCE
 from rigid_motion_batch.analysis.needed import RATES
 from rigid_motion_batch.analysis.radii import JOINT
 from rigid_motion_batch.command_line import printable
+from rigid_motion_batch.report.numbers import listed
 from rigid_motion_batch.rows import read_rows
 
 from . import bodies, claims

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from research.phrases import listed
+from rigid_motion_batch.report.numbers import listed
 
 from . import claims
 from .bows import FORMULA

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from research.phrases import listed
+from rigid_motion_batch.report.numbers import listed
 from rigid_motion_batch.streaming.packets import HEADER
 
 from . import claims

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from research.phrases import listed
 from research.summaries import of_paper, with_summary
 from rigid_motion.motion import MODES
 from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.report.numbers import listed
 
 from . import bodies_section, bows_section, claims, costs_section, sending_section, shell, strips, triangle
 from .bows import SCREW

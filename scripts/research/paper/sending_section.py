@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from research.phrases import listed
 from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.report.numbers import listed
 from rigid_motion_batch.streaming import TWISTS
 
 from . import claims

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from research.phrases import listed
 from rigid_motion_batch.analysis.modes import REFERENCE
+from rigid_motion_batch.report.numbers import listed
 
 from . import claims
 from .sending import SentNeeded

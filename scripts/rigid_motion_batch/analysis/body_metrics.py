@@ -1,7 +1,7 @@
 """What a comparison found of a whole body, in numbers: over all joints, and joint by joint.
 
 Errors are in metres, in the root's space. `metrics.csv` has the body, `metrics_joints.csv` its joints. What is as long
-as the recording is there for one mode at a time, and then only what is shown of it.
+as the recording is kept for one mode of those that are one motion.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_motion.motion import Poses
 from rigid_motion.motion.measures import rms
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.rows import line_of, write_rows
@@ -21,9 +20,6 @@ from rigid_motion_batch.rows import line_of, write_rows
 from .bodies import BodyErrors, BodyReconstruction, Ground, JointKeys, identical_body_modes, measure_body, moving
 from .metrics import BYTES_PER_KEY, Metrics, lines_of_poses
 from .reconstructions import Groups
-
-COLUMNS = 240
-"""Stretches of time that a picture of all joints is divided into."""
 
 Radii = float | np.ndarray
 """Of the balls at the joints, in metres: one for all, or shape (joints,)."""
@@ -59,29 +55,6 @@ class JointMetrics:
 
 
 @dataclass(frozen=True, eq=False)
-class ModeOfBody:
-    """What is shown of one mode. Errors in metres."""
-
-    over_time: np.ndarray
-    """The largest error of any joint at each sample, shape (n,)."""
-
-    by_joint: np.ndarray
-    """The largest error of each joint in each stretch of time, shape (joints, at most COLUMNS)."""
-
-    worst: tuple[int, int, float]
-    """The joint, the sample from the first key on, and the error."""
-
-    shown: Poses
-    """Where the joints are then, shape (joints,), in metres."""
-
-    truth: Poses
-    """Where they were in the recording."""
-
-    errors: np.ndarray
-    """Their errors then, shape (joints,)."""
-
-
-@dataclass(frozen=True, eq=False)
 class MeasuredBody:
     """A whole body under one choice of keys, measured."""
 
@@ -96,27 +69,27 @@ class MeasuredBody:
     groups: Groups
     """The modes, those together that are one motion."""
 
-    modes: Mapping[str, ModeOfBody]
+    errors: Mapping[str, BodyErrors]
+    """Of the first of each group."""
 
 
 def measure_modes(made: BodyReconstruction, radius: Radii) -> MeasuredBody:
-    """All modes of a reconstruction; of those that are one motion the first is shown."""
+    """All modes of a reconstruction; of those that are one motion the errors of the first are kept."""
     ground, groups = Ground.of(made), identical_body_modes(made)
     rows: dict[str, Metrics] = {}
     joints: dict[str, tuple[JointMetrics, ...]] = {}
-    shown: dict[str, ModeOfBody] = {}
+    kept: dict[str, BodyErrors] = {}
     for mode in made.keys:
         errors = measure_body(made, mode, radius, ground)
-        rows[mode] = row_of_body(made, mode, errors, ground)
-        joints[mode] = tuple(joint_rows(made, mode, errors))
+        rows[mode] = _row_of(made, mode, errors, ground)
+        joints[mode] = tuple(_rows_of_joints(made, mode, errors))
         if mode in (group[0] for group in groups):
-            shown[mode] = _shown_of(made, mode, errors)
+            kept[mode] = errors
     every = tuple(row for mode in made.keys for row in joints[mode])
-    return MeasuredBody(made, tuple(rows.values()), every, groups, shown)
+    return MeasuredBody(made, tuple(rows.values()), every, groups, kept)
 
 
-def row_of_body(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
-    """Return the row of a mode in `metrics.csv`."""
+def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
     clip, choice, times = made.clip, made.choice, made.times
     duration = float(times[-1] - times[0])
     keys = made.keys[mode]
@@ -149,8 +122,7 @@ def row_of_body(made: BodyReconstruction, mode: str, errors: BodyErrors, ground:
     )
 
 
-def joint_rows(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
-    """Return the rows of a mode in `metrics_joints.csv`."""
+def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
     clip, choice, times = made.clip, made.choice, made.times
     worst = errors.shell.argmax(axis=1)
     root_mean_squares = np.sqrt(np.mean(np.square(errors.shell), axis=1))
@@ -172,21 +144,6 @@ def joint_rows(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Itera
             decimation=choice.decimation,
             tolerance_m=choice.tolerance(clip),
         )
-
-
-def _shown_of(made: BodyReconstruction, mode: str, errors: BodyErrors) -> ModeOfBody:
-    joint, sample = errors.worst
-    count = errors.shell.shape[1]
-    begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
-    at = made.samples.start + sample
-    return ModeOfBody(
-        over_time=errors.shell.max(axis=0),
-        by_joint=np.maximum.reduceat(errors.shell, begins, axis=1),
-        worst=(joint, sample, float(errors.shell[joint, sample])),
-        shown=made.shown(mode, made.clip.times[at : at + 1])[:, 0],
-        truth=made.truth(slice(at, at + 1))[:, 0],
-        errors=errors.shell[:, sample].copy(),
-    )
 
 
 def key_samples(keys: JointKeys) -> np.ndarray:

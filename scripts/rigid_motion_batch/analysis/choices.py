@@ -274,10 +274,6 @@ def _reduced_body(clip: Clip, mode: str, radius: Radius, shared: bool, **wanted:
     )
 
 
-KINDS: dict[str, type[Choice]] = {kind.__name__.lower(): kind for kind in (Uniform, Budget, Tolerance)}
-"""What choices are called where they are plain data."""
-
-
 def fewest_keys(choices: Iterable[Choice]) -> list[Choice]:
     """Of each kind of choice that which keeps the fewest keys, where modes differ most."""
     kinds: dict[type[Choice], list[Choice]] = {}
@@ -292,13 +288,3 @@ def distinct(choices: Iterable[Choice]) -> list[Choice]:
     for choice in choices:
         first.setdefault(choice.wanted, choice)
     return list(first.values())
-
-
-def choice_parts(choice: Choice) -> tuple[str, str]:
-    """A choice as plain data."""
-    return type(choice).__name__.lower(), choice.written
-
-
-def choice_from(kind: str, written: str) -> Choice:
-    """The choice of `choice_parts`."""
-    return KINDS[kind](written)

@@ -8,7 +8,6 @@ the points of the curve of error over keys a second. Errors are in metres.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -253,20 +252,6 @@ class OfRigidBody:
                 break
             aim *= target / error
         return best, reached
-
-
-def to_json(found: KeysNeeded) -> str:
-    """As text, of which `from_json` makes it again."""
-    content = {name: one.tolist() if isinstance(one, np.ndarray) else one for name, one in vars(found).items()}
-    return json.dumps(content, indent=1) + "\n"
-
-
-def from_json(text: str) -> KeysNeeded:
-    """What `to_json` wrote."""
-    content = json.loads(text)
-    groups, rates = tuple(map(tuple, content.pop("groups"))), tuple(content.pop("rates"))
-    clip = content.pop("clip")
-    return KeysNeeded(clip, groups, rates, **{name: np.array(one, dtype=float) for name, one in content.items()})
 
 
 # -- over all clips ---------------------------------------------------------------------------------------------------

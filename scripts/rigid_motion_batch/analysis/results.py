@@ -17,9 +17,9 @@ from rigid_motion.motion import Poses
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip, ClipWarning
 
-from .bodies import BodyErrors, BodyReconstruction, Ground, identical_body_modes, measure_body, reconstruct_body
+from .bodies import BodyReconstruction, reconstruct_body
 from .body_decimated import KeysOfBody
-from .body_metrics import JointMetrics, joint_rows, key_samples, row_of_body
+from .body_metrics import JointMetrics, key_samples, measure_modes
 from .choices import Choice
 from .metrics import Metrics, measure_reconstruction
 from .modes import BEST_OF
@@ -244,29 +244,20 @@ def of_rigid_body(made: Reconstruction) -> ChoiceResult:
 
 def of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
     """Measure what was made of a whole body, whose joints have balls of these radii, shape (joints,), in metres."""
-    ground = Ground.of(made)
-    rows: dict[str, Metrics] = {}
-    joints: list[JointMetrics] = []
-    errors: dict[str, BodyErrors] = {}
-    groups = identical_body_modes(made)
-    for mode in made.keys:
-        found = measure_body(made, mode, radii, ground)
-        rows[mode] = row_of_body(made, mode, found, ground)
-        joints += joint_rows(made, mode, found)
-        if mode in (group[0] for group in groups):
-            errors[mode] = found
+    measured = measure_modes(made, radii)
+    rows = {row.mode: row for row in measured.rows}
     motions = [
         Motion(
             group,
             tuple(rows[mode] for mode in group),
             key_samples(made.keys[group[0]]),
-            _places(errors[group[0]].places),
-            np.stack([errors[group[0]].shell.max(axis=0), *errors[group[0]].largest]),
-            errors[group[0]].shell,
+            _places(errors.places),
+            np.stack([errors.shell.max(axis=0), *errors.largest]),
+            errors.shell,
         )
-        for group in groups
+        for group, errors in zip(measured.groups, measured.errors.values(), strict=True)
     ]
-    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=tuple(joints))
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=measured.joints)
 
 
 def _places(positions: np.ndarray) -> Poses:

@@ -13,7 +13,6 @@ import pytest
 from rigid_motion_batch.analysis import bodies
 from rigid_motion_batch.analysis.bodies import Ground, measure_body, reconstruct_body
 from rigid_motion_batch.analysis.body_metrics import (
-    COLUMNS,
     MeasuredBody,
     join_tables,
     key_samples,
@@ -24,6 +23,7 @@ from rigid_motion_batch.analysis.body_metrics import (
 )
 from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import body_table_names, write_metrics
+from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.rows import meant
 from tests.scripts.clips.bodies import JOINTS, swinging_body
 
@@ -119,14 +119,15 @@ def test_blocks_of_samples_make_no_difference_to_any_row(monkeypatch: pytest.Mon
         for field in fields(one):
             expected, found = getattr(one, field.name), getattr(other, field.name)
             assert found == (pytest.approx(expected, abs=1e-12) if isinstance(expected, float) else expected)
-    for mode, shown in whole.modes.items():
-        np.testing.assert_allclose(pieces.modes[mode].by_joint, shown.by_joint, atol=1e-12)
+    for mode, errors in whole.errors.items():
+        np.testing.assert_allclose(pieces.errors[mode].shell, errors.shell, atol=1e-12)
+        np.testing.assert_allclose(pieces.errors[mode].largest, errors.largest, atol=1e-9)
 
 
 def test_modes_that_are_one_motion_are_shown_once_and_have_a_row_each() -> None:
     found = measured()
     assert ("dq_sclerp", "cga_slerp") in found.groups
-    assert set(found.modes) == {group[0] for group in found.groups}
+    assert set(found.errors) == {group[0] for group in found.groups}
     rows = {row.mode: row for row in found.rows}
     assert replace(rows["cga_slerp"], mode="dq_sclerp").rms_shell_m == pytest.approx(rows["dq_sclerp"].rms_shell_m)
 
@@ -135,17 +136,15 @@ def test_modes_that_are_one_motion_are_shown_once_and_have_a_row_each() -> None:
 def test_what_is_shown_has_the_largest_errors_and_where_the_joints_are_then(seconds: float) -> None:
     clip = swinging_body(seconds=seconds)
     made = reconstruct_body(clip, Uniform("5"), ("lerp_slerp",), RADII)
-    shown = measure_modes(made, RADII).modes["lerp_slerp"]
+    shown = measure_modes(made, RADII).errors["lerp_slerp"]
     errors = measure_body(made, "lerp_slerp", RADII, Ground.of(made)).shell
-    joint, sample, error = shown.worst
-    assert error == errors.max() == errors[joint, sample] == shown.over_time.max() == shown.by_joint.max()
-    np.testing.assert_array_equal(shown.over_time, errors.max(axis=0))
-    np.testing.assert_array_equal(shown.by_joint.max(axis=1), errors.max(axis=1))
-    assert shown.by_joint.shape == (len(JOINTS), min(COLUMNS, errors.shape[1]))
-    np.testing.assert_array_equal(shown.errors, errors[:, sample])
-    truth = clip.figure.skeleton.in_root_space(clip.poses[:, made.samples])[:, sample].positions * 0.01
-    np.testing.assert_allclose(shown.truth.positions, truth, atol=1e-12)
-    assert np.linalg.norm(shown.shown.positions - truth, axis=-1).max() <= error
+    joint, sample = shown.worst
+    assert errors.max() == errors[joint, sample] == shown.shell.max()
+    np.testing.assert_array_equal(shown.shell, errors)
+    truth = to_blender(clip.figure.skeleton.in_root_space(clip.poses[:, made.samples])[:, sample], clip.axes)
+    away = np.linalg.norm(shown.places[:, sample] - 0.01 * truth.positions, axis=-1)
+    assert away.max() <= errors[:, sample].max()
+    assert away.max() == pytest.approx(shown.largest[0, sample], abs=1e-6)
 
 
 def test_how_many_numbers_keys_take_counts_times_turns_and_places_that_vary() -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.analysis.body_needed import NEAR, OfBody
 from rigid_motion_batch.analysis.metrics import NOTHING
-from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, evenly_spaced, from_json, keys_needed, to_json
+from rigid_motion_batch.analysis.needed import RATES, KeysNeeded, evenly_spaced, keys_needed
+from rigid_motion_batch.pipeline import values
 from tests.motion.bodies import body_errors
 from tests.scripts.clips.bodies import JOINTS, PARENTS, still_body, swinging_body
 
@@ -91,8 +94,9 @@ def test_a_body_of_which_nothing_moves_needs_nothing() -> None:
     assert np.isnan(nothing.keys).all()
 
 
-def test_what_was_found_is_read_back_as_it_was(found: KeysNeeded) -> None:
-    again = from_json(to_json(found))
+def test_what_was_found_is_read_back_as_it_was(found: KeysNeeded, tmp_path: Path) -> None:
+    values.write(tmp_path / "needed", found)
+    again = values.read(KeysNeeded, tmp_path / "needed")
     assert again.groups == found.groups
     for name in ("keys", "reached", "targets", "durations", "reference_keys", "uniform_errors"):
         np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
