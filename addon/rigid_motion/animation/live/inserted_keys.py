@@ -305,7 +305,8 @@ def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: 
 
 def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
     """Give a key this value, handles along with it; insert one that the channel lacks."""
-    keys, (number, times) = fcurve.keyframe_points, nearest_key(fcurve, frame)
+    keys, (number, points) = fcurve.keyframe_points, nearest_key(fcurve, frame)
+    times = points[:, 0]
     if len(times) and abs(times[number] - frame) < SAME_FRAME:
         keys[number].co_ui.y = value
     else:
