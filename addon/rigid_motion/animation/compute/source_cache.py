@@ -122,7 +122,12 @@ def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
 
 def _differ(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> np.ndarray:
     """Which of the keys differ in anything, shape (n,), where there are equally many."""
-    return np.logical_or.reduce([(before[name] != after[name]).any(axis=_OTHER_AXES[name]) for name in before])
+    differ = np.zeros(before["interpolation"].shape[1], dtype=bool)
+    for name, array in before.items():
+        # Most are the same throughout, which is told ten times as quickly.
+        if array.tobytes() != after[name].tobytes():
+            differ |= (array != after[name]).any(axis=_OTHER_AXES[name])
+    return differ
 
 
 def _part(name: str, array: np.ndarray, part: slice) -> np.ndarray:

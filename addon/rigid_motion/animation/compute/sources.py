@@ -281,8 +281,8 @@ class Source:
 
         A mode that begins within a segment does not act there.
         """
-        segment = np.searchsorted(self.key_frames, frame, side="right") - 1
-        return int(self.modes[np.clip(segment, 0, len(self.modes) - 1)])
+        segment = int(np.searchsorted(self.key_frames, frame, side="right")) - 1
+        return int(self.modes[min(max(segment, 0), len(self.modes) - 1)])
 
     @cached_property
     def segment_turns(self) -> np.ndarray:
