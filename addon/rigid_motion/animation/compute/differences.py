@@ -294,7 +294,9 @@ def _prepared(sources: Sequence[Source]) -> tuple[np.ndarray, Ends, np.ndarray |
     idle = np.zeros(len(modes), dtype=bool)
     if ends.turning is not None:
         idle = are_idle(weights, ends.turning.spins.turns)
-    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
+    has_handles = smooth
+    if smooth.any():
+        has_handles = smooth & np.concatenate([source.has_handles for source in sources])
     if has_handles.any():
         measured = measured_in(ends.times, segments)
         progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]

@@ -5,6 +5,7 @@ They are kept by their digests, which the Actions keep too, so that undo and red
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 
 import numpy as np
@@ -66,7 +67,7 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
         and not (old.passed.any() or new.passed.any())
         and {row: value for row, value in old.rest.items() if row >= 3}
         == {row: value for row, value in new.rest.items() if row >= 3}
-        and np.array_equal(old.original, new.original)
+        and old.original.tobytes() == new.original.tobytes()
         and _axes_bytes(old) == _axes_bytes(new)
         and _mode_bytes(old) == _mode_bytes(new)
         and _turns_bytes(old) == _turns_bytes(new)
@@ -85,12 +86,12 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
     ends = []
     for source in (old, new):
         keys = source.key_frames
-        before = np.searchsorted(keys, first, side="right") - 1 - margin
-        behind = np.searchsorted(keys, last) + margin
+        before = int(keys.searchsorted(first, side="right")) - 1 - margin
+        behind = int(keys.searchsorted(last)) + margin
         ends.append((keys[max(before, 0)], keys[min(behind, len(keys) - 1)]))
     begin, end = new.frame_range
-    first = min(max(int(np.floor(min(first for first, _ in ends))), begin), end)
-    return first, max(first, min(int(np.ceil(max(last for _, last in ends))), end))
+    first = min(max(math.floor(min(first for first, _ in ends)), begin), end)
+    return first, max(first, min(math.ceil(max(last for _, last in ends)), end))
 
 
 def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
