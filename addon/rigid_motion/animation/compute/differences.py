@@ -158,7 +158,7 @@ def differences(
         delta = rows[: filled_height(portion)]
         _move(portion, frames, rows, delta)
         for source, place in samples:
-            if source.is_on_top and not np.array_equal(source.original, REST):
+            if source.is_on_top and (source.original != REST).any():
                 take_off(delta[:, place], source.original)
         order = portion[0].order
         partial = [(source, place) for source, place in samples if source.influence is not None]

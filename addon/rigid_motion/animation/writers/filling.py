@@ -138,7 +138,7 @@ def _edit_of(place: SlotTransform, source: Source, need: Need) -> _Edit | None:
 def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source, Need]]:
     """Fill in a range of samples of each. Those for which that will not do are returned, and left as they are."""
     others = []
-    fixed = [edit.need._replace(fewest=edit.layout.rate, most=edit.layout.rate) for edit in edits]
+    fixed = [Need(edit.need.tolerance, edit.need.reach, edit.layout.rate, edit.layout.rate) for edit in edits]
     found = sampled([edit.source for edit in edits], fixed, [edit.span for edit in edits])
     for (place, source, need, layout, (first, last)), samples in zip(edits, found, strict=True):
         channels, rows, before = _channels(place, source), recorded_rows(place), recorded(place)
