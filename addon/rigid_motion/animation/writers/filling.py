@@ -21,8 +21,8 @@ from ..actions.records import record_in_betweens, recorded, recorded_digest, rec
 from ..actions.slots import SlotTransform, is_filled_in, is_time, slot_transforms_in
 from ..compute.between_samples import Samples
 from ..compute.components import PART_OF, ROTATION
-from ..compute.differences import NOTHING
 from ..compute.sample_rates import Need, error_of, sampled
+from ..compute.samples import NOTHING
 from ..compute.source_cache import cached_source, changed_range
 from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
@@ -155,14 +155,15 @@ def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source
             others.append((place, source, need))
             continue
         present[:] = values
-        pieces, error = corners(source, dict(zip(rows, written, strict=True)), layout, need)
+        all_samples = dict(zip(rows, written, strict=True))
+        pieces, error = corners(source, all_samples, layout, need)
         for row, fcurve, points in zip(rows, curves, written, strict=True):
             fcurve.sampled_points.foreach_set("co", points)
             layout.modify(fcurve, pieces.get(row, ()))
         elsewhere = before.error
         if math.isfinite(need.tolerance):
             if elsewhere > need.tolerance and elsewhere > samples.error:
-                elsewhere = error_of(source, dict(zip(rows, written, strict=True)), before.rate, need.reach)
+                elsewhere = error_of(source, all_samples, before.rate, need.reach)
             elsewhere = max(samples.error, error, elsewhere)
         record_in_betweens(place, source.digest, rows, before.rate, elsewhere)
         _tag(place)
