@@ -252,22 +252,24 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
         apart = {pair.differences for pair in motion.bone_slots}
-        # Those of bones first: one that lies outside is enough to know.
-        samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves]
-        begin, end = math.inf, -math.inf
+        # Those of bones first: one that lies outside is enough to know, and in a draft any is going to again.
+        most = 1 if is_draft(action) else None
+        samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves[:most]]
+        begin, end, span = math.inf, -math.inf, None
         for bag in bags:
             for fcurve in bag.fcurves if bag.slot_handle not in apart else ():
-                first, last = fcurve.range()
+                # There may be thousands, most with keys on the same frames: no more is asked than is needed.
+                if (own := fcurve.range()) == span:
+                    continue
+                first, last = own
                 if begin <= first and last <= end:
-                    # There may be thousands: no more is asked than is needed.
                     continue
                 if not _has_range(fcurve):
                     continue
                 if is_filled_in(fcurve) or is_time(fcurve):
                     samples.append(fcurve)
                 else:
-                    begin, end = min(begin, first), max(end, last)
-        # Those of a draft are going to lie outside again.
+                    begin, end, span = min(begin, first), max(end, last), own
         is_outside = (samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)
         if begin <= end and is_outside:
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):
