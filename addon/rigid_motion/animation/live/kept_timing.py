@@ -115,9 +115,14 @@ class Insertion:
         return int(np.searchsorted(self.old.key_frames, self.frame)) - 1
 
     @property
+    def ends(self) -> list[float]:
+        """The frames that this begins and ends on."""
+        return self.old.key_frames[self.segment : self.segment + 2].tolist()
+
+    @property
     def moments(self) -> np.ndarray:
         """`MOMENTS` before the key and then behind it, as frames."""
-        first, last = self.old.key_frames[self.segment : self.segment + 2]
+        first, last = self.ends
         moments = np.concatenate((first + (self.frame - first) * MOMENTS, self.frame + (last - self.frame) * MOMENTS))
         # On the last frame the next segment begins.
         moments[-1] = np.nextafter(last, first)
@@ -149,19 +154,20 @@ def _channels_of(insertions: Sequence[Insertion]) -> tuple[_Channels | None, lis
     found, handles, others = [], [], []
     for owner, inserted in enumerate(insertions):
         old, filled = inserted.old, inserted.old.filled_rows
-        first, last = old.key_frames[inserted.segment : inserted.segment + 2].tolist()
+        first, last = inserted.ends
+        frames = np.array((first, inserted.frame, last))
         for rows, keys in old.channels:
             chosen = []
             for number, row in enumerate(rows):
-                beside, points = _keys_on(inserted.curves[row], np.array((first, inserted.frame, last)))
+                beside, points = _keys_on(inserted.curves[row], frames)
                 has_handles = keys.left is not None and beside is not None and beside[0].interpolation == "BEZIER"
                 if has_handles:
                     chosen.append(number)
                     found.append((owner, beside, points, _weight(old, row) if row in filled else 0.0))
                 if not has_handles or row not in filled:
                     others.append((owner, row, None if has_handles else points))
-            before, behind = (int(np.abs(keys.times - frame).argmin()) for frame in (first, last))
             if chosen:
+                before, behind = (int(np.abs(keys.times - frame).argmin()) for frame in (first, last))
                 ends = [(side[chosen, before], side[chosen, behind]) for side in (keys.points, keys.left, keys.right)]
                 handles.append((*itertools.chain(*ends), np.full(len(chosen), inserted.frame)))
     if not found:
