@@ -213,6 +213,11 @@ class Editing(RuleBasedStateMachine):
             self.history[self.place + 1 :] = [self._remembered()]
             self.place += 1
 
+    def _only_share_out_turns(self, made: dict, after: dict) -> None:
+        """Keys are as the edit made them, but for turns, which new keys share out."""
+        for name in self.names:
+            assert without_turns(after[name]) == without_turns(made[name]), f"the keys of {name} were changed"
+
     def _curve(self, obj: Carrier, share: float) -> bpy.types.FCurve | None:
         curves = [c for (path, _), c in curves_of(obj).items() if path in WIDTHS and len(c.keyframe_points)]
         return curves[int(share * len(curves))] if curves else None
@@ -327,11 +332,7 @@ class Editing(RuleBasedStateMachine):
                     value = random_values(obj, path, 1, seed)[0, index]
                     fcurve.keyframe_points.insert(frame, value)
 
-        def settle(made: dict, after: dict) -> None:
-            for other in self.names:
-                assert without_turns(after[other]) == without_turns(made[other]), f"the keys of {other} were changed"
-
-        self._edit(insert, settle)
+        self._edit(insert, self._only_share_out_turns)
 
     @rule(who=shares, which=shares, to=frames_in, one_channel=st.booleans(), with_mode=st.booleans())
     def move_keys(self, who, which, to, one_channel, with_mode):

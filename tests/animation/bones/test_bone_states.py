@@ -110,7 +110,7 @@ class EditingBones(RigEditing):
                 setattr(bone, path, random_values(bone, path, 1, seed)[0])
                 bone.keyframe_insert(path, frame=frame)
 
-        self._edit(change)
+        self._edit(change, self._only_share_out_turns)
 
     @precondition(lambda self: self.on)
     @rule(who=shares, order=st.sampled_from(ORDERS), rekeyed=st.booleans(), seed=seeds)

@@ -30,7 +30,7 @@ from .influences import blended, undo_blending
 from .key_speeds import MEASURED, corrected
 from .neighbours import packed
 from .progress import are_idle, progress_weights
-from .samples import NOTHING, held_rows, range_of_each
+from .samples import kept_rows, range_of_each
 from .sources import MODE_NAMES, MODE_NUMBERS, Source
 
 AT_ONCE = 131072
@@ -158,7 +158,7 @@ def differences(
         delta = rows[: filled_height(portion)]
         _move(portion, frames, rows, delta)
         for source, place in samples:
-            if source.is_on_top and not np.array_equal(source.original, REST):
+            if source.is_on_top and (source.original != REST).any():
                 take_off(delta[:, place], source.original)
         order = portion[0].order
         partial = [(source, place) for source, place in samples if source.influence is not None]
@@ -177,14 +177,14 @@ def differences(
         errors = itertools.repeat(0.0)
         if reaches is not None:
             errors = largest_errors(delta, samples, spans, [reach_of[id(source)] for source in portion])
-        first, differs = delta[:, starts], range_of_each(delta, starts) > NOTHING
+        kept = [source.filled_rows for source in portion]
+        if ranges is None:
+            kept = kept_rows(portion, delta[:, starts], range_of_each(delta, starts))
         points = points.view(np.float32).reshape(*rows.shape, 2)[: len(delta)]
         points[..., 0] = np.concatenate(frames)
         points[..., 1] = delta
-        for number, ((source, place), error) in enumerate(zip(samples, errors, strict=False)):
-            changing = {row for row in source.filled_rows if differs[row, number] or ranges is not None}
-            held = held_rows(source, changing, first[:, number])
-            own = Samples({row: points[row, place].ravel() for row in sorted(changing | held)})
+        for (source, place), rows_of_source, error in zip(samples, kept, errors, strict=False):
+            own = Samples({row: points[row, place].ravel() for row in rows_of_source})
             own.rate, own.error = rate_of[id(source)], float(error)
             found[id(source)] = own
     return [found[id(source)] for source in sources]
@@ -294,7 +294,9 @@ def _prepared(sources: Sequence[Source]) -> tuple[np.ndarray, Ends, np.ndarray |
     idle = np.zeros(len(modes), dtype=bool)
     if ends.turning is not None:
         idle = are_idle(weights, ends.turning.spins.turns)
-    has_handles = smooth & np.concatenate([source.has_handles for source in sources])
+    has_handles = smooth
+    if smooth.any():
+        has_handles = smooth & np.concatenate([source.has_handles for source in sources])
     if has_handles.any():
         measured = measured_in(ends.times, segments)
         progress = np.einsum("rs,rsk->sk", weights, measured) - offsets[:, None]

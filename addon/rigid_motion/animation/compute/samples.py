@@ -13,7 +13,16 @@ NOTHING = 1e-9
 """What a component varies by that is always the same but for rounding errors."""
 
 
-def held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:
+def kept_rows(sources: Sequence[Source], first: np.ndarray, ranges: np.ndarray) -> list[list[int]]:
+    """The rows that each source has samples of, in which these are at first and vary by this much, (., sources)."""
+    kept = []
+    for source, constant, varies in zip(sources, first.T, (ranges > NOTHING).T.tolist(), strict=True):
+        changing = {row for row in source.filled_rows if varies[row]}
+        kept.append(sorted(changing | _held_rows(source, changing, constant)))
+    return kept
+
+
+def _held_rows(source: Source, changing: set[int], constant: np.ndarray) -> set[int]:
     """The rows that never change, and have to be held all the same, of what is constant (.,) in them.
 
     The components of a quaternion are one by one only where they are zero. In the NLA Blender puts what a strip has no

@@ -5,6 +5,7 @@ They are kept by their digests, which the Actions keep too, so that undo and red
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 
 import numpy as np
@@ -66,7 +67,7 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
         and not (old.passed.any() or new.passed.any())
         and {row: value for row, value in old.rest.items() if row >= 3}
         == {row: value for row, value in new.rest.items() if row >= 3}
-        and np.array_equal(old.original, new.original)
+        and old.original.tobytes() == new.original.tobytes()
         and _axes_bytes(old) == _axes_bytes(new)
         and _mode_bytes(old) == _mode_bytes(new)
         and _turns_bytes(old) == _turns_bytes(new)
@@ -85,12 +86,12 @@ def changed_range(old: Source, new: Source) -> tuple[int, int] | None:
     ends = []
     for source in (old, new):
         keys = source.key_frames
-        before = np.searchsorted(keys, first, side="right") - 1 - margin
-        behind = np.searchsorted(keys, last) + margin
+        before = int(keys.searchsorted(first, side="right")) - 1 - margin
+        behind = int(keys.searchsorted(last)) + margin
         ends.append((keys[max(before, 0)], keys[min(behind, len(keys) - 1)]))
     begin, end = new.frame_range
-    first = min(max(int(np.floor(min(first for first, _ in ends))), begin), end)
-    return first, max(first, min(int(np.ceil(max(last for _, last in ends))), end))
+    first = min(max(math.floor(min(first for first, _ in ends)), begin), end)
+    return first, max(first, min(math.ceil(max(last for _, last in ends)), end))
 
 
 def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
@@ -122,7 +123,12 @@ def _changed(old: Keys, new: Keys) -> tuple[float, float] | None:
 
 def _differ(before: dict[str, np.ndarray], after: dict[str, np.ndarray]) -> np.ndarray:
     """Which of the keys differ in anything, shape (n,), where there are equally many."""
-    return np.logical_or.reduce([(before[name] != after[name]).any(axis=_OTHER_AXES[name]) for name in before])
+    differ = np.zeros(before["interpolation"].shape[1], dtype=bool)
+    for name, array in before.items():
+        # Most are the same throughout, which is told ten times as quickly.
+        if array.tobytes() != after[name].tobytes():
+            differ |= (array != after[name]).any(axis=_OTHER_AXES[name])
+    return differ
 
 
 def _part(name: str, array: np.ndarray, part: slice) -> np.ndarray:

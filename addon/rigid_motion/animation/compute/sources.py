@@ -150,17 +150,17 @@ class Source:
         """What is written on keys, as components, shape (10,)."""
         return REST if self.is_on_top else self.original
 
-    @property
+    @cached_property
     def curves(self) -> list[Keys]:
         """The keys of all channels that have any."""
         return [keys for _, keys in self.channels]
 
-    @property
+    @cached_property
     def key_count(self) -> int:
         """How many keys its channels have."""
         return sum(keys.interpolation.size for keys in self.curves)
 
-    @property
+    @cached_property
     def is_together(self) -> bool:
         """Whether all channels have their keys on the same frames, and go through them once."""
         return len(self.channels) == 1 and self.cyclic is None and self.shaping is None
@@ -220,7 +220,7 @@ class Source:
             max(float(keys.times[-1]) for keys in self.curves),
         )
 
-    @property
+    @cached_property
     def goes_on(self) -> bool:
         """Whether any channel goes on outside of its keys, by cycles or at its slope."""
         return any(keys.linear or keys.cycles is not None for keys in self.curves)
@@ -255,7 +255,7 @@ class Source:
             change[3:6] -= FULL_TURN * np.rint(change[3:6] / FULL_TURN) if turning > 1 else change[3:6]
         return bool(np.abs(change[3:]).max() < 1e-6)
 
-    @property
+    @cached_property
     def is_smooth(self) -> bool:
         """Whether a mode in it looks at the keys around a segment."""
         numbers = np.unique(np.rint(self.mode.values)) if isinstance(self.mode, Keys) else (self.mode,)
@@ -281,8 +281,8 @@ class Source:
 
         A mode that begins within a segment does not act there.
         """
-        segment = np.searchsorted(self.key_frames, frame, side="right") - 1
-        return int(self.modes[np.clip(segment, 0, len(self.modes) - 1)])
+        segment = int(np.searchsorted(self.key_frames, frame, side="right")) - 1
+        return int(self.modes[min(max(segment, 0), len(self.modes) - 1)])
 
     @cached_property
     def segment_turns(self) -> np.ndarray:
@@ -340,7 +340,7 @@ class Source:
         # Channels keep these keys: one without a key on the others would be elsewhere there.
         return replace(self, shaping=self.key_frames[~self.passed])
 
-    @property
+    @cached_property
     def is_live(self) -> bool:
         """Whether there is a segment that is to be filled in otherwise than Blender does."""
         if not self.curves or len(self.key_frames) < 2:
@@ -391,7 +391,7 @@ class Source:
             first, last = min(first, self.seen[0] - longest), max(last, self.seen[1] + longest)
         return math.floor(first), math.ceil(last)
 
-    @property
+    @cached_property
     def filled_rows(self) -> list[int]:
         """The rows of the components that in-betweens may differ in from Blender's."""
         rows = list(range(10) if self.uniform_scale else range(7))
@@ -431,7 +431,7 @@ class Source:
             codes.append(keys.interpolation[:, np.clip(np.searchsorted(keys.times, at, side="right") - 1, 0, None)])
         return np.concatenate(codes)
 
-    @property
+    @cached_property
     def is_elastic(self) -> bool:
         """Whether any key eases elastically, which depends on how far a channel goes."""
         return any(keys.easing is not None and np.any(keys.interpolation == ELASTIC) for keys in self.curves)

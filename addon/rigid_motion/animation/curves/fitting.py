@@ -41,7 +41,7 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
     array, shape (c, 2, 2)
         Time and value of either handle of each. No handle is longer in time than the segment.
     """
-    best, least = _cubic_in_time(times, values)
+    best, least = cubics_in_time(times, values[None])
     if least < GOOD:
         return np.repeat(best, len(shares), axis=0)
     # What is not the curve of one segment can be a mean of several, whose handles differ in time.
@@ -58,12 +58,16 @@ def fit_together(times: np.ndarray, values: np.ndarray, shares: np.ndarray, nati
     return best if len(best) == len(shares) else np.repeat(best, len(shares), axis=0)
 
 
-def _cubic_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the handles (1, 2, 2) of a segment that is a cubic in time, as most are, and the largest error."""
-    handles = np.stack((3.0 * times * (1.0 - times) ** 2, 3.0 * times * times * (1.0 - times)), axis=1)
+def cubics_in_time(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the handles (..., 2, 2) of segments that are cubics in time, as most are, and their largest errors (...).
+
+    They run from (0, 0) to (1, 1), nearest to values (..., m) at times (m,).
+    """
+    handles = np.stack((3.0 * times * (1.0 - times) ** 2, 3.0 * times * times * (1.0 - times)))
     wanted = values - times**3
-    y = np.linalg.lstsq(handles, wanted, rcond=None)[0]
-    return np.stack((STARTS[0], y), axis=1)[None], float(np.abs(handles @ y - wanted).max())
+    y = wanted @ np.linalg.pinv(handles)
+    found = np.stack((np.broadcast_to(STARTS[0], y.shape), y), axis=-1)
+    return found, np.abs(y @ handles - wanted).max(axis=-1)
 
 
 def _improved(x: np.ndarray, times: np.ndarray, values: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, float]:

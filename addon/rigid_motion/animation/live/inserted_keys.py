@@ -24,9 +24,10 @@ on as it did: see `kept_timing`.
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from collections import OrderedDict, defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -73,6 +74,52 @@ class _Posed:
     """Whether it has been evaluated so."""
 
 
+@dataclass(frozen=True)
+class _NewKey:
+    """A key that was inserted on the frame that is shown."""
+
+    user: Transform
+    """Of which it is, if it can be."""
+
+    posed: _Posed | None
+    """How that was posed on this frame."""
+
+    old: Source
+    """What was keyed without it."""
+
+    source: Source
+    """What is keyed by now."""
+
+    frame: float
+    """Of the Action."""
+
+    had: np.ndarray
+    """What the channels had there without it, shape (10,)."""
+
+    @cached_property
+    def numbers(self) -> dict[int, int]:
+        """The numbers of the keys on its frame, by the rows of the channels that have one."""
+        nearest = (
+            (rows, keys.times, int(np.abs(keys.times - self.frame).argmin())) for rows, keys in self.source.channels
+        )
+        return {
+            row: number
+            for rows, times, number in nearest
+            if abs(times[number] - self.frame) < SAME_FRAME
+            for row in rows
+        }
+
+    def has_values(self, shown: np.ndarray) -> bool:
+        """Whether every key on this frame has the value that the property had, of these components (10,)."""
+        for rows, keys in self.source.channels:
+            if rows[0] in self.numbers:
+                had = shown[rows]
+                off = np.abs(keys.values[:, self.numbers[rows[0]]] - had)
+                if np.any(off > TOLERANCE * np.maximum(1.0, np.abs(had))):
+                    return False
+        return True
+
+
 class InsertedKeys:
     """How transforms of a file were posed, for the keys that may be inserted of it."""
 
@@ -80,29 +127,46 @@ class InsertedKeys:
         self._posed: dict[tuple[int, str], _Posed] = {}
         self._whole: OrderedDict[tuple[tuple[int, str], bytes], _Posed] = OrderedDict()
         """The whole poses that undo and redo can bring back, by the transform and the components."""
-        self._had: dict[tuple[str, float], np.ndarray] = {}
-        """What the channels had, (10, 1), by the digest of a source and the frame, while keys are looked through."""
+        self._new: defaultdict[SlotTransform, list[_NewKey]] = defaultdict(list)
+        """The keys that were inserted in each place, as each of its users may have them, while edits are looked at."""
         self._insertions: list[Insertion] = []
         self._inserted: OrderedDict[tuple[str, str], tuple[np.ndarray, bool, bool]] = OrderedDict()
         """What undo and redo bring back is decided as it was: the components that there were, whether they were all of
         the pose, and whether they were the in-between as it was, by the digests before and after."""
 
-    def look_at(self, changes: Iterable[tuple[str, Source]], frame: float) -> None:
-        """Work out at once what the channels of many had on the frame that is shown, where keys were inserted on it.
+    def look_at(self, changes: Iterable[tuple[SlotTransform, str, Source]], frame: float) -> None:
+        """Find the keys that were inserted on the frame that is shown, and what the channels of all had there.
 
-        `changes` are the digests of what slots are filled in from, and the sources that they have now.
+        `changes` are places, the digests of what they are filled in from, and what is keyed in them now.
         """
-        olds = {
-            before: old
-            for before, source in changes
-            if (old := _before_insertion(before, source)) is not None and _is_inserted(old, source, frame)
-        }
-        values = values_of(list(olds.values()), [old.held(np.array([frame])) for old in olds.values()])
-        self._had = {(digest, frame): of_source for digest, of_source in zip(olds, values, strict=True)}
+        self._new.clear()
+        found = []
+        for place, before, source in changes:
+            if (old := _before_insertion(before, source)) is not None:
+                for user in self._by_precedence(place):
+                    data, own = user.animated.animation_data, frame
+                    if data.use_tweak_mode:
+                        own = data.nla_tweak_strip_time_to_scene(frame, invert=True)
+                    if _is_inserted(old, source, own):
+                        found.append((place, user, old, source, own))
+        had = values_of([old for _, _, old, *_ in found], [old.held(np.array([own])) for _, _, old, _, own in found])
+        for (place, user, old, source, own), values in zip(found, had, strict=True):
+            posed = self._posed.get(_identity(user))
+            posed = posed if posed is not None and posed.frame == frame else None
+            self._new[place].append(_NewKey(user, posed, old, source, own, values[:, 0]))
+
+    def _by_precedence(self, place: SlotTransform) -> list[Transform]:
+        """The users of a slot that a key may be of: first what was posed by hand, or else what is active."""
+        users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
+        if len(users) > 1:
+            layer = bpy.context.view_layer
+            active = None if layer is None else layer.objects.active
+            users.sort(key=lambda user: (_identity(user) not in self._posed, user.animated != active))
+        return users
 
     def keep_timing(self) -> None:
         """Have the motion go on as it did beside the keys that were given the pose of it."""
-        self._had.clear()
+        self._new.clear()
         insertions, self._insertions = self._insertions, []
         keep_timing(insertions)
 
@@ -181,60 +245,25 @@ class InsertedKeys:
             for transform in transforms:
                 self._posed.pop(_identity(transform), None)
 
-    def keep_pose(self, place: SlotTransform, before: str, source: Source, frame: float, *, again: bool) -> bool:
-        """Give a key that was inserted in between the pose that it is of.
+    def keep_pose(self, place: SlotTransform, *, again: bool) -> bool:
+        """Give a key that was found in a place the pose of one of the users of the slot, if it can be of any.
 
-        Parameters
-        ----------
-        place, source
-            As they are now, with the new key.
-        before : str
-            The digest of the source that the slot is filled in from.
-        frame : float
-            The frame that is shown, of the scene.
-        again : bool
-            Whether undo or redo brought the key back, and not an edit.
-
-        Returns
-        -------
-        bool
-            Whether there was such a key.
+        `again` is whether undo or redo brought the key back, and not an edit. Returns whether there was such a key.
         """
-        old = _before_insertion(before, source)
-        if old is None:
-            return False
-        users = [user for user in place.users if user.animated.animation_data.action == place.slot.action]
-        users.sort(key=self._precedence)
-        return any(self._keep_pose_of(user, place, old, source, frame, again) for user in users)
+        return any(self._keep_pose_of(place, key, again) for key in self._new.get(place, ()))
 
-    def _precedence(self, user: Transform) -> tuple[bool, bool]:
-        """Which of the users of a slot a key is of that comes first: what was posed by hand, or else what is active."""
-        layer = bpy.context.view_layer
-        active = None if layer is None else layer.objects.active
-        return _identity(user) not in self._posed, user.animated != active
-
-    def _keep_pose_of(
-        self, user: Transform, place: SlotTransform, old: Source, source: Source, frame: float, again: bool
-    ) -> bool:
-        """Give it the pose of one of the users of the slot, if it can be of that one."""
-        posed = self._posed.get(_identity(user))
-        posed = posed if posed is not None and posed.frame == frame else None
-        data = user.animated.animation_data
-        if data.use_tweak_mode:
-            frame = data.nla_tweak_strip_time_to_scene(frame, invert=True)
-        if not _is_inserted(old, source, frame):
-            return False
+    def _keep_pose_of(self, place: SlotTransform, key: _NewKey, again: bool) -> bool:
+        user, posed, old, source, frame = key.user, key.posed, key.old, key.source, key.frame
         change = old.digest, source.digest
-        decided, frames = self._inserted.get(change) if again else None, np.array([frame])
-        added = added_values(place, user, source, frames)[:, 0]
+        decided = self._inserted.get(change) if again else None
+        added = added_values(place, user, source, np.array([frame]))[:, 0]
         if decided is None:
-            had = self._had.get((old.digest, frame))
-            in_between = (old.values_at(old.held(frames)) if had is None else had)[:, 0] + added
+            in_between = key.had + added
             # A property that had no keys at all is where it is.
             unkeyed = [part not in old.keyed for part in PART_OF]
             in_between[unkeyed] = user.components()[unkeyed]
             shown = in_between if posed is None else posed.components
-            if not _has_values(source, frame, shown) or (posed is not None and not (posed.on_top or posed.is_shown)):
+            if not key.has_values(shown) or (posed is not None and not (posed.on_top or posed.is_shown)):
                 return False
             is_whole = posed is not None and posed.is_whole
             decided = shown, is_whole, not is_whole and _is_same(old, shown, in_between)
@@ -242,13 +271,16 @@ class InsertedKeys:
             if len(self._inserted) > MOST_INSERTED:
                 self._inserted.popitem(last=False)
         shown, is_whole, is_in_between = decided
-        left = rows_left_to(old.driven)
+        left = rows_left_to(old.driven) if old.driven else ()
         seen = (shown if is_whole else _seen_components(user, place, old, shown, frame)) - added
-        for row, channel in user.channels.items():
-            if row not in left and (fcurve := place.curves.get(channel)) is not None:
+        curves = {row: place.curves[channel] for row, channel in user.channels.items() if channel in place.curves}
+        for row, fcurve in curves.items():
+            if row in key.numbers and row not in left:
+                fcurve.keyframe_points[key.numbers[row]].co_ui.y = seen[row]
+                fcurve.update()
+            elif row not in left:
                 set_key(fcurve, frame, seen[row])
         if is_in_between and old.keyed_range[0] < frame < old.keyed_range[1]:
-            curves = {row: place.curves[channel] for row, channel in user.channels.items() if channel in place.curves}
             if not needs_turning(old):
                 mark_breakdown(curves.values(), old, frame)
             self._insertions.append(Insertion(curves, old, frame))
@@ -279,17 +311,6 @@ def _is_inserted(old: Source, new: Source, frame: float) -> bool:
     return old.is_live and old.mode_at(frame) != 0
 
 
-def _has_values(source: Source, frame: float, shown: np.ndarray) -> bool:
-    """Whether every key on this frame has the value that the property had."""
-    for rows, keys in source.channels:
-        place = int(np.argmin(np.abs(keys.times - frame)))
-        if abs(keys.times[place] - frame) < SAME_FRAME:
-            had = shown[rows]
-            if np.any(np.abs(keys.values[:, place] - had) > TOLERANCE * np.maximum(1.0, np.abs(had))):
-                return False
-    return True
-
-
 def _is_same(source: Source, components: np.ndarray, others: np.ndarray) -> bool:
     """Whether these are the same components (10,), as far as they are keyed."""
     rows = [row for own, _ in source.channels for row in own]
@@ -305,7 +326,8 @@ def _seen_components(user: Transform, place: SlotTransform, old: Source, shown: 
 
 def set_key(fcurve: bpy.types.FCurve, frame: float, value: float) -> None:
     """Give a key this value, handles along with it; insert one that the channel lacks."""
-    keys, (number, times) = fcurve.keyframe_points, nearest_key(fcurve, frame)
+    keys, (number, points) = fcurve.keyframe_points, nearest_key(fcurve, frame)
+    times = points[:, 0]
     if len(times) and abs(times[number] - frame) < SAME_FRAME:
         keys[number].co_ui.y = value
     else:

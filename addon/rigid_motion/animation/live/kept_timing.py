@@ -7,17 +7,19 @@ get the timing that the motion had, before the new key and behind it, and the ha
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import bpy
 import numpy as np
 
+from ..compute.components import PART_OF, ROTATION
 from ..compute.differences import progress_at
-from ..compute.sources import DEPENDS_ON_KEYS, SAME_FRAME, Source
-from ..curves import Keys
-from ..curves.fitting import fit_together
+from ..compute.sources import DEPENDS_ON_KEYS, SAME_FRAME, Source, values_of
+from ..curves.fitting import GOOD, cubics_in_time, fit_together
 from ..curves.solvers import bezier_cubics, solve_cubics
 
 MOMENTS = np.linspace(0.0, 1.0, 41)
@@ -31,56 +33,71 @@ STILL = 1e-6
 
 
 @dataclass(frozen=True)
-class _Channel:
-    """A channel that is not linear, with a new key, and with keys on both frames beside it."""
+class _Channels:
+    """c channels of several insertions that are not linear, with a new key, and with keys on both frames beside it."""
 
-    keys: list[bpy.types.Keyframe]
-    """The one before, the new one and the one behind."""
+    owners: np.ndarray
+    """The number of the insertion of each, shape (c,)."""
+
+    keys: list[list[bpy.types.Keyframe]]
+    """The one before, the new one and the one behind, of each."""
+
+    points: np.ndarray
+    """The frames and values of these, shape (c, 3, 2)."""
 
     outer: np.ndarray
-    """The handles before the first of them and behind the last, shape (2, 2)."""
+    """The handles before the first of them and behind the last, shape (c, 2, 2)."""
 
     native: np.ndarray
-    """Those between, with which its curve would stay as it was: before the new key and behind it, shape (2, 2, 2)."""
+    """Those between, with which a curve would stay as it was: before the new key and behind it, shape (c, 2, 2, 2)."""
 
-    weight: float
-    """What the square of its way counts for in that of all channels."""
+    weights: np.ndarray
+    """What the square of its way counts for in that of all channels, 0 where a curve is to stay as it was, (c,)."""
 
-    def way(self, side: int) -> np.ndarray:
-        """From one key to the next, before the new one or behind it, in frames and value."""
-        return np.array(self.keys[side + 1].co) - np.array(self.keys[side].co)
+    @cached_property
+    def ways(self) -> np.ndarray:
+        """From one key to the next, before the new one and behind it, in frames and value, shape (c, 2, 2)."""
+        return np.diff(self.points, axis=1)
 
-    def times(self, side: int) -> np.ndarray:
-        """The times of the native handles there, from 0 to 1, shape (2,)."""
-        return np.clip((self.native[side, :, 0] - self.keys[side].co.x) / self.way(side)[0], 0.0, 1.0)
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """What each counts for before the new key and behind it, shape (c, 2)."""
+        return self.weights[:, None] * self.ways[..., 1] ** 2
 
-    def set_handles(self, inner: Sequence[np.ndarray]) -> None:
-        """Set these before the new key and behind it, (2, 2) each, and the outer ones as they were."""
-        before, new, behind = self.keys
-        for key in self.keys:
-            key.handle_left_type = key.handle_right_type = "FREE"
-        before.handle_left, behind.handle_right = self.outer
-        (before.handle_right, new.handle_left), (new.handle_right, behind.handle_left) = inner
+    def times(self, chosen: np.ndarray, side: int) -> np.ndarray:
+        """The times of the native handles of some on one side, from 0 to 1, shape (k, 2)."""
+        begun = self.native[chosen, side, :, 0] - self.points[chosen, side, 0, None]
+        return np.clip(begun / self.ways[chosen, side, :1], 0.0, 1.0)
+
+    def set_handles(self, fitted: np.ndarray) -> None:
+        """Set handles (c, 2, 2, 2) of segments of unit size, or those of what stays as it was, and the outer ones."""
+        inner = self.points[:, :2, None] + fitted * self.ways[:, :, None]
+        inner = np.where(self.weights[:, None, None, None] > 0.0, inner, self.native)
+        for keys, outer, handles in zip(self.keys, self.outer.tolist(), inner.tolist(), strict=True):
+            before, new, behind = keys
+            for key in keys:
+                key.handle_left_type = key.handle_right_type = "FREE"
+            before.handle_left, behind.handle_right = outer
+            (before.handle_right, new.handle_left), (new.handle_right, behind.handle_left) = handles
 
 
 def nearest_key(fcurve: bpy.types.FCurve, frame: float) -> tuple[int, np.ndarray]:
-    """Return the number of the key that is nearest to a frame, 0 where there is none, and the times of all (n,)."""
-    points = np.empty(2 * len(fcurve.keyframe_points), np.float32)
-    fcurve.keyframe_points.foreach_get("co", points)
-    times = points[::2]
-    return int(np.abs(times - frame).argmin()) if len(times) else 0, times
+    """Return the number of the key nearest to a frame, 0 where there is none, and frame and value of all, (n, 2)."""
+    points = np.empty((len(fcurve.keyframe_points), 2), np.float32)
+    fcurve.keyframe_points.foreach_get("co", points.ravel())
+    return int(np.abs(points[:, 0] - frame).argmin()) if len(points) else 0, points
 
 
 def mark_breakdown(curves: Iterable[bpy.types.FCurve], old: Source, frame: float) -> None:
     """Make a new key a breakdown, where the path would be another one with a key more that shapes it."""
     if old.cyclic is None and old.mode_at(frame) in DEPENDS_ON_KEYS:
         for fcurve in curves:
-            number, times = nearest_key(fcurve, frame)
-            if len(times) and abs(times[number] - frame) < SAME_FRAME:
+            number, points = nearest_key(fcurve, frame)
+            if len(points) and abs(points[number, 0] - frame) < SAME_FRAME:
                 fcurve.keyframe_points[number].type = "BREAKDOWN"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Insertion:
     """A key that was inserted of the motion as it was."""
 
@@ -98,9 +115,14 @@ class Insertion:
         return int(np.searchsorted(self.old.key_frames, self.frame)) - 1
 
     @property
+    def ends(self) -> list[float]:
+        """The frames that this begins and ends on."""
+        return self.old.key_frames[self.segment : self.segment + 2].tolist()
+
+    @property
     def moments(self) -> np.ndarray:
         """`MOMENTS` before the key and then behind it, as frames."""
-        first, last = self.old.key_frames[self.segment : self.segment + 2]
+        first, last = self.ends
         moments = np.concatenate((first + (self.frame - first) * MOMENTS, self.frame + (last - self.frame) * MOMENTS))
         # On the last frame the next segment begins.
         moments[-1] = np.nextafter(last, first)
@@ -110,88 +132,122 @@ class Insertion:
 def keep_timing(insertions: Iterable[Insertion]) -> None:
     """Set the handles of new keys and of those beside them, where handles shape the segment."""
     shaped = [inserted for inserted in insertions if inserted.old.has_handles[inserted.segment]]
-    progress = progress_at([inserted.old for inserted in shaped], [inserted.moments for inserted in shaped])
-    for inserted, along in zip(shaped, progress, strict=True):
-        _keep_timing(inserted, along.reshape(2, -1))
+    if not shaped:
+        return
+    sources, moments = [inserted.old for inserted in shaped], [inserted.moments for inserted in shaped]
+    progress = np.reshape(progress_at(sources, moments), (-1, 2, len(MOMENTS)))
+    channels, others = _channels_of(shaped)
+    if channels is not None:
+        channels.set_handles(_fitted(channels, progress, _done_by(others, shaped)))
+    for inserted in shaped:
+        for fcurve in inserted.curves.values():
+            fcurve.update()
 
 
-def _keep_timing(inserted: Insertion, progress: np.ndarray) -> None:
-    """The same for one of them, from its progress at `MOMENTS` on either side, shape (2, m)."""
-    old, curves = inserted.old, inserted.curves
-    frames = np.insert(old.key_frames[inserted.segment : inserted.segment + 2], 1, inserted.frame)
-    channels, others = [], []
-    for rows, keys in old.channels:
-        outer, native = _handles_of(keys, frames) if keys.left is not None else (None, None)
-        for number, row in enumerate(rows):
-            weight = QUATERNION if old.order is None and 3 <= row < 7 else 1.0
-            beside = _keys_on(curves[row], frames)
-            if beside is None or beside[0].interpolation != "BEZIER":
-                others.append((row, weight, beside))
-                continue
-            channel = _Channel(beside, outer[number], native[number], weight)
-            if row in old.filled_rows:
-                channels.append(channel)
-            else:
-                channel.set_handles(channel.native)
-                others.append((row, weight, None))
-    done = np.zeros((2, len(MOMENTS)))
-    values = old.values_at(inserted.moments).reshape(-1, 2, len(MOMENTS)) if others else None
-    for row, weight, beside in others:
-        if beside is not None:
-            values[row] = [np.interp(MOMENTS, (0, 1), (key.co.y, after.co.y)) for key, after in pairwise(beside)]
-        way = values[row] - values[row, :, :1]
-        done += weight * way[:, -1:] * way
-    fitted = [_fitted(channels, side, progress[side], done[side]) for side in (0, 1)]
-    for number, channel in enumerate(channels):
-        channel.set_handles(
-            [
-                np.array(channel.keys[side].co) + handles[number] * channel.way(side)
-                for side, handles in enumerate(fitted)
-            ]
-        )
-    for fcurve in curves.values():
-        fcurve.update()
+Other = tuple[int, int, np.ndarray | None]
+"""What else does a part of the way: the number of an insertion, the row of a component, and frame and value of three
+keys (3, 2) between which it is linear."""
 
 
-def _keys_on(fcurve: bpy.types.FCurve, frames: Sequence[float]) -> list[bpy.types.Keyframe] | None:
-    """The keys on three frames, if there are any and none between them."""
-    at, times = nearest_key(fcurve, frames[1])
+def _channels_of(insertions: Sequence[Insertion]) -> tuple[_Channels | None, list[Other]]:
+    """Return the channels whose handles are set, if there are any, and what else does a part of the way."""
+    found, handles, others = [], [], []
+    for owner, inserted in enumerate(insertions):
+        old, filled = inserted.old, inserted.old.filled_rows
+        first, last = inserted.ends
+        frames = np.array((first, inserted.frame, last))
+        for rows, keys in old.channels:
+            chosen = []
+            for number, row in enumerate(rows):
+                beside, points = _keys_on(inserted.curves[row], frames)
+                has_handles = keys.left is not None and beside is not None and beside[0].interpolation == "BEZIER"
+                if has_handles:
+                    chosen.append(number)
+                    found.append((owner, beside, points, _weight(old, row) if row in filled else 0.0))
+                if not has_handles or row not in filled:
+                    others.append((owner, row, None if has_handles else points))
+            if chosen:
+                before, behind = (int(np.abs(keys.times - frame).argmin()) for frame in (first, last))
+                ends = [(side[chosen, before], side[chosen, behind]) for side in (keys.points, keys.left, keys.right)]
+                handles.append((*itertools.chain(*ends), np.full(len(chosen), inserted.frame)))
+    if not found:
+        return None, others
+    owners, beside, points, weights = zip(*found, strict=True)
+    start, end, outer_left, left, right, outer_right, frames = map(np.concatenate, zip(*handles, strict=True))
+    outer, native = np.stack((outer_left, outer_right), axis=1), _divided(start, right, left, end, frames)
+    return _Channels(np.array(owners), list(beside), np.stack(points), outer, native, np.array(weights)), others
+
+
+def _weight(source: Source, row: int) -> float:
+    return QUATERNION if source.order is None and PART_OF[row] == ROTATION else 1.0
+
+
+def _keys_on(
+    fcurve: bpy.types.FCurve, frames: np.ndarray
+) -> tuple[list[bpy.types.Keyframe], np.ndarray] | tuple[None, None]:
+    """The keys on three frames, and frame and value of each (3, 2), if there are any and none between them."""
+    at, all_points = nearest_key(fcurve, frames[1])
     beside = slice(max(at - 1, 0), at + 2)
-    is_beside = len(times[beside]) == 3 and np.abs(times[beside] - frames).max() < SAME_FRAME
-    return fcurve.keyframe_points[beside] if is_beside else None
+    points = all_points[beside].astype(np.float64)
+    if len(points) < 3 or np.abs(points[:, 0] - frames).max() >= SAME_FRAME:
+        return None, None
+    return fcurve.keyframe_points[beside], points
 
 
-def _handles_of(keys: Keys, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what `_Channel` has as `outer` and `native` of c channels, from a new key between two frames."""
-    before, behind = (int(np.argmin(np.abs(keys.times - frame))) for frame in frames[::2])
-    outer = np.stack((keys.left[:, before], keys.right[:, behind]), axis=1)
-    start, end = keys.points[:, before], keys.points[:, behind]
-    first, second, third = bezier_cubics(start, keys.right[:, before], keys.left[:, behind], end)
-    start, duration = start.astype(np.float64), keys.times[behind] - keys.times[before]
-    at = np.full(len(start), (frames[1] - keys.times[before]) / duration)
-    t = solve_cubics(at, np.stack((first, second, third))[..., 0] / duration)[:, None]
+def _divided(start: np.ndarray, right: np.ndarray, left: np.ndarray, end: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Return the inner handles of both parts (c, 2, 2, 2) that Bezier curves are divided into on a frame of each, (c,).
+
+    The curves run from `start` to `end` by the handles `right` and `left`, (c, 2).
+    """
+    first, second, third = bezier_cubics(start, right, left, end)
+    start, duration = start.astype(np.float64), end[:, 0].astype(np.float64) - start[:, 0]
+    t = solve_cubics((frames - start[:, 0]) / duration, np.stack((first, second, third))[..., 0] / duration)[:, None]
     # The control points of the cubic, and those of both parts by de Casteljau.
     p = [start, start + first / 3.0, start + (2.0 * first + second) / 3.0, start + first + second + third]
     q = [a + t * (b - a) for a, b in pairwise(p)]
     r = [a + t * (b - a) for a, b in pairwise(q)]
-    return outer, np.stack((np.stack((q[0], r[0]), axis=1), np.stack((r[1], q[2]), axis=1)), axis=1)
+    return np.stack((np.stack((q[0], r[0]), axis=1), np.stack((r[1], q[2]), axis=1)), axis=1)
 
 
-def _fitted(channels: Sequence[_Channel], side: int, progress: np.ndarray, done: np.ndarray) -> np.ndarray:
-    """Return the handles (c, 2, 2) of channels on one side of a new key, where that is a segment of unit size.
+def _done_by(others: Sequence[Other], insertions: Sequence[Insertion]) -> np.ndarray:
+    """Return what these do of the way at `MOMENTS` on either side of each insertion (k, 2, m), as in `_Channels`."""
+    done = np.zeros((len(insertions), 2, len(MOMENTS)))
+    asked = [insertions[owner] for owner in dict.fromkeys(owner for owner, _, points in others if points is None)]
+    found = values_of([inserted.old for inserted in asked], [inserted.moments for inserted in asked])
+    values_in = dict(zip(asked, found, strict=True))
+    for owner, row, points in others:
+        inserted = insertions[owner]
+        if points is None:
+            values = values_in[inserted][row].reshape(2, -1)
+        else:
+            values = points[:2, 1, None] + np.diff(points[:, 1])[:, None] * MOMENTS
+        way = values - values[:, :1]
+        done[owner] += _weight(inserted.old, row) * way[:, -1:] * way
+    return done
+
+
+def _fitted(channels: _Channels, progress: np.ndarray, done: np.ndarray) -> np.ndarray:
+    """Return the handles (c, 2, 2, 2) before new keys and behind them, where these segments are of unit size.
 
     Parameters
     ----------
-    channels, side
-    progress : array, shape (m,)
-        What the motion has there at `MOMENTS`.
-    done : array, shape (m,)
+    channels
+    progress : array, shape (k, 2, m)
+        What the motion of each insertion has at `MOMENTS`.
+    done : array, shape (k, 2, m)
         What the other channels do of the way by then, as its part of the square of all.
     """
-    shares = np.array([channel.weight * channel.way(side)[1] ** 2 for channel in channels])
-    way, sum_of_shares = progress[-1] - progress[0], shares.sum()
-    if abs(way) < STILL or sum_of_shares == 0.0:
-        return np.repeat((((1.0, 1.0), (2.0, 2.0)),), len(channels), axis=0) / 3.0
-    wanted = (progress - progress[0]) / way * (done[-1] + sum_of_shares) - done
-    native = np.stack([channel.times(side) for channel in channels])
-    return fit_together(MOMENTS, wanted / sum_of_shares, shares / sum_of_shares, native)
+    sums = np.zeros(progress.shape[:2])
+    np.add.at(sums, channels.owners, channels.shares)
+    begun = progress - progress[..., :1]
+    moves = (np.abs(begun[..., -1]) >= STILL) & (sums > 0.0)
+    way, total = np.where(moves, (begun[..., -1], sums), 1.0)
+    wanted = (begun / way[..., None] * (done[..., -1] + total)[..., None] - done) / total[..., None]
+    handles, errors = cubics_in_time(MOMENTS, wanted)
+    handles[~moves] = np.array(((1.0, 1.0), (2.0, 2.0))) / 3.0
+    found = handles[channels.owners]
+    for owner, side in np.argwhere(moves & (errors >= GOOD)).tolist():
+        chosen = np.flatnonzero((channels.owners == owner) & (channels.weights > 0.0))
+        shares = channels.shares[chosen, side] / sums[owner, side]
+        found[chosen, side] = fit_together(MOMENTS, wanted[owner, side], shares, channels.times(chosen, side))
+    return found

@@ -20,7 +20,7 @@ from ..actions.slots import SlotTransform, places_of
 from ..compute.components import PART_OF
 from ..queries.visible_pose import shown_components
 from ..transforms import WIDTHS, Refused, Transform, transform_of
-from ..writers.table import shown_differences
+from ..writers.table import shown_parts
 
 
 class LeftInPlace:
@@ -63,19 +63,14 @@ class LeftInPlace:
         left = {}
         for transform, parts in animated.items():
             with suppress(Refused):
-                loose = _parts_on(transform) - parts
+                loose = shown_parts(transform) - parts
                 if loose and transform.animated.is_editable:
                     loose -= set().union(*(_animated_parts(transform, place) for place in places_of(transform)))
                     left[transform] = loose, shown_components(transform)
         yield
         for transform, (loose, seen) in left.items():
             with suppress(Refused):
-                transform.set_components(seen, loose - _parts_on(transform) - self._set.get(transform, set()))
-
-
-def _parts_on(transform: Transform) -> set[str]:
-    """Which of location, rotation and scale have a difference on top."""
-    return set().union(*(parts for _, parts in shown_differences(transform)))
+                transform.set_components(seen, loose - shown_parts(transform) - self._set.get(transform, set()))
 
 
 def _animated_parts(user: Transform, place: SlotTransform) -> set[str]:

@@ -59,8 +59,8 @@ def refresh_places(
         keyed = dict(zip(with_modes, keyed_in(with_modes), strict=True))
         sources = [keyed.get(place) for place in places]
     stale, idle, emptied, keyed_anew = [], [], [], []
-    read = [(recorded_digest(place), source) for place, source in zip(places, sources, strict=True)]
-    inserted.look_at(((before, source) for before, source in read if isinstance(source, Source)), frame)
+    read = [(place, recorded_digest(place), source) for place, source in zip(places, sources, strict=True)]
+    inserted.look_at((change for change in read if isinstance(change[2], Source)), frame)
     for place, source in zip(places, sources, strict=True):
         if place.slot.action.is_editable:
             leave_other_way(place)
@@ -76,8 +76,7 @@ def refresh_places(
                 emptied.append(place)
             idle.append(place)
         elif source.digest != before or not is_complete(place, source):
-            kept = inserted.keep_pose(place, before, source, frame, again=again)
-            if kept or keep_motion(place, before, source):
+            if inserted.keep_pose(place, again=again) or keep_motion(place, before, source):
                 keyed_anew.append(place)
             else:
                 stale.append((place, source))

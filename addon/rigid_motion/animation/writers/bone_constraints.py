@@ -28,9 +28,8 @@ def shown_by(constraint: bpy.types.ActionConstraint) -> tuple[bpy.types.Action |
 
 def curves_shown_by(constraint: bpy.types.ActionConstraint, user: Transform) -> Curves:
     """The F-curves that a constraint shows on a bone."""
-    action, handle = constraint.action, constraint.action_slot_handle
-    slot = None if action is None else next((slot for slot in action.slots if slot.handle == handle), None)
-    channelbag = None if slot is None else action_get_channelbag_for_slot(action, slot)
+    action, slot = constraint.action, constraint.action_slot
+    channelbag = None if action is None or slot is None else action_get_channelbag_for_slot(action, slot)
     group = None if channelbag is None else channelbag.groups.get(user.difference_group(user.prefix))
     return {} if group is None else {(fcurve.data_path, fcurve.array_index): fcurve for fcurve in group.channels}
 
@@ -78,7 +77,7 @@ def has_constraint(user: Transform, place: SlotTransform) -> bool:
 
 def has_stale_constraint(user: BoneTransform, place: SlotTransform) -> bool:
     """Whether a bone has a constraint that shows what is shown already, or what does not move its rig any more."""
-    shown = [shown_by(constraint) for constraint in filter(shows_differences, user.carrier.constraints)]
+    shown = [shown_by(constraint) for constraint in user.carrier.constraints if shows_differences(constraint)]
     if not shown or shown == [slot_of_differences(place)]:
         return False
     return len(set(shown)) < len(shown) or not set(shown) <= _in_use(user.animated)

@@ -7,7 +7,7 @@ a constraint takes, its evaluation time says, see `times`.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import bpy
 import numpy as np
@@ -118,14 +118,13 @@ class ConstraintWriter(Writer):
         return _difference_at(constraint, time, filled, user)
 
     def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
-        found = []
-        for constraint in user.carrier.constraints:
-            if shows_differences(constraint) and constraint.enabled:
-                shown = curves_shown_by(constraint, user)
-                parts = {PART_OF[row] for row, channel in user.differences.items() if channel in shown}
-                if parts:
-                    found.append((_difference_at(constraint, constraint.eval_time, shown, user), parts))
-        return found
+        return [
+            (_difference_at(constraint, constraint.eval_time, shown, user), parts)
+            for constraint, shown, parts in _shown_on(user)
+        ]
+
+    def shown_parts(self, user: Transform) -> set[str]:
+        return set().union(*(parts for *_, parts in _shown_on(user)))
 
     def hide(self, place: SlotTransform, user: Transform) -> None:
         constraint, time = constraint_of(user, place), time_of(place)
@@ -249,6 +248,15 @@ def _remove_slot_if_empty(slot: Slot) -> None:
         number, pair = next((number, pair) for number, pair in enumerate(pairs) if pair.handle == slot.handle)
         slot.action.slots.remove(next(one for one in slot.action.slots if one.handle == pair.differences))
         pairs.remove(number)
+
+
+def _shown_on(user: Transform) -> Iterator[tuple[bpy.types.ActionConstraint, Curves, set[str]]]:
+    """The constraints that add to a user, what they show, and which of location, rotation and scale that is."""
+    for constraint in user.carrier.constraints:
+        if shows_differences(constraint) and constraint.enabled:
+            shown = curves_shown_by(constraint, user)
+            if parts := {PART_OF[row] for row, channel in user.differences.items() if channel in shown}:
+                yield constraint, shown, parts
 
 
 def _no_difference(user: Transform) -> np.ndarray:

@@ -65,13 +65,16 @@ class DeltaWriter(Writer):
         return difference
 
     def shown_differences(self, user: Transform) -> list[tuple[np.ndarray, set[str]]]:
-        noted = {row: channel for row, channel in user.differences.items() if user.is_noted([channel])}
-        if not noted:
+        parts = self.shown_parts(user)
+        if not parts:
             return []
         difference = np.zeros(10)
         for row, (path, index) in user.differences.items():
             difference[row] = getattr(user.carrier, path)[index]
-        return [(difference, {PART_OF[row] for row in noted})]
+        return [(difference, parts)]
+
+    def shown_parts(self, user: Transform) -> set[str]:
+        return {PART_OF[row] for row, channel in user.differences.items() if user.is_noted([channel])}
 
     def hide(self, place: SlotTransform, user: Transform) -> None:
         user.show_original()

@@ -6,7 +6,7 @@ what is seen in the viewport, one is as good. An Action keeps itself that it is 
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
 
 import bpy
@@ -24,13 +24,15 @@ LARGE = 10_000
 
 def begin_drafts(readings: Sequence[tuple[SlotTransform, Source]]) -> None:
     """Have large Actions that are to be filled in go on in draft."""
-    apart = [(place, source) for place, source in readings if place.kind.has_difference_slot]
-    counts = Counter(place.slot.action for place, _ in apart)
-    for place, source in apart:
-        action, (first, last) = place.slot.action, source.frame_range
-        bones = max(counts.pop(action, 0), len(action.rigid_motion.slots))
-        if not is_draft(action) and bones * (last - first) >= LARGE:
-            _begin_draft(action, [place for place, _ in readings if place.slot.action == action])
+    apart: defaultdict[bpy.types.Action, list[tuple[SlotTransform, Source]]] = defaultdict(list)
+    for place, source in readings:
+        if place.kind.has_difference_slot:
+            apart[place.slot.action].append((place, source))
+    for action, own in apart.items():
+        if not is_draft(action):
+            longest = max(last - first for first, last in (source.frame_range for _, source in own))
+            if max(len(own), len(action.rigid_motion.slots)) * longest >= LARGE:
+                _begin_draft(action, [place for place, _ in own])
 
 
 def _begin_draft(action: bpy.types.Action, known: Iterable[SlotTransform]) -> None:

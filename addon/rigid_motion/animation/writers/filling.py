@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -18,15 +19,17 @@ import numpy as np
 from ..actions.reading import keyed_in
 from ..actions.records import record_in_betweens, recorded, recorded_digest, recorded_rows
 from ..actions.slots import SlotTransform, is_filled_in, is_time, slot_transforms_in
+from ..compute.between_samples import Samples
 from ..compute.components import PART_OF, ROTATION
-from ..compute.differences import NOTHING
 from ..compute.sample_rates import Need, error_of, sampled
+from ..compute.samples import NOTHING
 from ..compute.source_cache import cached_source, changed_range
 from ..compute.sources import FULL_TURN, Source
 from ..transforms import Channel
 from ..transforms.reaches import metres_per_channel_unit, reach_at_rest
 from .corners import corners
 from .drafts import begin_drafts, drafts_among, end_drafts, is_draft
+from .layout import Layout
 from .table import release, writer_of
 
 TOLERANCE = 0.00005
@@ -45,13 +48,12 @@ def fill_in(readings: Sequence[tuple[SlotTransform, Source]], *, in_draft: bool 
     if in_draft:
         begin_drafts(readings)
     changed, anew = [], []
-    needs = _needs(readings)
-    for (place, source), need in zip(readings, needs, strict=True):
-        span = _changed_range(place, source)
-        if span is None:
+    for (place, source), need in zip(readings, _needs(readings), strict=True):
+        edit = _edit_of(place, source, need)
+        if edit is None:
             anew.append((place, source, need))
         else:
-            changed.append((place, source, need, span))
+            changed.append(edit)
     anew += _fill_in_changed(changed)
     # However far cycles are seen, one round is all that is written where it repeats.
     rounds = [replace(source, seen=None) if source.repeats else source for _, source, _ in anew]
@@ -98,100 +100,105 @@ def _needs(readings: Sequence[tuple[SlotTransform, Source]]) -> list[Need]:
     reaches: dict[bpy.types.Bone, float] = {}
     needs = []
     for place, source in readings:
+        if is_draft(place.slot.action):
+            needs.append(Need(math.inf, 0.0, most=1))
+            continue
         user = place.users[0]
         unit, reach = metres_per_channel_unit(user), reach_at_rest(user, reaches)
-        if is_draft(place.slot.action):
-            needs.append(Need(math.inf, reach, most=1))
-        else:
-            needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(place).most_samples(source)))
+        needs.append(Need(TOLERANCE * max(1.0 / unit, reach), reach, most=writer_of(place).most_samples(source)))
     return needs
 
 
-def _changed_range(place: SlotTransform, source: Source) -> tuple[int, int] | None:
-    """The samples to fill in anew where the rest is as it has to be, None where all of them are."""
+class _Edit(NamedTuple):
+    """A place in which some samples are to be filled in anew, and the rest is as it has to be."""
+
+    place: SlotTransform
+    source: Source
+    need: Need
+    layout: Layout
+    """How the samples lie."""
+
+    span: tuple[int, int]
+    """The first and the last of those to be filled in."""
+
+
+def _edit_of(place: SlotTransform, source: Source, need: Need) -> _Edit | None:
+    """What has to be filled in of a place, None where all has to be."""
     old, rate = cached_source(recorded_digest(place)), recorded(place).rate
     if old is None or old is source or old.sample_range(rate) != source.sample_range(rate):
         return None
-    if writer_of(place).layout(source, rate).is_ring or not is_complete(place, source):
+    frames, layout = changed_range(old, source), writer_of(place).layout(source, rate)
+    if frames is None or layout.is_ring or not is_complete(place, source, layout):
         return None
-    span = changed_range(old, source)
-    if span is None:
-        return None
-    begin, end = source.sample_range(rate)
     # On a whole frame around it, keys off whole frames leave no sample.
-    first, last = (min(max(frame * rate, begin), end) for frame in span)
-    return first, last
+    first, last = (min(max(frame * rate, layout.first), layout.last) for frame in frames)
+    return _Edit(place, source, need, layout, (first, last))
 
 
-def _fill_in_changed(
-    readings: Sequence[tuple[SlotTransform, Source, Need, tuple[int, int]]],
-) -> list[tuple[SlotTransform, Source, Need]]:
+def _fill_in_changed(edits: Sequence[_Edit]) -> list[tuple[SlotTransform, Source, Need]]:
     """Fill in a range of samples of each. Those for which that will not do are returned, and left as they are."""
     others = []
-    sources, spans = [source for _, source, *_ in readings], [span for *_, span in readings]
-    rates = [recorded(place).rate for place, *_ in readings]
-    fixed = [need._replace(fewest=rate, most=rate) for (*_, need, _), rate in zip(readings, rates, strict=True)]
-    for (place, source, need, (first, last)), samples in zip(readings, sampled(sources, fixed, spans), strict=True):
-        channels, rows, curves, before = _channels(place, source), recorded_rows(place), place.filled, recorded(place)
-        if samples.error > need.tolerance and before.rate < need.most:
+    fixed = [Need(edit.need.tolerance, edit.need.reach, edit.layout.rate, edit.layout.rate) for edit in edits]
+    found = sampled([edit.source for edit in edits], fixed, [edit.span for edit in edits])
+    for (place, source, need, layout, (first, last)), samples in zip(edits, found, strict=True):
+        channels, rows, before = _channels(place, source), recorded_rows(place), recorded(place)
+        if (samples.error > need.tolerance and before.rate < need.most) or not _are_covered(samples, rows):
             others.append((place, source, need))
             continue
-        layout = writer_of(place).layout(source, before.rate)
-        part = slice(2 * (first - layout.first) + 1, 2 * (last - layout.first) + 2, 2)
-        written = {}
-        for row in rows:
-            points = curves[channels[row]].sampled_points
-            written[row] = np.empty(2 * len(points), np.float32)
-            points.foreach_get("co", written[row])
-        values = {row: points[1::2] for row, points in samples.items()}
-        present = {row: points[part] for row, points in written.items()}
-        if not (_is_covered(values, rows) and _continue(values, present, source)):
+        curves = [place.filled[channels[row]] for row in rows]
+        written = np.empty((len(rows), 2 * layout.count), np.float32)
+        for fcurve, points in zip(curves, written, strict=True):
+            fcurve.sampled_points.foreach_get("co", points)
+        present = written[:, 2 * (first - layout.first) + 1 : 2 * (last - layout.first) + 2 : 2]
+        values = np.array([samples[row][1::2] for row in rows]).reshape(present.shape)
+        if not _continue(values, present, rows, source):
             others.append((place, source, need))
             continue
-        for row, points in written.items():
-            points[part] = values[row]
-            curves[channels[row]].sampled_points.foreach_set("co", points)
-        pieces, error = corners(source, written, layout, need)
-        for row in rows:
-            layout.modify(curves[channels[row]], pieces.get(row, ()))
+        present[:] = values
+        all_samples = dict(zip(rows, written, strict=True))
+        pieces, error = corners(source, all_samples, layout, need)
+        for row, fcurve, points in zip(rows, curves, written, strict=True):
+            fcurve.sampled_points.foreach_set("co", points)
+            layout.modify(fcurve, pieces.get(row, ()))
         elsewhere = before.error
         if math.isfinite(need.tolerance):
             if elsewhere > need.tolerance and elsewhere > samples.error:
-                elsewhere = error_of(source, written, before.rate, need.reach)
+                elsewhere = error_of(source, all_samples, before.rate, need.reach)
             elsewhere = max(samples.error, error, elsewhere)
         record_in_betweens(place, source.digest, rows, before.rate, elsewhere)
         _tag(place)
     return others
 
 
-def _is_covered(values: dict[int, np.ndarray], rows: Sequence[int]) -> bool:
-    """Whether there are F-curves for all components that differ in these frames."""
-    return all(row in rows or np.ptp(part) < NOTHING for row, part in values.items()) and all(
-        row in values for row in rows
-    )
+def _are_covered(samples: Samples, rows: Sequence[int]) -> bool:
+    """Whether there are F-curves for all components that differ in these samples, and samples for all F-curves."""
+    others = samples.keys() - set(rows)
+    return len(others) + len(rows) == len(samples) and all(np.ptp(samples[row][1::2]) < NOTHING for row in others)
 
 
-def _continue(values: dict[int, np.ndarray], before: dict[int, np.ndarray], source: Source) -> bool:
+def _continue(values: np.ndarray, before: np.ndarray, rows: Sequence[int], source: Source) -> bool:
     """Have rotations go on from those on the first frame, in the sign and in the turn that they have; in place.
 
-    False where they do not arrive in those of the last frame, on from where all stays as it is.
+    False where they do not arrive in those of the last frame, on from where all stays as it is. Both are of shape
+    (rows, m).
     """
-    rows = [row for row in before if PART_OF[row] == ROTATION]
-    if not rows:
+    turning = [number for number, row in enumerate(rows) if PART_OF[row] == ROTATION]
+    if not turning:
         return True
-    new, old = np.stack([values[row] for row in rows]), np.stack([before[row] for row in rows])
+    rotations = slice(turning[0], turning[-1] + 1)
+    new, old = values[rotations], before[rotations]
     if source.order is None:
         new *= -1.0 if new[:, 0] @ old[:, 0] < 0.0 else 1.0
     else:
         new += (FULL_TURN * np.rint((old[:, 0] - new[:, 0]) / FULL_TURN))[:, None]
-    values.update(zip(rows, new, strict=True))
     return bool(np.abs(new[:, [0, -1]] - old[:, [0, -1]]).max() < SAME_ROTATION)
 
 
-def is_complete(place: SlotTransform, source: Source) -> bool:
-    """Whether all F-curves are as they were written for a source."""
+def is_complete(place: SlotTransform, source: Source, layout: Layout | None = None) -> bool:
+    """Whether all F-curves are as they were written for a source, whose samples lie so."""
     writer, channels, curves = writer_of(place), _channels(place, source), place.filled
-    layout, written = writer.layout(source, recorded(place).rate), [channels.get(row) for row in recorded_rows(place)]
+    layout = layout or writer.layout(source, recorded(place).rate)
+    written = [channels.get(row) for row in recorded_rows(place)]
     return (
         all(channel in curves and layout.fits(curves[channel]) for channel in written)
         and len(curves) == len(written)
@@ -245,22 +252,24 @@ def _limit_ranges(actions: Iterable[bpy.types.Action], longer: Iterable[bpy.type
             continue
         bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
         apart = {pair.differences for pair in motion.bone_slots}
-        # Those of bones first: one that lies outside is enough to know.
-        samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves]
-        begin, end = math.inf, -math.inf
+        # Those of bones first: one that lies outside is enough to know, and in a draft any is going to again.
+        most = 1 if is_draft(action) else None
+        samples = [fcurve for bag in bags if bag.slot_handle in apart for fcurve in bag.fcurves[:most]]
+        begin, end, span = math.inf, -math.inf, None
         for bag in bags:
             for fcurve in bag.fcurves if bag.slot_handle not in apart else ():
-                first, last = fcurve.range()
+                # There may be thousands, most with keys on the same frames: no more is asked than is needed.
+                if (own := fcurve.range()) == span:
+                    continue
+                first, last = own
                 if begin <= first and last <= end:
-                    # There may be thousands: no more is asked than is needed.
                     continue
                 if not _has_range(fcurve):
                     continue
                 if is_filled_in(fcurve) or is_time(fcurve):
                     samples.append(fcurve)
                 else:
-                    begin, end = min(begin, first), max(end, last)
-        # Those of a draft are going to lie outside again.
+                    begin, end, span = min(begin, first), max(end, last), own
         is_outside = (samples and is_draft(action)) or any(_is_outside(fcurve, begin, end) for fcurve in samples)
         if begin <= end and is_outside:
             if (action.use_frame_range, action.frame_start, action.frame_end) != (True, begin, end):

@@ -149,7 +149,9 @@ class Layout:
 
     def _has_modifiers(self, fcurve: bpy.types.FCurve) -> bool:
         """Whether it has those that all have; whatever is added to it may have to be something else by now."""
-        modifiers = list(fcurve.modifiers)
+        modifiers = fcurve.modifiers[:]
+        if not (modifiers or self._modifiers):
+            return True
         count = len(self._modifiers)
         return _are(modifiers[:count], self._modifiers) and all(
             modifier.type == "GENERATOR" and modifier.use_restricted_range and not modifier.mute
@@ -158,9 +160,9 @@ class Layout:
 
     def modify(self, fcurve: bpy.types.FCurve, pieces: Sequence[Piece] = ()) -> None:
         """Give an F-curve the modifiers that it needs, in place of those it has, and add these to it."""
-        present = list(fcurve.modifiers)
+        present = fcurve.modifiers[:]
         wanted = [*self._modifiers, *(piece.modifier for piece in pieces)]
-        if _are(present, wanted):
+        if not (present or wanted) or _are(present, wanted):
             return
         for modifier in present:
             fcurve.modifiers.remove(modifier)

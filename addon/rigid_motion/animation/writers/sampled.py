@@ -94,8 +94,11 @@ def hide_fcurve(channelbag: bpy.types.ActionChannelbag, group: str, fcurve: bpy.
 
 def regroup(place: SlotTransform) -> None:
     """Take F-curves with in-betweens back that have been put into another group, or into none."""
-    rows, (channelbag, group) = recorded_rows(place), place.home
-    if channelbag is None or len(place.filled) >= len(rows):
+    rows = recorded_rows(place)
+    if len(place.filled) >= len(rows):
+        return
+    channelbag, group = place.home
+    if channelbag is None:
         return
     rotations = ("rotation_quaternion", "rotation_euler")
     channels = [place.users[0].differences_for(rotation) for rotation in rotations]

@@ -58,6 +58,11 @@ def shown_differences(user: Transform) -> list[tuple[np.ndarray, set[str]]]:
     return WRITERS[user.kind].shown_differences(user)
 
 
+def shown_parts(user: Transform) -> set[str]:
+    """Which of location, rotation and scale that is in."""
+    return WRITERS[user.kind].shown_parts(user)
+
+
 def remove_orphans(places: Iterable[SlotTransform]) -> None:
     """Take out of the slots of these what is left in them of parts that none of their users has any more."""
     slots: dict[tuple[Slot, Writer], None] = {(place.slot, writer_of(place)): None for place in places}

@@ -62,8 +62,8 @@ def time_of(place: SlotTransform) -> bpy.types.FCurve | None:
 def span_of(place: SlotTransform) -> tuple[int, int]:
     """The frames of the differences that an evaluation time of 0 and one of 1 stand for: there are more than one where
     more than one sample is shown in a frame."""
-    points, rate = next(iter(place.filled.values())).sampled_points, recorded(place).rate
-    return 0, _duration(math.ceil(points[len(points) - 1].co[0] / rate)) * rate
+    (_, last), rate = next(iter(place.filled.values())).range(), recorded(place).rate
+    return 0, _duration(math.ceil(last / rate)) * rate
 
 
 def most_samples(source: Source) -> int:
@@ -187,7 +187,7 @@ def is_line(fcurve: bpy.types.FCurve, line: Line, steps: tuple[Stepped, ...] = (
 
 def _holds(fcurve: bpy.types.FCurve, steps: tuple[Stepped, ...]) -> bool:
     """Whether the modifiers of an F-curve are one, and behind it those that hold these frames."""
-    return len(fcurve.modifiers) == 1 + len(steps) and read_steps(fcurve.modifiers) == steps
+    return len(fcurve.modifiers) == 1 + len(steps) and (not steps or read_steps(fcurve.modifiers) == steps)
 
 
 def _line_of(fcurve: bpy.types.FCurve) -> Line | None:

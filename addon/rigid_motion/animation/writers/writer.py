@@ -64,6 +64,10 @@ class Writer(ABC):
         """
 
     @abstractmethod
+    def shown_parts(self, user: Transform) -> set[str]:
+        """Which of location, rotation and scale they are in."""
+
+    @abstractmethod
     def hide(self, place: SlotTransform, user: Transform) -> None:
         """Show a user as its properties have it, until Blender evaluates its animation again."""
 
