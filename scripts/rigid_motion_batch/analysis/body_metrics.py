@@ -36,7 +36,7 @@ class JointMetrics:
     rate_hz: str
     """As the user wrote it; empty where a tolerance decides."""
 
-    keys: int
+    keys: int | None
     """1 of a joint that stays as it is in its parent's space."""
 
     samples: int
@@ -94,17 +94,18 @@ def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Gro
     duration = float(times[-1] - times[0])
     keys = made.keys[mode]
     # A joint that stays as it is has its key once, and sends nothing.
-    sent = sum(len(own) - 1 for own in keys)
+    count = sum(map(len, keys))
+    sent = count - len(keys)
     moving_joints = sum(len(own) > 1 for own in keys)
     joint, _ = errors.worst
     return Metrics(
         clip=clip.name,
         mode=mode,
         rate_hz=choice.rate,
-        keys=sum(map(len, keys)),
+        keys=count or None,
         samples=len(times),
         duration_s=duration,
-        bytes_per_s=sent / duration * BYTES_PER_KEY,
+        bytes_per_s=sent / duration * BYTES_PER_KEY if count else None,
         rms_shell_m=rms(errors.shell),
         p95_shell_m=float(np.percentile(errors.shell, 95.0)),
         max_shell_m=float(errors.shell.max()),
@@ -113,9 +114,9 @@ def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Gro
         rms_velocity_m_s=rms(errors.velocity),
         decimation=choice.decimation,
         tolerance_m=choice.tolerance(clip),
-        keys_per_s=sent / max(moving_joints, 1) / duration,
+        keys_per_s=sent / max(moving_joints, 1) / duration if count else None,
         joints=len(keys),
-        key_frames=len(key_samples(keys)),
+        key_frames=len(key_samples(keys)) or None,
         worst_joint=clip.figure.joints[joint],
         foot_slide_m=errors.slide if len(ground.joints) else None,
         recorded_slide_m=ground.slide if len(ground.joints) else None,
@@ -132,7 +133,7 @@ def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> 
             joint=name,
             mode=mode,
             rate_hz=choice.rate,
-            keys=len(made.keys[mode][joint]),
+            keys=len(made.keys[mode][joint]) or None,
             samples=len(times),
             rms_shell_m=float(root_mean_squares[joint]),
             p95_shell_m=float(np.percentile(errors.shell[joint], 95.0)),
@@ -185,7 +186,8 @@ def write_key_tables(folder: Path, made: BodyReconstruction) -> None:
     A row is a joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
     """
     uniform = made.choice.decimation == "uniform"
-    for mode, keys in list(made.keys.items())[: 1 if uniform else None]:
+    known = [(mode, keys) for mode, keys in made.keys.items() if len(keys[0])]
+    for mode, keys in known[: 1 if uniform else None]:
         with replacing(folder / ("keys.csv" if uniform else f"{mode}.keys.csv")) as stream:
             stream.write("joint,t,x,y,z,qw,qx,qy,qz\n")
             for joint, own in enumerate(keys):

@@ -47,7 +47,8 @@ class Metrics:
     rate_hz: str
     """As the user wrote it; empty where a tolerance decides."""
 
-    keys: int
+    keys: int | None
+    """Empty of somebody else's motion, as all that is counted by keys."""
 
     samples: int
     """How many samples of the recording were compared: those between the first and the last key, both included."""
@@ -55,7 +56,7 @@ class Metrics:
     duration_s: float
     """From the first key to the last."""
 
-    bytes_per_s: float
+    bytes_per_s: float | None
     """Of the keys that were really kept, not of the rate that was asked for: see `measure_reconstruction`."""
 
     rms_shell_m: float
@@ -71,7 +72,7 @@ class Metrics:
     tolerance_m: float | None
     """The largest shell error that was allowed; empty in the table where a rate decides."""
 
-    keys_per_s: float
+    keys_per_s: float | None
     """On average, the first key not counted; of a whole body, for each joint."""
 
     joints: int | None = None
@@ -114,7 +115,7 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     duration = float(times[-1] - times[0])
     rows = []
     for mode, errors in reconstruction.errors.items():
-        keys = len(reconstruction.keys[mode])
+        keys = len(reconstruction.keys[mode]) or None
         rows.append(
             Metrics(
                 clip=clip.name,
@@ -123,7 +124,7 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
                 keys=keys,
                 samples=len(times),
                 duration_s=duration,
-                bytes_per_s=(keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
+                bytes_per_s=keys and (keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
                 rms_shell_m=rms(errors.shell),
                 p95_shell_m=float(np.percentile(errors.shell, 95.0)),
                 max_shell_m=float(np.max(errors.shell)),
@@ -132,7 +133,7 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
                 rms_velocity_m_s=rms(errors.velocity),
                 decimation=choice.decimation,
                 tolerance_m=choice.tolerance(clip),
-                keys_per_s=(keys - 1) / duration,
+                keys_per_s=keys and (keys - 1) / duration,
             )
         )
     return rows
@@ -227,7 +228,8 @@ def write_reconstruction(folder: Path, reconstruction: Reconstruction, form: str
     clip = reconstruction.clip
     for mode, poses in reconstruction.poses.items():
         write_poses(folder / f"{mode}.{form}", reconstruction.times, poses)
-    tables = {f"{mode}.keys.{form}": keys for mode, keys in reconstruction.keys.items() if mode != BEST_OF}
+    known = {mode: keys for mode, keys in reconstruction.keys.items() if len(keys)}
+    tables = {f"{mode}.keys.{form}": keys for mode, keys in known.items() if mode != BEST_OF}
     if reconstruction.choice.decimation == "uniform":
         tables = {f"keys.{form}": next(iter(tables.values()))}
     for name, keys in tables.items():

@@ -69,6 +69,7 @@ examples:
   python scripts/compare.py hand_left.csv --modes all,best_of
   python scripts/compare.py take.csv --tolerance 5mm
   python scripts/compare.py take.csv --budget 5,10 --rates 10
+  python scripts/compare.py take.csv --against mine.csv
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 choosing keys:
@@ -85,6 +86,12 @@ choosing modes:
   best_of takes, in each segment from key to key, the one of the other modes named that comes closest to the recording
   there. Evenly spaced keys are the same for all modes; with adaptive keys it uses those of the best single mode. A
   column of best_of.keys.csv has the mode of each segment.
+
+somebody else's motion:
+  --against FILE adds a lane, a line and a row with a motion that came from elsewhere, such as the in-betweens of
+  another program, named after its file. It is read in any format, with the same options, and compared at the samples
+  of the recording, with straight lines and SLERP between its own. Its times are taken as they are: the clip is cut to
+  those that both have. A whole body needs joints of the same names and axes, as the same rig in the same format has.
 
 what is written:
   OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
@@ -154,6 +161,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="M|CSV",
         help=f"radius of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table "
         "joint,radius_m for joints by name",
+    )
+    parser.add_argument(
+        "--against",
+        default="",
+        metavar="FILE",
+        help="a motion to show beside those of the modes: somebody else's, of the same clip, read as this is",
     )
     add_reading_options(parser)
     workers = parser.add_mutually_exclusive_group()
@@ -271,6 +284,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         parser.error(str(error))
     options.inputs = options.inputs or own_recordings()
     options.inputs = [file for source in options.inputs for file in files_of(source)]
+    if options.against and len(options.inputs) != 1:
+        parser.error(f"--against is a motion of one clip, and there are {len(options.inputs)}: name one recording")
     return options
 
 

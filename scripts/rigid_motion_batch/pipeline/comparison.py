@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -69,6 +70,9 @@ class Comparison:
 
     choices: tuple[Choice, ...]
     modes: tuple[str, ...]
+    against: str = ""
+    """The source of a motion that is shown beside the modes: somebody else's, of the one clip that there is then."""
+
     axes: str | None = None
     """Of `axes.AXES`; None for those of each format."""
 
@@ -119,6 +123,8 @@ class Study:
 
     warnings: tuple[ClipWarning, ...] = field(default=(), repr=False)
     beside_decimate: bool = True
+    against: str = ""
+    """What the motion is called that it is compared with beside the modes."""
 
     @property
     def name(self) -> str:
@@ -163,14 +169,12 @@ class ComparisonPlan:
         comparison = self.comparison
         inputs: tuple[Input, ...] = ()
         step: Step = steps.read
-        try:
-            path, _ = split_source(source)
-            inputs = (self.store.input(path),)
-            step = steps.read_in_blender if path.suffix.lower() in IN_BLENDER else step
-        except TrajectoryError:
-            pass  # Whoever reads it will say that there is no such file.
+        with suppress(TrajectoryError):  # Whoever reads it will say that there is no such file.
+            paths = [split_source(one)[0] for one in (source, comparison.against) if one]
+            inputs = tuple(map(self.store.input, paths))
+            step = steps.read_in_blender if any(path.suffix.lower() in IN_BLENDER for path in paths) else step
         blender = comparison.blender if step is steps.read_in_blender else ""
-        parameters = steps.Read(source, comparison.axes, comparison.reading, blender)
+        parameters = steps.Read(source, comparison.axes, comparison.reading, blender, comparison.against)
         return Task(step, parameters, f"read {source}", inputs=inputs, title=source, weight=0.3)
 
     def read(self, run: Callable[[Plan], Outcome]) -> tuple[Outcome, list[str]]:
@@ -217,7 +221,9 @@ class ComparisonPlan:
             }
             if long_enough:
                 clip, joints = ClipOf(name, body), len(one.joints)
-                study = Study(clip, key, len(times), long_enough, joints, one.warnings, comparison.beside_decimate)
+                study = Study(
+                    clip, key, len(times), long_enough, joints, one.warnings, comparison.beside_decimate, one.against
+                )
                 self.studies.append(study)
                 notes += self._left_out(study)
         return notes
@@ -303,6 +309,7 @@ class ComparisonPlan:
                 weight = 0.1 + 5e-6 * study.samples * study.joints * len(modes) * (1.0 if evenly else 40.0)
             else:
                 tables = table_names(choice, modes, comparison.form)
+                tables += [f"{study.against}.{comparison.form}"] if study.against else []
                 weight = 0.02 + 8e-6 * study.samples * len(modes) * (1.0 if evenly else 50.0)
             measuring = Task(
                 steps.measure,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
 
 RECORDINGS = ("rigid_motion/motion", "recordings", "axes.py", "command_line.py", "files.py", "rows.py")
+READING = (*RECORDINGS, "analysis/modes.py")
 ANALYSIS = (*RECORDINGS, "analysis")
 SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "hushing.py")
 REPORT = (*ANALYSIS, "report", "palette.py")
@@ -47,6 +48,9 @@ class Read:
     blender: str = ""
     """The version of Blender, for formats that it reads."""
 
+    against: str = ""
+    """What somebody else has made of it, as a source."""
+
 
 @dataclass(frozen=True)
 class BodyFacts:
@@ -61,6 +65,9 @@ class BodyFacts:
     joints: tuple[str, ...]
     """Of a whole body; none of a single rigid one."""
 
+    against: str = ""
+    """What the motion is called that it is compared with beside the modes."""
+
 
 @dataclass(frozen=True)
 class SourceFacts:
@@ -72,10 +79,19 @@ def read_source(job: Job, parameters: Read) -> None:
     """Read a source, and repair its clips."""
     import numpy as np
 
-    from rigid_motion_batch.recordings import TrajectoryError, clip_reading
+    from rigid_motion_batch.analysis.modes import name_of_other
+    from rigid_motion_batch.recordings import TrajectoryError, against, clip_reading
+    from rigid_motion_batch.recordings.reading import split_source
 
+    how = parameters.axes, parameters.options
     try:
-        clips, note = clip_reading.read_source(parameters.source, parameters.axes, parameters.options)
+        clips, note = clip_reading.read_source(parameters.source, *how)
+        if parameters.against:
+            if len(clips) > 1:
+                raise TrajectoryError(parameters.source, f"{len(clips)} bodies", "name the one that --against is of")
+            name = name_of_other(split_source(parameters.against)[0].stem)
+            clip, more = against.with_against(clips[0], parameters.against, name, *how)
+            clips, note = [clip], "; ".join(filter(None, (note, more)))
     except TrajectoryError as error:
         raise TaskError(str(error)) from None
     bodies = []
@@ -83,16 +99,17 @@ def read_source(job: Job, parameters: Read) -> None:
         values.write(job.folder / f"{number}", clip)
         np.save(job.folder / f"{number}.times.npy", clip.times)
         joints = clip.figure.joints if clip.figure else ()
-        bodies.append(BodyFacts(clip.name, clip.body, clip.repairs, clip.warnings, joints))
+        other = clip.against.name if clip.against else ""
+        bodies.append(BodyFacts(clip.name, clip.body, clip.repairs, clip.warnings, joints, other))
     values.write(job.folder / "facts", SourceFacts(note, tuple(bodies)))
 
 
-@step(rooms=RECORDINGS, stage="read")
+@step(rooms=READING, stage="read")
 def read(job: Job, parameters: Read) -> None:
     read_source(job, parameters)
 
 
-@step(rooms=(*RECORDINGS, "rigid_motion/animation"), stage="read", blender=True)
+@step(rooms=(*READING, "rigid_motion/animation"), stage="read", blender=True)
 def read_in_blender(job: Job, parameters: Read) -> None:
     read_source(job, parameters)
 
@@ -184,9 +201,11 @@ def decimate(job: Job, parameters: Measure) -> None:
     from rigid_motion_batch.scenes.decimating import beside_decimate
 
     clip, found = parameters.clip.read(job.before[0]), result_in(job.before[1])
-    made = BodyReconstruction(clip, found.choice, dict(found.keys), parameters.shared)
+    known = [row for row in found.rows if row.keys]
+    keys = {row.mode: found.keys[row.mode] for row in known}
+    made = BodyReconstruction(clip, found.choice, keys, parameters.shared)
     try:
-        rows = beside_decimate(made, parameters.radii.of(clip.figure.joints), found.rows)
+        rows = beside_decimate(made, parameters.radii.of(clip.figure.joints), known)
     except RuntimeError as error:
         problem = " ".join(str(error).split())
         raise TaskError(f"{clip.name} {found.choice.phrase}: not compared with Blender's Decimate: {problem}") from None

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.recordings.figures import Figure
 
 
@@ -27,6 +27,24 @@ class ClipWarning:
 
     def __str__(self) -> str:
         return f"{self.text}; {self.way_out}" if self.way_out else self.text
+
+
+@dataclass(frozen=True, eq=False)
+class OtherMotion:
+    """Somebody else's motion of a clip, by its own samples; between these straight lines and SLERP."""
+
+    name: str
+    """What it is called, and its id beside those of modes."""
+
+    times: np.ndarray
+    """Seconds of the clip's clock, strictly rising, shape (m,)."""
+
+    poses: Poses
+    """As those of the clip, shape (m,) or (joints, m)."""
+
+    def at(self, times: np.ndarray) -> Poses:
+        """The poses at any times (n,), shape (n,) or (joints, n)."""
+        return interpolate(self.times, self.poses, times, "lerp_slerp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +86,9 @@ class Clip:
 
     calibration: int = 0
     """Samples of a T-pose or the like before the motion, which are left out."""
+
+    against: OtherMotion | None = None
+    """What the user compares with it beside the modes."""
 
     @property
     def samples_a_second(self) -> float:

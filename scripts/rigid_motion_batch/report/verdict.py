@@ -132,6 +132,7 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
         if gain and gain != said[0] and said[0] != _lower_error(first):
             facts.append(gain)
         others = [_gain(contest) for contest in contests[1:]]
+        facts = [fact for fact in (_other(numbers, first),) if fact] + facts
         facts += [fact for fact in (_wins(first), *others, _best_of(numbers, first), _others(first)) if fact]
     return Verdict(said[0], tuple(facts[:3]))
 
@@ -394,6 +395,24 @@ def _best_of(numbers: Numbers, contest: _Contest) -> Text | None:
     ratio = float(np.exp(np.log(np.maximum(own[possible], 1e-9) / single[possible]).mean()))
     said = f"{percent(1.0 - ratio)} lower error" if ratio < 1.0 - TIE else "No lower error"
     return Part(said, "number"), Part(" from the best mode of each segment than from the best single one")
+
+
+def _other(numbers: Numbers, contest: _Contest) -> Text | None:
+    """Somebody else's motion beside the best mode, under the middle choice of keys."""
+    other = next((mode for mode in numbers.modes if mode not in MODES and mode != BEST_OF), None)
+    if other is None or contest.kind is Tolerance:
+        return None
+    at = (len(contest.places) - 1) // 2
+    own = numbers.mean()[ERROR, contest.places[at], numbers.modes.index(other)]
+    best = int(np.argmin(contest.means[at]))
+    return (
+        Part(f"{digits(own)}\u00a0mm off (RMS)", "number"),
+        Part(" is "),
+        Part(numbers.label(other), "mode", other),
+        Part(", and "),
+        contest.name(best),
+        Part(f" {digits(contest.means[at, best])}\u00a0mm {contest.phrase(at)}"),
+    )
 
 
 def _others(contest: _Contest) -> Text | None:
