@@ -7,7 +7,7 @@
 - `verdict` is the sentence alone, of `Gathering.numbers()`, for the terminal.
 
 What is shown comes as `ClipResult` (analysis); clips are gone through once, one in memory at a time. A colour is in
-`colours` or `templates/page.css`, a chart in `charts`, the sentence in `verdict`, the viewer in `viewer/`.
+`palette` or `templates/page.css`, a chart in `charts`, the sentence in `verdict`, the viewer in `viewer/`.
 """
 
 from __future__ import annotations

@@ -26,9 +26,9 @@ from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
+from rigid_motion_batch.palette import full_colour
 from rigid_motion_batch.recordings.figures import carrying, short_names
 
-from .joints import full_colour
 from .mesh import Mesh
 
 MOST_SEEN = {True: 4_000_000, False: 12_000_000}

@@ -29,10 +29,10 @@ from rigid_motion_batch.analysis.needed import KeysNeeded
 from rigid_motion_batch.analysis.radii import JOINT
 from rigid_motion_batch.analysis.results import ClipFacts, ClipResult
 from rigid_motion_batch.files import replacing, write_text
+from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages
 from rigid_motion_batch.rows import line_of
 
 from . import charts, tables
-from .colours import ERROR_COLOURS, colours_of
 from .data import clip_data, json_in_page, mesh_data
 from .joints import Joints, joints_of
 from .mesh import Mesh, drill
@@ -359,7 +359,7 @@ def _context(numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings)
         "needed": needed,
         "measures": MEASURES,
         "deciding": numbers.deciding(0),
-        "colours": [colours_of(mode) for mode in numbers.modes],
+        "colours": [colours_on_pages(mode) for mode in numbers.modes],
         "descriptions": [description_of(mode) for mode in numbers.modes],
         "style": Markup((HERE / "templates" / "page.css").read_text(encoding="utf-8")),
         "most_tabs": MOST_TABS,
