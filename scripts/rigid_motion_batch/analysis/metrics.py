@@ -206,12 +206,12 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
         yield first, [",".join(map(repr, row)) for row in rows]
 
 
-def table_names(choice: Choice, modes: Iterable[str], form: str = "csv") -> list[str]:
-    """The files that `write_reconstruction` writes for a choice of keys."""
+def table_names(choice: Choice, modes: Iterable[str], form: str = "csv", other: str = "") -> list[str]:
+    """The files that `write_reconstruction` writes for a choice of keys; `other` is a motion whose keys are unknown."""
     modes = tuple(modes)
     single = [] if choice.decimation == "uniform" else [f"{mode}.keys.{form}" for mode in single_modes(modes)]
     best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
-    return [*(f"{mode}.{form}" for mode in modes), *(single or [f"keys.{form}"]), *best]
+    return [*(f"{mode}.{form}" for mode in (*modes, other) if mode), *(single or [f"keys.{form}"]), *best]
 
 
 def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:

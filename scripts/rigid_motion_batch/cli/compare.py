@@ -37,7 +37,7 @@ from rigid_motion_batch.pipeline.comparison import (
     Comparison,
     ComparisonPlan,
 )
-from rigid_motion_batch.pipeline.comparison_steps import PAGE, About
+from rigid_motion_batch.pipeline.comparison_steps import PAGE
 from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor, processors
 from rigid_motion_batch.pipeline.explain import explain
 from rigid_motion_batch.pipeline.performing import Executor, ExecutorError
@@ -50,7 +50,9 @@ from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.report import Gathering, Numbers, Verdict, verdict
+from rigid_motion_batch.report.numbers import Gathering, Numbers
+from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.verdict import Verdict, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -113,7 +115,14 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         beside_decimate=bool(blender),
         stage=stage,
         every_film=options.films == ALL,
-        about=About(f"{manifest()['name']} {manifest()['version']}", command, details),
+        about=Settings(
+            options.radius.rigid,
+            f"{manifest()['name']} {manifest()['version']}",
+            command,
+            joint_radius=options.radius.joint,
+            details=details,
+        ),
+        subject=options.object,
         blender=blender,
     )
 
@@ -290,11 +299,11 @@ class _Run:
             self._do("Reading", self.plan.reading)
             if self.outcome.interrupted or self.outcome.problem or self.options.only:
                 return self._end()
-        notes = self._look_into()
+        notes = self.plan.look_into_anew(lambda tasks: self._do("Reading", tasks))
         warnings = [
             "; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out)))
             for study in self.plan.studies
-            for warning in study.warnings
+            for warning in study.facts.warnings
         ]
         for note in dict.fromkeys([*notes, *warnings]):
             self._note(note, "yellow" if note in warnings else "")
@@ -325,7 +334,7 @@ class _Run:
             self._show_numbers()
         return self._end()
 
-    def _do(self, title: str, tasks: Plan) -> None:
+    def _do(self, title: str, tasks: Plan) -> Outcome:
         with self.progress.stage(title, 1.0) as stage:
             shown = FarmProgress() if self.on_farm else _Shown(self.progress, stage, self.options.quiet)
             outcome = run(
@@ -342,17 +351,7 @@ class _Run:
         self.outcome.details = before.details | outcome.details
         if not self.options.only:
             self.outcome.note_failures(self.store)
-
-    def _look_into(self) -> list[str]:
-        """See what was read. What is damaged is read again."""
-        try:
-            return self.plan.look_into()
-        except Exception:
-            for task in self.plan.reading():
-                if not self.store.result(task.key, thoroughly=True):
-                    self.store.discard(task.key)
-            self._do("Reading", self.plan.reading)
-            return self.plan.look_into()
+        return outcome
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)

@@ -100,3 +100,46 @@ class Clip:
         if self.metres_per_unit == 1.0:
             return poses
         return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
+
+
+@dataclass(frozen=True)
+class ClipFacts:
+    """A clip without its samples."""
+
+    name: str
+    source: str
+    axes: str
+    samples: int
+    duration: float
+    """Seconds."""
+
+    repairs: tuple[str, ...]
+
+    joint_names: tuple[str, ...] = ()
+    """Of a whole body; none of a single rigid one."""
+
+    warnings: tuple[ClipWarning, ...] = ()
+    body: str = ""
+    """As the user named it."""
+
+    against: str = ""
+    """What the motion is called that the modes are compared with, if any."""
+
+    @property
+    def joints(self) -> int:
+        return len(self.joint_names)
+
+    @classmethod
+    def of(cls, clip: Clip) -> ClipFacts:
+        return cls(
+            clip.name,
+            clip.source,
+            clip.axes,
+            len(clip.times),
+            float(clip.times[-1] - clip.times[0]),
+            clip.repairs,
+            clip.figure.joints if clip.figure else (),
+            clip.warnings,
+            clip.body,
+            clip.against.name if clip.against else "",
+        )

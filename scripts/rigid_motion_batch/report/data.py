@@ -96,7 +96,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
             recording["scales"] = block.put(clip.truth.scales[seen])
     return {
         "name": clip.facts.name,
-        "joints": short_names(clip.joint_names) if body else [],
+        "joints": short_names(clip.facts.joint_names) if body else [],
         "parents": _drawn_from(clip.parents) if body else [],
         "size": size,
         "cell": cell,
@@ -107,7 +107,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
                 "from": None if one.start_s is None else one.start_s - begin,
                 "to": None if one.end_s is None else one.end_s - begin,
             }
-            for one in clip.warnings
+            for one in clip.facts.warnings
         ],
         "recording": recording | {"block": block.text()},
         "choices": [_choice_data(clip, result, seen, label, size) for result in clip.choices],

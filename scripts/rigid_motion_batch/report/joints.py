@@ -63,7 +63,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
         [digits(1e3 * value) for row in of_joint for value in (row.rms_shell_m, row.max_shell_m)]
         for of_joint in zip(*by_mode, strict=True)
     ]
-    names = short_names(clip.joint_names)
+    names = short_names(clip.facts.joint_names)
     places = [int(motion.joint_errors.max(axis=1).argmax()) for motion in motions]
     worst = [f"{names[joint]} {digits(some[joint].max())} mm" for joint, some in zip(places, errors, strict=True)]
     slid = motions[0].metrics[0].recorded_slide_m

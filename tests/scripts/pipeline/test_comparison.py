@@ -19,7 +19,7 @@ from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.results import compare_clip
 from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
-from rigid_motion_batch.pipeline.comparison_steps import About, result_in
+from rigid_motion_batch.pipeline.comparison_steps import result_in
 from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
 from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import Outcome, Share, run
@@ -27,6 +27,7 @@ from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import StageSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparing import write_toss
@@ -37,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 STAGE = StageSettings(resolution=(64, 36), fps=10)
 
-ABOUT = About("Rigid Motion", "compare toss.csv", {"Videos": "small"})
+ABOUT = Settings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "small"})
 
 
 def wanted(*sources: Path, **fields: object) -> Comparison:
@@ -369,14 +370,15 @@ from pathlib import Path
 sys.modules["bpy"] = sys.modules["mathutils"] = None
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
-from rigid_motion_batch.pipeline.comparison_steps import About
+from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.pipeline.executors import SerialExecutor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.store import Store
 
 with Store(Path(sys.argv[2])) as store, SerialExecutor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
-    plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=About("x", "y")), store)
+    about = Settings(0.1, "x", "y")
+    plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
     plan.read(lambda tasks: run(tasks, store, executor))
     outcome = run(plan.tasks, store, executor)
 sys.exit(str(outcome.failures) if outcome.failures else 0)

@@ -12,7 +12,9 @@ import pytest
 
 from rigid_motion_batch.analysis.choices import Budget, Tolerance
 from rigid_motion_batch.recordings.clips import ClipWarning
-from rigid_motion_batch.report import Settings, pages, write_overview, write_report
+from rigid_motion_batch.report import pages
+from rigid_motion_batch.report.pages import write_overview, write_report
+from rigid_motion_batch.report.settings import Settings
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
 from tests.scripts.report.chromium import Browser, browser
@@ -49,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_report(folder / "adaptive.html", [result_of(swinging_clip(), (Tolerance("20mm"),))], SETTINGS)
     named = result_of(swinging_clip(), RATES[1:2], warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
     named = replace(named, facts=replace(named.facts, name=HOSTILE))
-    write_report(folder / "hostile.html", [named, two[0]], replace(SETTINGS, names={"lerp_slerp": HOSTILE}))
+    write_report(folder / "hostile.html", [named, two[0]], SETTINGS)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pages, "IN_THE_PAGE", 1)
         write_report(folder / "large.html", two, SETTINGS)

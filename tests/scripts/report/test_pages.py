@@ -24,9 +24,10 @@ from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.palette import MODE_COLOURS, PAGES, colours_on_pages
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import ClipWarning
-from rigid_motion_batch.report import Gathering, Settings, pages, write_overview, write_report
-from rigid_motion_batch.report.numbers import ERROR, KEYS
-from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of
+from rigid_motion_batch.report import pages
+from rigid_motion_batch.report.numbers import ERROR, KEYS, Gathering
+from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of, write_overview, write_report
+from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.tables import grids
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
@@ -110,7 +111,7 @@ def test_no_name_gets_into_the_page_but_as_text(tmp_path: Path) -> None:
     clip = result_of(swinging_clip(), TEN, warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
     facts = replace(clip.facts, name=HOSTILE, source=HOSTILE, axes=HOSTILE, repairs=(HOSTILE,))
     body = result_of(swinging_body(), TEN)
-    body = replace(body, joint_names=(HOSTILE, *body.joint_names[1:]))
+    body = replace(body, facts=replace(body.facts, joint_names=(HOSTILE, *body.facts.joint_names[1:])))
     path = tmp_path / "report.html"
     page = written(path, replace(clip, facts=facts), body, program=HOSTILE, command=HOSTILE, details={HOSTILE: HOSTILE})
     assert all_text(page).count("alert(1)") >= 8
