@@ -63,6 +63,9 @@ PROGRAM = program_of(SCRIPT)
 
 TABLES = (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED)
 
+SAYING = ("--explain", "--json", "--open", "--quiet")
+"""Options that are about what is printed, and are no part of the command that a report names."""
+
 RECORD = "comparison.json"
 """What a folder is the comparison of, among the files of the store: its recordings, as they count from there."""
 
@@ -76,7 +79,8 @@ def main(arguments: list[str]) -> int:
     options = parse(arguments)
     try:
         blender = _blender(options)
-        comparison = comparison_of(options, as_typed(PROGRAM, arguments, options.inputs), blender)
+        said = [argument for argument in arguments if argument not in SAYING]
+        comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)
         output = options.output or free_folder(options.inputs)
         if not options.overwrite:
             _require_same_comparison(output, options.inputs)
