@@ -126,7 +126,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
             joint_radius=options.radius.joint,
             details=details,
         ),
-        subject=options.object,
+        subject=options.subject,
         blender=blender,
     )
 
@@ -222,11 +222,11 @@ def _blender(options: argparse.Namespace) -> str:
         from rigid_motion_batch.pipeline.blender import version_of
 
         return version_of(options.blender)
-    if options.stage and options.object not in MODELS:
+    if options.stage and options.subject not in MODELS:
         # Only here is Blender loaded, which takes longer than all else before the work begins.
         from rigid_motion_batch.scenes.subject import load_subject
 
-        load_subject(options.object)
+        load_subject(options.subject)
     try:
         return version("bpy")
     except PackageNotFoundError:

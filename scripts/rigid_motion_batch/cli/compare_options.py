@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
@@ -237,6 +238,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     video.add_argument(
         "--object",
+        dest="subject",
         default="drill",
         metavar="OBJECT",
         help="the object to show: drill, controller, or FILE.blend:NAME (%(default)s)",
@@ -262,20 +264,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
     try:
-        options.stage = StageSettings(
-            engine=options.engine,
-            resolution=options.resolution,
-            fps=options.fps,
-            slow_motion=options.slow_motion,
-            subject=options.object,
-            antialiasing=options.antialiasing,
-            samples=options.samples,
-            theme=options.theme,
-            deviation=options.deviation,
-            distinct=options.modes.distinct,
-        )
-        if options.no_video:
-            options.stage = None
+        options.distinct = options.modes.distinct
+        stage = StageSettings(**{one.name: getattr(options, one.name) for one in fields(StageSettings)})
+        options.stage = None if options.no_video else stage
         if options.part != (1, 1) and not options.only:
             raise ValueError("--part is a share of one stage: add --only STAGE")
         options.choices = _choices(options)
@@ -359,17 +350,22 @@ def _modes(text: str) -> Modes:
     return Modes((*modes, BEST_OF), share)
 
 
-def _jobs(text: str) -> int:
-    if not re.fullmatch(r"\d{1,3}", text, re.ASCII):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
-    return int(text)
+def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *numbers: True) -> Callable[[str], Any]:
+    """How whole numbers are read: those in the groups of a pattern, or the single one."""
+
+    def parse_whole(text: str) -> int | tuple[int, ...]:
+        found = re.fullmatch(pattern, text, re.ASCII)
+        numbers = tuple(map(int, found.groups())) if found else ()
+        if not (numbers and fits(*numbers)):
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
+        return numbers if len(numbers) > 1 else numbers[0]
+
+    return parse_whole
 
 
-def _part(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text, re.ASCII)
-    if not found or not 1 <= int(found[1]) <= int(found[2]):
-        raise argparse.ArgumentTypeError(f"{text!r} is no share; give one such as 1/8")
-    return int(found[1]), int(found[2])
+_jobs = _whole(r"(\d{1,3})", "number of processes; give 0, 1, 2, ...")
+_part = _whole(r"(\d{1,6})/(\d{1,6})", "share; give one such as 1/8", lambda number, of: 1 <= number <= of)
+_resolution = _whole(r"(\d{1,5})x(\d{1,5})", "resolution; give one such as 1280x720")
 
 
 def _positive(text: str) -> float:
@@ -384,10 +380,3 @@ def _radii(text: str) -> Radii:
         return read_radii(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _resolution(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text, re.ASCII)
-    if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} is no resolution; give one such as 1280x720")
-    return int(found[1]), int(found[2])

@@ -329,13 +329,13 @@ class ComparisonPlan:
         comparison, stage = self.comparison, self.comparison.stage
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
-        subject = () if study.facts.joints else (self.store.input(place_of_subject(stage.subject)[0]),)
+        how = comparison.radii, comparison.shared, stage, comparison.blender
         building = Task(
             steps.build,
-            steps.Build(study.clip, comparison.radii, comparison.shared, stage, comparison.blender),
+            steps.Build(study.clip, *how),
             f"build {folder}",
             after=(study.reader, measured),
-            inputs=subject,
+            inputs=() if study.facts.joints else self._subject_file(),
             publish={steps.BLEND: f"{folder}/{steps.BLEND}"},
             title=title,
             group=folder,
@@ -344,32 +344,19 @@ class ComparisonPlan:
         count = Timeline.between(*study.choices[choice], stage.fps, stage.slow_motion).count
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
-        rendered = []
+        after = [building.key]
         for first, following in itertools.pairwise(firsts):
-            frames = following - first
-            rendering = Task(
-                steps.render,
-                steps.Frames(title, first, following - 1),
-                f"render {folder} from {first}",
-                after=(building.key,),
-                title=title,
-                weight=seconds * frames,
-                amount=frames,
-                unit="frame",
-                group=f"{folder} from {first}",
-            )
-            rendered.append(rendering.key)
-            yield rendering
-        yield Task(
-            steps.encode,
-            steps.Frames(title, 1, count),
-            f"encode {folder}",
-            after=(building.key, *rendered),
-            publish={steps.FILM: f"{folder}/{steps.FILM}"},
-            title=title,
-            weight=seconds * count * 0.06,
-            group=folder,
-        )
+            frames, name = following - first, f"{folder} from {first}"
+            part = steps.Frames(title, first, following - 1)
+            about = {"title": title, "weight": seconds * frames, "amount": frames, "unit": "frame", "group": name}
+            yield (rendering := Task(steps.render, part, f"render {name}", (building.key,), **about))
+            after.append(rendering.key)
+        about = {"title": title, "weight": seconds * count * 0.06, "group": folder}
+        publish = {steps.FILM: f"{folder}/{steps.FILM}"}
+        yield Task(steps.encode, steps.Frames(title, 1, count), f"encode {folder}", (*after,), publish=publish, **about)
+
+    def _subject_file(self) -> tuple[Input]:
+        return (self.store.input(place_of_subject(self.comparison.subject)[0]),)
 
     # -- pages --------------------------------------------------------------------------------------------------------
 
@@ -378,12 +365,11 @@ class ComparisonPlan:
         comparison, subject = self.comparison, self.comparison.subject
         if subject != Comparison.subject and comparison.blender and not all(s.facts.joints for s in self.studies):
             parameters = steps.Subject(subject, comparison.blender)
-            inputs = (self.store.input(place_of_subject(subject)[0]),)
-            task = Task(steps.subject, parameters, f"object {subject}", inputs=inputs, title=subject)
+            task = Task(steps.subject, parameters, f"object {subject}", inputs=self._subject_file(), title=subject)
             yield task
-            keys = keys | {Part("subject"): task.key}
+            keys |= {Part("subject"): task.key}
         if len(self.studies) <= ON_ONE_PAGE:
-            yield self._page(steps.page, keys | filmed, (), coming=not films)
+            yield self._page(steps.page, keys | filmed, coming=not films)
             return
         of_clips: dict[ClipOf, dict[Part, str]] = {}
         for part, key in (keys | filmed).items():
@@ -392,11 +378,11 @@ class ComparisonPlan:
         for clip, own in of_clips.items():
             films_of = {part: own.pop(part) for part in [*own] if part in filmed}
             page = {"overview": f"../{steps.PAGE}", "folder": clip.name}
-            pages.append(self._page(steps.page, own | shared | films_of, (), coming=not films, **page))
-            yield pages[-1]
-        yield self._page(steps.overview, keys, [page.key for page in pages])
+            yield (task := self._page(steps.page, own | shared | films_of, coming=not films, **page))
+            pages.append(task.key)
+        yield self._page(steps.overview, keys, pages)
 
-    def _page(self, step: Step, parts: dict[Part, str], pages: Iterable[str], **how: Any) -> Task:
+    def _page(self, step: Step, parts: dict[Part, str], pages: Iterable[str] = (), **how: Any) -> Task:
         parameters = Page(tuple(parts), self.comparison.about, **how)
         folder, place = parameters.folder, f"{parameters.folder}/" if parameters.folder else ""
         return Task(
