@@ -17,9 +17,9 @@ from rigid_motion.motion.contacts import slide, standing
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Choice, Uniform
+from .choices import Choice
 from .modes import REFERENCE, single_modes
-from .reconstructions import FEWEST_PROBED, NO_KEYS, PROBE, Groups
+from .reconstructions import FEWEST_PROBED, NO_KEYS, Groups, alike, probing
 
 BLOCK = 4096
 """Samples of all joints that are worked on at once."""
@@ -227,8 +227,7 @@ def same_body_motions(clip: Clip, modes: Sequence[str]) -> Groups:
 
     Each is on its own where there are too few samples to see it.
     """
-    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
-    probe = reconstruct_body(replace(clip, against=None), Uniform(f"{max(rate, 1e-6):.6f}"), modes, 0.0)
+    probe = reconstruct_body(replace(clip, against=None), probing(clip), modes, 0.0)
     if probe is None or 1 < max(map(len, probe.keys[modes[0]])) < FEWEST_PROBED:
         return tuple((mode,) for mode in modes)
     return identical_body_modes(probe)
@@ -238,17 +237,8 @@ def identical_body_modes(made: BodyReconstruction) -> Groups:
     """The modes in groups that put every joint at the same place, but for rounding: as `identical_modes`."""
     samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED).astype(int))
     truth = made.truth(samples)
-    rounding = 1e-12 * (1.0 + np.abs(truth.positions).max())
-    found: list[tuple[list[str], Poses, float]] = []
-    for mode in made.keys:
-        shown = made.shown(mode, made.clip.times[samples])
-        for group, poses, largest in found:
-            if shell_error(shown, poses).max() <= 1e-6 * largest + rounding:
-                group.append(mode)
-                break
-        else:
-            found.append(([mode], shown, float(shell_error(shown, truth).max())))
-    return tuple(tuple(group) for group, _, _ in found)
+    shown = {mode: made.shown(mode, made.clip.times[samples]) for mode in made.keys}
+    return alike(shown, {mode: float(shell_error(poses, truth).max()) for mode, poses in shown.items()})
 
 
 def rms_of_body(made: BodyReconstruction, mode: str, radii: np.ndarray) -> float:

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Errors, Poses
 from rigid_motion.motion.measures import rms
 from rigid_motion_batch.files import replacing
+from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.rows import write_rows
 
 from .choices import Choice
@@ -116,27 +118,33 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     rows = []
     for mode, errors in reconstruction.errors.items():
         keys = len(reconstruction.keys[mode]) or None
-        rows.append(
-            Metrics(
-                clip=clip.name,
-                mode=mode,
-                rate_hz=choice.rate,
-                keys=keys,
-                samples=len(times),
-                duration_s=duration,
-                bytes_per_s=keys and (keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
-                rms_shell_m=rms(errors.shell),
-                p95_shell_m=float(np.percentile(errors.shell, 95.0)),
-                max_shell_m=float(np.max(errors.shell)),
-                rms_position_m=rms(errors.position),
-                rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
-                rms_velocity_m_s=rms(errors.velocity),
-                decimation=choice.decimation,
-                tolerance_m=choice.tolerance(clip),
-                keys_per_s=keys and (keys - 1) / duration,
-            )
+        row = Metrics(
+            mode=mode,
+            keys=keys,
+            duration_s=duration,
+            bytes_per_s=keys and (keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
+            keys_per_s=keys and (keys - 1) / duration,
+            **of_errors(clip, choice, errors),
         )
+        rows.append(row)
     return rows
+
+
+def of_errors(clip: Clip, choice: Choice, errors: Errors) -> dict[str, Any]:
+    """The fields of a row that any motion has, of errors in metres and radians."""
+    return {
+        "clip": clip.name,
+        "rate_hz": choice.rate,
+        "samples": errors.shell.shape[-1],
+        "rms_shell_m": rms(errors.shell),
+        "p95_shell_m": float(np.percentile(errors.shell, 95.0)),
+        "max_shell_m": float(errors.shell.max()),
+        "rms_position_m": rms(errors.position),
+        "rms_rotation_deg": float(np.degrees(rms(errors.rotation))),
+        "rms_velocity_m_s": rms(errors.velocity),
+        "decimation": choice.decimation,
+        "tolerance_m": choice.tolerance(clip),
+    }
 
 
 def geometric_mean(values: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ Times and poses are the clip's, errors are in metres (`clips`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -169,11 +169,16 @@ def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tup
 
     Each is on its own where there are too few samples to see it.
     """
-    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
-    probe = reconstruct(replace(clip, against=None), Uniform(f"{max(rate, 1e-6):.6f}"), modes, radius)
+    probe = reconstruct(replace(clip, against=None), probing(clip), modes, radius)
     if probe is None or len(probe.keys[modes[0]]) < FEWEST_PROBED:
         return tuple((mode,) for mode in modes)
     return identical_modes([probe])
+
+
+def probing(clip: Clip) -> Uniform:
+    """About every `PROBE`th sample as a key."""
+    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
+    return Uniform(f"{max(rate, 1e-6):.6f}")
 
 
 def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:
@@ -199,19 +204,20 @@ def joint_groups(groupings: Iterable[Groups]) -> Groups:
 
 
 def _groups(reconstruction: Reconstruction) -> Groups:
+    poses = {mode: reconstruction.clip.in_metres(own) for mode, own in reconstruction.poses.items()}
+    largest = {mode: float(errors.shell.max()) for mode, errors in reconstruction.errors.items()}
+    return alike(poses, largest)
+
+
+def alike(poses: Mapping[str, Poses], largest: Mapping[str, float]) -> Groups:
+    """The modes whose poses are the same but for a millionth of their largest error and for rounding, in metres."""
     groups: list[list[str]] = []
-    for mode in reconstruction.poses:
+    for mode, own in poses.items():
         for group in groups:
-            if _same(reconstruction, group[0], mode):
+            rounding = 1e-12 * (1.0 + np.abs(poses[group[0]].positions).max())
+            if shell_error(poses[group[0]], own).max() <= 1e-6 * largest[group[0]] + rounding:
                 group.append(mode)
                 break
         else:
             groups.append([mode])
     return tuple(map(tuple, groups))
-
-
-def _same(reconstruction: Reconstruction, first: str, second: str) -> bool:
-    poses, others = (reconstruction.clip.in_metres(reconstruction.poses[mode]) for mode in (first, second))
-    rounding = 1e-12 * (1.0 + np.abs(poses.positions).max())
-    apart = shell_error(poses, others).max()
-    return bool(apart <= 1e-6 * reconstruction.errors[first].shell.max() + rounding)
