@@ -108,7 +108,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         sources=tuple(options.inputs),
         choices=tuple(options.choices),
         modes=options.modes.names,
-        against=options.against,
+        against=options.against or "",
         axes=options.axes,
         reading=options.reading,
         radii=options.radius,
@@ -116,7 +116,6 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         form=options.format,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
-        beside_decimate=bool(blender),
         stage=stage,
         every_film=options.films == ALL,
         about=Settings(
@@ -209,7 +208,7 @@ def _blender(options: argparse.Namespace) -> str:
     Refused, ExecutorError, SubjectError
         Where one is needed that there is not, with the way out.
     """
-    read = next((one for one in [*options.inputs, options.against] if _suffix(one) in IN_BLENDER), None)
+    read = next((one for one in [*options.inputs, options.against or ""] if _suffix(one) in IN_BLENDER), None)
     if not (options.blender or blender_program() or find_spec("bpy")):
         if options.stage or read:
             raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))

@@ -14,7 +14,7 @@ from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.command_line import did_you_mean, folder_path, number, parser_of
+from rigid_motion_batch.command_line import did_you_mean, folder_path, not_empty, number, parser_of
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.bundle import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
@@ -165,7 +165,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     parser.add_argument(
         "--against",
-        default="",
+        type=not_empty,
         metavar="FILE",
         help="a motion to show beside those of the modes: somebody else's, of the same clip, read as this is",
     )

@@ -95,9 +95,6 @@ class Comparison:
     fit: bool = False
     """And how many where they may be fitted."""
 
-    beside_decimate: bool = True
-    """Whether to set adaptive keys of bodies beside those of Blender's Decimate, for which there must be a Blender."""
-
     stage: StageSettings | None = None
     """How to make the films; None for a run without."""
 
@@ -112,7 +109,7 @@ class Comparison:
     Blender."""
 
     blender: str = ""
-    """The version of the Blender that films and reads; empty where there is none."""
+    """The version of the Blender that films, reads and decimates; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +124,8 @@ class Study:
     choices: dict[Choice, tuple[float, float]]
     """Each with the times of the first and the last key."""
 
-    beside_decimate: bool = True
+    blender: bool
+    """Whether there is one."""
 
     @property
     def name(self) -> str:
@@ -144,7 +142,7 @@ class Study:
     @property
     def decimated(self) -> list[Choice]:
         """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
-        if not self.beside_decimate or not 0 < self.facts.samples * self.facts.joints <= MOST_DECIMATED:
+        if not self.blender or not 0 < self.facts.samples * self.facts.joints <= MOST_DECIMATED:
             return []
         return [choice for choice in self.choices if choice.decimation == "adaptive"]
 
@@ -226,7 +224,7 @@ class ComparisonPlan:
                 choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
             }
             if enough:
-                self.studies.append(Study(ClipOf(name, body), key, one, enough, comparison.beside_decimate))
+                self.studies.append(Study(ClipOf(name, body), key, one, enough, bool(comparison.blender)))
                 of_clips += self._left_out(self.studies[-1])
         return notes + of_clips
 
@@ -243,7 +241,7 @@ class ComparisonPlan:
         if joints and not study.decimated and any(choice.decimation == "adaptive" for choice in study.choices):
             reason = (
                 f": {joints} joints with {samples} samples would take too long; cut it to {MOST_DECIMATED // joints}"
-                if self.comparison.beside_decimate
+                if study.blender
                 else ", for there is no Blender here"
             )
             yield f"{study.name}: not compared with Blender's Decimate{reason}"

@@ -43,7 +43,8 @@ ABOUT = Settings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "sm
 
 def wanted(*sources: Path, **fields: object) -> Comparison:
     modes = ("lerp_slerp", "motor_spline")
-    return replace(Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes), **fields)
+    comparison = Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes, blender="this")
+    return replace(comparison, **fields)
 
 
 def compared(
@@ -163,7 +164,7 @@ def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Pa
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
         *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4")),
     }
-    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), beside_decimate=False))
+    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), blender=""))
     assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
     assert {*published(tmp_path / "without")} >= {"metrics.csv", "metrics_joints.csv"}
     assert "decimated.csv" not in published(tmp_path / "without")
