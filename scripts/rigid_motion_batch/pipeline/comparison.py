@@ -226,7 +226,15 @@ class ComparisonPlan:
             if enough:
                 self.studies.append(Study(ClipOf(name, body), key, one, enough, bool(comparison.blender)))
                 of_clips += self._left_out(self.studies[-1])
+        if self._shows_object and not comparison.blender:
+            notes.append(f"the report shows a drill, for there is no Blender here that reads {comparison.subject}")
         return notes + of_clips
+
+    @property
+    def _shows_object(self) -> bool:
+        """Whether pages show another object than the one that needs no Blender."""
+        rigid = any(not study.facts.joints for study in self.studies)
+        return rigid and self.comparison.subject != Comparison.subject
 
     def _left_out(self, study: Study) -> Iterator[str]:
         """What is not made of a clip because it is too much, for the user."""
@@ -361,7 +369,7 @@ class ComparisonPlan:
     def _pages(self, keys: dict[Part, str], filmed: dict[Part, str], films: bool) -> Iterator[Task]:
         """The page of a few clips, or a page for each of many and one that leads to them."""
         comparison, subject = self.comparison, self.comparison.subject
-        if subject != Comparison.subject and comparison.blender and not all(s.facts.joints for s in self.studies):
+        if comparison.blender and self._shows_object:
             parameters = steps.Subject(subject, comparison.blender)
             task = Task(steps.subject, parameters, f"object {subject}", inputs=self._subject_file(), title=subject)
             yield task

@@ -390,3 +390,12 @@ def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", WITHOUT, toss, output], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     assert {"metrics.csv", "keys_needed.csv", "report.html"} <= {*published(output)}
+
+
+def test_without_blender_a_page_shows_a_drill_and_a_line_says_so(output: Path, toss: Path) -> None:
+    outcome, listener = compared(output, wanted(toss, about=ABOUT, subject="controller", blender=""))
+    assert outcome.failures == {}
+    assert "the report shows a drill, for there is no Blender here that reads controller" in listener.notes
+    assert "object controller" not in listener.done
+    _, again = compared(output, wanted(toss, about=ABOUT, subject="controller"))
+    assert again.done == {"object controller", "report.html"}
