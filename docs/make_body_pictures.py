@@ -24,11 +24,10 @@ from rigid_motion_batch.analysis.choices import Uniform
 from rigid_motion_batch.analysis.radii import EVERYWHERE
 from rigid_motion_batch.analysis.results import ChoiceResult, compare_clip
 from rigid_motion_batch.cli import compare
+from rigid_motion_batch.palette import ERROR_COLOURS, full_colour
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import short_names
-from rigid_motion_batch.report.colours import ERROR_COLOURS
-from rigid_motion_batch.report.joints import full_colour
 from rigid_motion_batch.scenes.film import render_still
 from rigid_motion_batch.scenes.materials import surface
 from tests.rigs import dancer, figure

@@ -45,7 +45,15 @@ def to_blender(poses: Poses, axes: str) -> Poses:
     """
     if axes not in AXES:
         raise ValueError(f"there are no axes named {axes!r}; known are {', '.join(AXES)}")
-    change = AXES[axes]
+    return _changed(poses, AXES[axes])
+
+
+def from_blender(poses: Poses, axes: str) -> Poses:
+    """The opposite of `to_blender`."""
+    return _changed(poses, AXES[axes].T)
+
+
+def _changed(poses: Poses, change: np.ndarray) -> Poses:
     handedness = np.sign(np.linalg.det(change))
     quaternions = poses.quaternions.copy()
     quaternions[..., 1:] = handedness * poses.quaternions[..., 1:] @ change.T

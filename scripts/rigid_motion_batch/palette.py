@@ -1,8 +1,9 @@
-"""Colours: one for each mode wherever it is shown, and those of the stage around it. sRGB, as in a web page.
+"""Colours: one for each mode wherever it is shown, in films, on pages and in drawings, and what is around it. sRGB.
 
 The modes have the colours of Okabe and Ito (Color Universal Design, 2008), which people with any of the common forms
 of colour blindness can tell apart, but for a lighter blue, and a leaf green beside them that keeps apart from all: each
-reaches a contrast of 3 on the dark stage, and is darkened to reach it on the light one. Nothing here needs Blender.
+reaches a contrast of 3 on the dark stage. Where one would stand out too little it is darkened or lightened. Nothing
+here needs Blender.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ MODE_COLOURS: dict[str, str] = {
 """Mode id to colour."""
 
 OTHER_COLOURS = ("#B3B3B3", "#A98467", "#B7E4C7")
-"""For modes that have no colour of their own yet."""
+"""For modes that have no colour of their own yet, and for somebody else's motion."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,9 @@ THEMES = {
 }
 DARK = THEMES["dark"]
 
+PAGES = "#ffffff", "#0e1115"
+"""Grounds of a report, light and dark."""
+
 ERROR_COLOURS = ("#5B7FB0", "#C9B98A", "#F08A24", "#C4162A")
 """What an error looks like where it is a colour, evenly from none to the largest: calm where all is well, red where it
 is not. They differ in lightness as well, for people who cannot tell red from green."""
@@ -65,6 +69,9 @@ NEARLY_ALL = 0.995
 LEAST_CONTRAST = 3.0
 """Of a mode with what it stands before (WCAG 2.2, 1.4.11)."""
 
+CONTRAST_OF_WORDS = 4.5
+"""Of its name with the page (WCAG 2.2, 1.4.3)."""
+
 
 def colour_of(mode: str) -> str:
     """The colour of a mode, the same in every run, also for a mode that the table does not know."""
@@ -72,13 +79,27 @@ def colour_of(mode: str) -> str:
 
 
 def colour_on(theme: Theme, mode: str) -> str:
-    """The colour of a mode, darkened as far as it needs to be to stand out from a light card."""
-    red, green, blue = linear(colour_of(mode))
-    highest = (luminance(theme.card) + 0.05) / LEAST_CONTRAST - 0.05
-    if luminance(theme.card) < 0.5 or luminance(colour_of(mode)) <= highest:
-        return colour_of(mode)
-    share = highest / luminance(colour_of(mode))
-    return "#" + "".join(f"{int(255.0 * _encoded(share * value)):02X}" for value in (red, green, blue))
+    """The colour of a mode, as it stands out from a card."""
+    return standing_out(colour_of(mode), theme.card, LEAST_CONTRAST)
+
+
+def colours_on_pages(mode: str) -> list[str]:
+    """The colour of a mode on a light page and on a dark one, where its name is written in it."""
+    return [standing_out(colour_of(mode), ground, CONTRAST_OF_WORDS) for ground in PAGES]
+
+
+def standing_out(colour: str, ground: str, contrast: float) -> str:
+    """A colour, darkened on a light ground or lightened on a dark one as far as it needs to be for a contrast."""
+    behind, own = luminance(ground) + 0.05, luminance(colour)
+    light = behind > 0.5
+    limit = behind / contrast - 0.05 if light else behind * contrast - 0.05
+    if own <= limit if light else own >= limit:
+        return colour
+    towards = 0.0 if light else 1.0
+    share = (limit - own) / (towards - own)
+    mixed = (value + share * (towards - value) for value in linear(colour))
+    # Rounded away from the ground.
+    return "#" + "".join(f"{min(int(255.0 * _encoded(value) + towards), 255):02X}" for value in mixed)
 
 
 def error_hex(share: float) -> str:

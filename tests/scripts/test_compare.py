@@ -27,8 +27,10 @@ from rigid_motion_batch.pipeline.steps import OWN
 from rigid_motion_batch.pipeline.store import Store
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.scenes import film
+from rigid_motion_batch.scenes.subject import load_subject, vertices_of
 from tests.balls import largest_displacements
 from tests.recordings import RECORDINGS
+from tests.scripts.comparing import write_toss
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -721,3 +723,26 @@ def test_the_best_of_fewer_than_two_modes_is_refused(modes, capsys):
     assert "best_of chooses among the other modes that are named: name two or more, or all,best_of" in (
         capsys.readouterr().err
     )
+
+
+def test_the_viewer_moves_the_object_of_the_films(tmp_path):
+    toss = write_toss(tmp_path / "toss.csv")
+    sizes = {}
+    for model in ("drill", "controller"):
+        assert run(toss, "--no-video", "--rates", "10", "--object", model, "--output", tmp_path / model) == 0
+        page = (tmp_path / model / "report.html").read_text(encoding="utf-8")
+        (data,) = re.findall(r'<script type="application/json" id="page">(.*?)</script>', page)
+        sizes[model] = json.loads(data)["mesh"]["size"]
+        assert len(page) < 500_000
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    places = vertices_of(load_subject("controller"))
+    assert sizes["controller"] == pytest.approx(np.linalg.norm(np.ptp(places, axis=0)), rel=0.02)
+    assert sizes["controller"] != pytest.approx(sizes["drill"], rel=0.1)
+
+
+def test_an_object_that_the_viewer_cannot_have_leaves_the_report(tmp_path, capsys):
+    toss = write_toss(tmp_path / "toss.csv")
+    how = ("--no-video", "--rates", "10", "--object", tmp_path / "none.blend:Box", "--output", tmp_path / "output")
+    assert run(toss, *how) == 1
+    assert "the report shows a drill: " in capsys.readouterr().err
+    assert (tmp_path / "output" / "report.html").exists()

@@ -15,9 +15,9 @@ from urllib.parse import unquote
 import pytest
 
 from rigid_motion_batch.cli import compare
+from rigid_motion_batch.pipeline.comparison import ON_ONE_PAGE
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.clip_reading import DEVICES, NOT_FOLDERS, folder_names
-from rigid_motion_batch.report import ON_ONE_PAGE
 from rigid_motion_batch.rows import meant
 from tests.scripts.recordings.seeds import SEEDS
 

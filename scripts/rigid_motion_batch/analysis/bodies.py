@@ -7,7 +7,7 @@ space, through the hierarchy, in metres. What is as long as the recording is wor
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,9 +17,9 @@ from rigid_motion.motion.contacts import slide, standing
 from rigid_motion_batch.axes import to_blender
 from rigid_motion_batch.recordings.clips import Clip
 
-from .choices import Choice, Uniform
+from .choices import Choice
 from .modes import REFERENCE, single_modes
-from .reconstructions import FEWEST_PROBED, PROBE, Groups
+from .reconstructions import FEWEST_PROBED, NO_KEYS, Groups, alike, probing
 
 BLOCK = 4096
 """Samples of all joints that are worked on at once."""
@@ -44,7 +44,7 @@ class BodyReconstruction:
     choice: Choice
 
     keys: dict[str, JointKeys]
-    """Mode id to the keys of the joints."""
+    """Mode id to the keys of the joints; none of somebody else's motion, which comes last."""
 
     shared: bool
     """Whether the keys are key poses: the same samples for all joints that move."""
@@ -68,7 +68,7 @@ class BodyReconstruction:
     @property
     def best_mode(self) -> str:
         """The one with the fewest keys; where all have as many, the reference or the first."""
-        counts = {mode: sum(map(len, keys)) for mode, keys in self.keys.items()}
+        counts = {mode: count for mode, keys in self.keys.items() if (count := sum(map(len, keys)))}
         fewest = [mode for mode, count in counts.items() if count == min(counts.values())]
         return REFERENCE if REFERENCE in fewest else fewest[0]
 
@@ -78,6 +78,8 @@ class BodyReconstruction:
         In the unit of the recording.
         """
         clip = self.clip
+        if not len(self.keys[mode][0]):
+            return clip.against.at(times)
         poses = Poses(np.empty((len(self.skeleton), len(times), 3)), np.empty((len(self.skeleton), len(times), 4)))
         for joints, own in self._alike(mode):
             poses[joints] = interpolate(clip.times[own], clip.poses[joints][:, own], times, mode)
@@ -180,7 +182,10 @@ def reconstruct_body(
     for group in [modes] if uniform else same_body_motions(clip, modes):
         found = choice.body_keys(clip, group[0], radius, shared=shared)
         keys |= dict.fromkeys(group, tuple(own[:1] if rests else own for own, rests in zip(found, still, strict=True)))
-    return BodyReconstruction(clip, choice, {mode: keys[mode] for mode in modes}, shared or uniform)
+    keys = {mode: keys[mode] for mode in modes}
+    if clip.against:
+        keys[clip.against.name] = (NO_KEYS,) * len(still)
+    return BodyReconstruction(clip, choice, keys, shared or uniform)
 
 
 def measure_body(made: BodyReconstruction, mode: str, radius: float | np.ndarray, ground: Ground) -> BodyErrors:
@@ -222,8 +227,7 @@ def same_body_motions(clip: Clip, modes: Sequence[str]) -> Groups:
 
     Each is on its own where there are too few samples to see it.
     """
-    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
-    probe = reconstruct_body(clip, Uniform(f"{max(rate, 1e-6):.6f}"), modes, 0.0)
+    probe = reconstruct_body(replace(clip, against=None), probing(clip), modes, 0.0)
     if probe is None or 1 < max(map(len, probe.keys[modes[0]])) < FEWEST_PROBED:
         return tuple((mode,) for mode in modes)
     return identical_body_modes(probe)
@@ -233,17 +237,8 @@ def identical_body_modes(made: BodyReconstruction) -> Groups:
     """The modes in groups that put every joint at the same place, but for rounding: as `identical_modes`."""
     samples = np.unique(np.linspace(made.samples.start, made.samples.stop - 1, COMPARED).astype(int))
     truth = made.truth(samples)
-    rounding = 1e-12 * (1.0 + np.abs(truth.positions).max())
-    found: list[tuple[list[str], Poses, float]] = []
-    for mode in made.keys:
-        shown = made.shown(mode, made.clip.times[samples])
-        for group, poses, largest in found:
-            if shell_error(shown, poses).max() <= 1e-6 * largest + rounding:
-                group.append(mode)
-                break
-        else:
-            found.append(([mode], shown, float(shell_error(shown, truth).max())))
-    return tuple(tuple(group) for group, _, _ in found)
+    shown = {mode: made.shown(mode, made.clip.times[samples]) for mode in made.keys}
+    return alike(shown, {mode: float(shell_error(poses, truth).max()) for mode, poses in shown.items()})
 
 
 def rms_of_body(made: BodyReconstruction, mode: str, radii: np.ndarray) -> float:

@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_motion.motion.measures import rms
+from rigid_motion.motion import Errors
 from rigid_motion_batch.files import replacing
 from rigid_motion_batch.rows import line_of, write_rows
 
 from .bodies import BodyErrors, BodyReconstruction, Ground, JointKeys, identical_body_modes, measure_body, moving
-from .metrics import BYTES_PER_KEY, Metrics, lines_of_poses
+from .metrics import BYTES_PER_KEY, Metrics, lines_of_poses, of_errors
 from .reconstructions import Groups
 
 Radii = float | np.ndarray
@@ -36,7 +36,7 @@ class JointMetrics:
     rate_hz: str
     """As the user wrote it; empty where a tolerance decides."""
 
-    keys: int
+    keys: int | None
     """1 of a joint that stays as it is in its parent's space."""
 
     samples: int
@@ -90,59 +90,37 @@ def measure_modes(made: BodyReconstruction, radius: Radii) -> MeasuredBody:
 
 
 def _row_of(made: BodyReconstruction, mode: str, errors: BodyErrors, ground: Ground) -> Metrics:
-    clip, choice, times = made.clip, made.choice, made.times
-    duration = float(times[-1] - times[0])
-    keys = made.keys[mode]
+    clip, keys = made.clip, made.keys[mode]
+    duration = float(made.times[-1] - made.times[0])
     # A joint that stays as it is has its key once, and sends nothing.
-    sent = sum(len(own) - 1 for own in keys)
+    count = sum(map(len, keys))
+    sent = count - len(keys)
     moving_joints = sum(len(own) > 1 for own in keys)
-    joint, _ = errors.worst
     return Metrics(
-        clip=clip.name,
         mode=mode,
-        rate_hz=choice.rate,
-        keys=sum(map(len, keys)),
-        samples=len(times),
+        keys=count or None,
         duration_s=duration,
-        bytes_per_s=sent / duration * BYTES_PER_KEY,
-        rms_shell_m=rms(errors.shell),
-        p95_shell_m=float(np.percentile(errors.shell, 95.0)),
-        max_shell_m=float(errors.shell.max()),
-        rms_position_m=rms(errors.position),
-        rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
-        rms_velocity_m_s=rms(errors.velocity),
-        decimation=choice.decimation,
-        tolerance_m=choice.tolerance(clip),
-        keys_per_s=sent / max(moving_joints, 1) / duration,
+        bytes_per_s=sent / duration * BYTES_PER_KEY if count else None,
+        keys_per_s=sent / max(moving_joints, 1) / duration if count else None,
         joints=len(keys),
-        key_frames=len(key_samples(keys)),
-        worst_joint=clip.figure.joints[joint],
+        key_frames=len(key_samples(keys)) or None,
+        worst_joint=clip.figure.joints[errors.worst[0]],
         foot_slide_m=errors.slide if len(ground.joints) else None,
         recorded_slide_m=ground.slide if len(ground.joints) else None,
+        **of_errors(clip, made.choice, errors),
     )
 
 
 def _rows_of_joints(made: BodyReconstruction, mode: str, errors: BodyErrors) -> Iterator[JointMetrics]:
-    clip, choice, times = made.clip, made.choice, made.times
-    worst = errors.shell.argmax(axis=1)
-    root_mean_squares = np.sqrt(np.mean(np.square(errors.shell), axis=1))
-    for joint, name in enumerate(clip.figure.joints):
+    clip, times = made.clip, made.times
+    of_joints = map(Errors, errors.shell, errors.position, errors.rotation, errors.velocity)
+    for name, keys, own in zip(clip.figure.joints, made.keys[mode], of_joints, strict=True):
         yield JointMetrics(
-            clip=clip.name,
             joint=name,
             mode=mode,
-            rate_hz=choice.rate,
-            keys=len(made.keys[mode][joint]),
-            samples=len(times),
-            rms_shell_m=float(root_mean_squares[joint]),
-            p95_shell_m=float(np.percentile(errors.shell[joint], 95.0)),
-            max_shell_m=float(errors.shell[joint, worst[joint]]),
-            worst_s=float(times[worst[joint]] - times[0]),
-            rms_position_m=float(errors.position[joint]),
-            rms_rotation_deg=float(np.degrees(errors.rotation[joint])),
-            rms_velocity_m_s=float(errors.velocity[joint]),
-            decimation=choice.decimation,
-            tolerance_m=choice.tolerance(clip),
+            keys=len(keys) or None,
+            worst_s=float(times[own.shell.argmax()] - times[0]),
+            **of_errors(clip, made.choice, own),
         )
 
 
@@ -185,7 +163,8 @@ def write_key_tables(folder: Path, made: BodyReconstruction) -> None:
     A row is a joint's pose in its parent's space, in the unit of the recording: `joint,t,x,y,z,qw,qx,qy,qz`.
     """
     uniform = made.choice.decimation == "uniform"
-    for mode, keys in list(made.keys.items())[: 1 if uniform else None]:
+    known = [(mode, keys) for mode, keys in made.keys.items() if len(keys[0])]
+    for mode, keys in known[: 1 if uniform else None]:
         with replacing(folder / ("keys.csv" if uniform else f"{mode}.keys.csv")) as stream:
             stream.write("joint,t,x,y,z,qw,qx,qy,qz\n")
             for joint, own in enumerate(keys):

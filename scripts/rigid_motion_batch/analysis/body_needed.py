@@ -15,7 +15,8 @@ from rigid_motion_batch.recordings.clips import Clip
 
 from .bodies import BodyReconstruction, rms_of_body, same_body_motions
 from .choices import Uniform
-from .needed import DECIMATIONS, part_of
+from .needed import DECIMATIONS, OfRigidBody, Ways, part_of
+from .radii import Radii
 from .reconstructions import Groups
 
 NEAR = 0.02
@@ -78,3 +79,8 @@ class OfBody:
             )
             keys = max(found, key=len)
         return keys, self.error(keys, mode)
+
+
+def ways_of(clip: Clip, radii: Radii, *, fit: bool) -> Ways:
+    """The ways to have fewer keys of a clip, whatever it is of; only those of a rigid body may be fitted."""
+    return OfBody(clip, radii.of(clip.figure.joints)) if clip.figure else OfRigidBody(clip, radii.rigid, fit=fit)

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Errors, Poses
 from rigid_motion.motion.measures import rms
 from rigid_motion_batch.files import replacing
+from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.rows import write_rows
 
 from .choices import Choice
@@ -47,7 +49,8 @@ class Metrics:
     rate_hz: str
     """As the user wrote it; empty where a tolerance decides."""
 
-    keys: int
+    keys: int | None
+    """Empty of somebody else's motion, as all that is counted by keys."""
 
     samples: int
     """How many samples of the recording were compared: those between the first and the last key, both included."""
@@ -55,7 +58,7 @@ class Metrics:
     duration_s: float
     """From the first key to the last."""
 
-    bytes_per_s: float
+    bytes_per_s: float | None
     """Of the keys that were really kept, not of the rate that was asked for: see `measure_reconstruction`."""
 
     rms_shell_m: float
@@ -71,7 +74,7 @@ class Metrics:
     tolerance_m: float | None
     """The largest shell error that was allowed; empty in the table where a rate decides."""
 
-    keys_per_s: float
+    keys_per_s: float | None
     """On average, the first key not counted; of a whole body, for each joint."""
 
     joints: int | None = None
@@ -114,28 +117,34 @@ def measure_reconstruction(reconstruction: Reconstruction) -> list[Metrics]:
     duration = float(times[-1] - times[0])
     rows = []
     for mode, errors in reconstruction.errors.items():
-        keys = len(reconstruction.keys[mode])
-        rows.append(
-            Metrics(
-                clip=clip.name,
-                mode=mode,
-                rate_hz=choice.rate,
-                keys=keys,
-                samples=len(times),
-                duration_s=duration,
-                bytes_per_s=(keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
-                rms_shell_m=rms(errors.shell),
-                p95_shell_m=float(np.percentile(errors.shell, 95.0)),
-                max_shell_m=float(np.max(errors.shell)),
-                rms_position_m=rms(errors.position),
-                rms_rotation_deg=float(np.degrees(rms(errors.rotation))),
-                rms_velocity_m_s=rms(errors.velocity),
-                decimation=choice.decimation,
-                tolerance_m=choice.tolerance(clip),
-                keys_per_s=(keys - 1) / duration,
-            )
+        keys = len(reconstruction.keys[mode]) or None
+        row = Metrics(
+            mode=mode,
+            keys=keys,
+            duration_s=duration,
+            bytes_per_s=keys and (keys - 1) / duration * (BYTES_PER_KEY + BYTES_PER_MODE * (mode == BEST_OF)),
+            keys_per_s=keys and (keys - 1) / duration,
+            **of_errors(clip, choice, errors),
         )
+        rows.append(row)
     return rows
+
+
+def of_errors(clip: Clip, choice: Choice, errors: Errors) -> dict[str, Any]:
+    """The fields of a row that any motion has, of errors in metres and radians."""
+    return {
+        "clip": clip.name,
+        "rate_hz": choice.rate,
+        "samples": errors.shell.shape[-1],
+        "rms_shell_m": rms(errors.shell),
+        "p95_shell_m": float(np.percentile(errors.shell, 95.0)),
+        "max_shell_m": float(errors.shell.max()),
+        "rms_position_m": rms(errors.position),
+        "rms_rotation_deg": float(np.degrees(rms(errors.rotation))),
+        "rms_velocity_m_s": rms(errors.velocity),
+        "decimation": choice.decimation,
+        "tolerance_m": choice.tolerance(clip),
+    }
 
 
 def geometric_mean(values: np.ndarray) -> np.ndarray:
@@ -205,12 +214,12 @@ def lines_of_poses(columns: Sequence[np.ndarray]) -> Iterator[tuple[int, list[st
         yield first, [",".join(map(repr, row)) for row in rows]
 
 
-def table_names(choice: Choice, modes: Iterable[str], form: str = "csv") -> list[str]:
-    """The files that `write_reconstruction` writes for a choice of keys."""
+def table_names(choice: Choice, modes: Iterable[str], form: str = "csv", other: str = "") -> list[str]:
+    """The files that `write_reconstruction` writes for a choice of keys; `other` is a motion whose keys are unknown."""
     modes = tuple(modes)
     single = [] if choice.decimation == "uniform" else [f"{mode}.keys.{form}" for mode in single_modes(modes)]
     best = [f"{BEST_OF}.keys.csv"] if BEST_OF in modes else []
-    return [*(f"{mode}.{form}" for mode in modes), *(single or [f"keys.{form}"]), *best]
+    return [*(f"{mode}.{form}" for mode in (*modes, other) if mode), *(single or [f"keys.{form}"]), *best]
 
 
 def body_table_names(choice: Choice, modes: Iterable[str]) -> list[str]:
@@ -227,7 +236,8 @@ def write_reconstruction(folder: Path, reconstruction: Reconstruction, form: str
     clip = reconstruction.clip
     for mode, poses in reconstruction.poses.items():
         write_poses(folder / f"{mode}.{form}", reconstruction.times, poses)
-    tables = {f"{mode}.keys.{form}": keys for mode, keys in reconstruction.keys.items() if mode != BEST_OF}
+    known = {mode: keys for mode, keys in reconstruction.keys.items() if len(keys)}
+    tables = {f"{mode}.keys.{form}": keys for mode, keys in known.items() if mode != BEST_OF}
     if reconstruction.choice.decimation == "uniform":
         tables = {f"keys.{form}": next(iter(tables.values()))}
     for name, keys in tables.items():

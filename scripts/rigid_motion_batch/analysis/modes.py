@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rigid_motion.motion import MODES
+from rigid_motion_batch.recordings.clip_reading import folder_names
 
 REFERENCE = "lerp_slerp"
 """The state of the art in the paper: what the other modes are held against."""
@@ -19,6 +20,8 @@ BEST_OF_DESCRIPTION = (
     "has those of the best single mode"
 )
 
+OTHER_DESCRIPTION = "A motion that was given with --against, as its own samples have it; its keys are not known"
+
 
 def label_of(mode: str) -> str:
     """What a mode is called."""
@@ -29,9 +32,16 @@ def label_of(mode: str) -> str:
 
 def description_of(mode: str) -> str:
     """What a mode does for the motion, in one sentence without a full stop."""
-    return BEST_OF_DESCRIPTION if mode == BEST_OF else MODES[mode].description
+    if mode == BEST_OF:
+        return BEST_OF_DESCRIPTION
+    return MODES[mode].description if mode in MODES else OTHER_DESCRIPTION
 
 
 def single_modes(modes: Iterable[str]) -> tuple[str, ...]:
     """Those that fill in all segments alike."""
     return tuple(mode for mode in modes if mode != BEST_OF)
+
+
+def name_of_other(stem: str) -> str:
+    """What somebody else's motion is called, by its file: safe as the name of a table, and unlike any other there."""
+    return folder_names([*MODES, BEST_OF, "keys", stem.replace(".", "_")])[-1]

@@ -5,7 +5,7 @@ Times and poses are the clip's, errors are in metres (`clips`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from rigid_motion.motion import (
     rms,
     shell_error,
 )
-from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.recordings.clips import Clip, OtherMotion
 
 from .choices import Choice, Uniform
 from .modes import BEST_OF, single_modes
@@ -33,6 +33,9 @@ PROBE = 4
 
 FEWEST_PROBED = 4
 """Keys that are needed to see which modes are one motion: between two, a spline is a screw like any other."""
+
+NO_KEYS = np.array([], dtype=int)
+"""Of somebody else's motion: they are not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,8 @@ class Reconstruction:
     """How the keys were chosen."""
 
     keys: dict[str, np.ndarray]
-    """Mode id to the samples that were kept, rising indices into the clip, shape (k,)."""
+    """Mode id to the samples that were kept, rising indices into the clip, shape (k,); none of somebody else's motion,
+    which comes last."""
 
     poses: dict[str, Poses]
     """Mode id to the poses at `times`."""
@@ -73,10 +77,13 @@ class Reconstruction:
     @property
     def best_mode(self) -> str:
         """The best single mode: with the fewest keys, and of those with the least RMS shell error."""
-        return min(single_modes(self.keys), key=lambda mode: (len(self.keys[mode]), rms(self.errors[mode].shell)))
+        counts = {mode: len(self.keys[mode]) for mode in single_modes(self.keys) if len(self.keys[mode])}
+        return min(counts, key=lambda mode: (counts[mode], rms(self.errors[mode].shell)))
 
     def filled_in(self, mode: str, times: np.ndarray) -> Poses:
         """What a mode makes of its keys at any times."""
+        if not len(self.keys[mode]):
+            return self.clip.against.at(times)
         key_times, keys = self.clip.times[self.keys[mode]], self.clip.poses[self.keys[mode]]
         if mode == BEST_OF:
             return interpolate_by_segments(key_times, keys, times, self.segment_modes)
@@ -89,6 +96,7 @@ def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float)
     Parameters
     ----------
     clip : Clip
+        What the user compares with it comes after the modes.
     choice : Choice
     modes : sequence of str
         Of `rigid_motion.motion.MODES`, and `BEST_OF` of them.
@@ -113,7 +121,8 @@ def reconstruct(clip: Clip, choice: Choice, modes: Sequence[str], radius: float)
     if min(map(len, keys.values())) < 2:
         return None
     made = fill_in(clip, choice, {mode: keys[mode] for mode in modes}, radius)
-    return with_best_of(made, radius) if with_best else made
+    made = with_best_of(made, radius) if with_best else made
+    return with_other(made, clip.against, radius) if clip.against else made
 
 
 def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
@@ -126,6 +135,19 @@ def with_best_of(made: Reconstruction, radius: float) -> Reconstruction:
     )
     best = fill_in(clip, made.choice, {BEST_OF: kept}, radius, chosen)
     return replace(best, keys=made.keys | best.keys, poses=made.poses | best.poses, errors=made.errors | best.errors)
+
+
+def with_other(made: Reconstruction, other: OtherMotion, radius: float) -> Reconstruction:
+    """The same with somebody else's motion behind its modes, at the samples that these are compared at."""
+    clip, poses = made.clip, other.at(made.times)
+    truth = clip.in_metres(clip.poses[made.samples])
+    errors = measure(made.times, clip.in_metres(poses), truth, radius)
+    return replace(
+        made,
+        keys=made.keys | {other.name: NO_KEYS},
+        poses=made.poses | {other.name: poses},
+        errors=made.errors | {other.name: errors},
+    )
 
 
 def fill_in(
@@ -147,11 +169,16 @@ def same_motions(clip: Clip, modes: tuple[str, ...], radius: float) -> tuple[tup
 
     Each is on its own where there are too few samples to see it.
     """
-    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
-    probe = reconstruct(clip, Uniform(f"{max(rate, 1e-6):.6f}"), modes, radius)
+    probe = reconstruct(replace(clip, against=None), probing(clip), modes, radius)
     if probe is None or len(probe.keys[modes[0]]) < FEWEST_PROBED:
         return tuple((mode,) for mode in modes)
     return identical_modes([probe])
+
+
+def probing(clip: Clip) -> Uniform:
+    """About every `PROBE`th sample as a key."""
+    rate = (len(clip.times) - 1) / float(clip.times[-1] - clip.times[0]) / PROBE
+    return Uniform(f"{max(rate, 1e-6):.6f}")
 
 
 def identical_modes(reconstructions: Sequence[Reconstruction]) -> Groups:
@@ -177,19 +204,20 @@ def joint_groups(groupings: Iterable[Groups]) -> Groups:
 
 
 def _groups(reconstruction: Reconstruction) -> Groups:
+    poses = {mode: reconstruction.clip.in_metres(own) for mode, own in reconstruction.poses.items()}
+    largest = {mode: float(errors.shell.max()) for mode, errors in reconstruction.errors.items()}
+    return alike(poses, largest)
+
+
+def alike(poses: Mapping[str, Poses], largest: Mapping[str, float]) -> Groups:
+    """The modes whose poses are the same but for a millionth of their largest error and for rounding, in metres."""
     groups: list[list[str]] = []
-    for mode in reconstruction.poses:
+    for mode, own in poses.items():
         for group in groups:
-            if _same(reconstruction, group[0], mode):
+            rounding = 1e-12 * (1.0 + np.abs(poses[group[0]].positions).max())
+            if shell_error(poses[group[0]], own).max() <= 1e-6 * largest[group[0]] + rounding:
                 group.append(mode)
                 break
         else:
             groups.append([mode])
     return tuple(map(tuple, groups))
-
-
-def _same(reconstruction: Reconstruction, first: str, second: str) -> bool:
-    poses, others = (reconstruction.clip.in_metres(reconstruction.poses[mode]) for mode in (first, second))
-    rounding = 1e-12 * (1.0 + np.abs(poses.positions).max())
-    apart = shell_error(poses, others).max()
-    return bool(apart <= 1e-6 * reconstruction.errors[first].shell.max() + rounding)

@@ -10,48 +10,28 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.recordings.clips import Clip, ClipWarning
+from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 
 from .bodies import BodyReconstruction, reconstruct_body
 from .body_decimated import KeysOfBody
-from .body_metrics import JointMetrics, key_samples, measure_modes
+from .body_metrics import JointMetrics, key_samples, measure_modes, write_key_tables
 from .choices import Choice
-from .metrics import Metrics, measure_reconstruction
+from .metrics import Metrics, measure_reconstruction, write_reconstruction
 from .modes import BEST_OF
 from .needed import KeysNeeded
 from .radii import Radii
-from .reconstructions import Reconstruction, identical_modes, reconstruct
+from .reconstructions import Reconstruction, fill_in, identical_modes, reconstruct
 
 Keys = tuple[np.ndarray, ...]
 """The samples that are keys, rising: of a rigid body one array, of a whole body one for each joint."""
 
-
-@dataclass(frozen=True)
-class ClipFacts:
-    """A clip without its samples."""
-
-    name: str
-    source: str
-    axes: str
-    samples: int
-    duration: float
-    """Seconds."""
-
-    repairs: tuple[str, ...]
-
-    joints: int = 0
-    """Of a whole body; 0 for a single rigid one."""
-
-    @classmethod
-    def of(cls, clip: Clip) -> ClipFacts:
-        duration = float(clip.times[-1] - clip.times[0])
-        joints = len(clip.figure.joints) if clip.figure else 0
-        return cls(clip.name, clip.source, clip.axes, len(clip.times), duration, clip.repairs, joints)
+Made = Reconstruction | BodyReconstruction
 
 
 @dataclass(frozen=True)
@@ -158,15 +138,12 @@ class ClipResult:
     truth: Poses
     """The recording, shape (n,); of a body shape (joints, n), where quaternions are the identity."""
 
-    joint_names: tuple[str, ...]
     parents: np.ndarray | None
     """Of each joint of a body; -1 for a root."""
 
     choices: tuple[ChoiceResult, ...]
     needed: KeysNeeded | None = None
     """The keys that are needed, where that was looked for."""
-
-    warnings: tuple[ClipWarning, ...] = ()
 
 
 def compare_clip(
@@ -190,11 +167,36 @@ def compare_clip(
     ChoiceResult or None
         None where the clip is too short for two keys.
     """
+    made = made_of(clip, choice, modes, radii, shared=shared)
+    return None if made is None else measured(made, radii)
+
+
+def made_of(clip: Clip, choice: Choice, modes: Sequence[str], radii: Radii, *, shared: bool) -> Made | None:
+    """What modes make of a clip: the first half of `compare_clip`."""
     if clip.figure is None:
-        made = reconstruct(clip, choice, modes, radii.rigid)
-        return None if made is None else of_rigid_body(made)
-    body = reconstruct_body(clip, choice, modes, of_joints := radii.of(clip.figure.joints), shared=shared)
-    return None if body is None else of_body(body, of_joints)
+        return reconstruct(clip, choice, modes, radii.rigid)
+    return reconstruct_body(clip, choice, modes, radii.of(clip.figure.joints), shared=shared)
+
+
+def made_again(clip: Clip, found: ChoiceResult, radii: Radii, *, shared: bool) -> Made:
+    """The same by the keys that were chosen before."""
+    if clip.figure is None:
+        keys = {mode: keys[0] for mode, keys in found.keys.items()}
+        return fill_in(clip, found.choice, keys, radii.rigid, found.mode_of_segments)
+    return BodyReconstruction(clip, found.choice, dict(found.keys), shared)
+
+
+def measured(made: Made, radii: Radii) -> ChoiceResult:
+    """Measure what was made: the second half of `compare_clip`."""
+    return _of_body(made, radii) if isinstance(made, BodyReconstruction) else _of_rigid_body(made)
+
+
+def write_tables(folder: Path, made: Made, form: str) -> None:
+    """Write the keys, and of a rigid body the poses, as `table_names` says."""
+    if isinstance(made, BodyReconstruction):
+        write_key_tables(folder, made)
+    else:
+        write_reconstruction(folder, made, form)
 
 
 def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded | None = None) -> ClipResult:
@@ -208,16 +210,13 @@ def clip_result(clip: Clip, choices: Sequence[ChoiceResult], needed: KeysNeeded 
         ClipFacts.of(clip),
         clip.times,
         truth,
-        figure.joints if figure else (),
         figure.parents if figure else None,
         tuple(choices),
         needed,
-        clip.warnings,
     )
 
 
-def of_rigid_body(made: Reconstruction) -> ChoiceResult:
-    """Measure what was made of a rigid body."""
+def _of_rigid_body(made: Reconstruction) -> ChoiceResult:
     rows = {row.mode: row for row in measure_reconstruction(made)}
     motions = []
     for group in identical_modes([made]):
@@ -242,10 +241,9 @@ def of_rigid_body(made: Reconstruction) -> ChoiceResult:
     )
 
 
-def of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
-    """Measure what was made of a whole body, whose joints have balls of these radii, shape (joints,), in metres."""
-    measured = measure_modes(made, radii)
-    rows = {row.mode: row for row in measured.rows}
+def _of_body(made: BodyReconstruction, radii: Radii) -> ChoiceResult:
+    found = measure_modes(made, radii.of(made.clip.figure.joints))
+    rows = {row.mode: row for row in found.rows}
     motions = [
         Motion(
             group,
@@ -255,9 +253,9 @@ def of_body(made: BodyReconstruction, radii: np.ndarray) -> ChoiceResult:
             np.stack([errors.shell.max(axis=0), *errors.largest]),
             errors.shell,
         )
-        for group, errors in zip(measured.groups, measured.errors.values(), strict=True)
+        for group, errors in zip(found.groups, found.errors.values(), strict=True)
     ]
-    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=measured.joints)
+    return ChoiceResult(made.choice, made.samples.start, tuple(motions), made.keys, joints=found.joints)
 
 
 def _places(positions: np.ndarray) -> Poses:

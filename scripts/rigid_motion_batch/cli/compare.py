@@ -37,7 +37,7 @@ from rigid_motion_batch.pipeline.comparison import (
     Comparison,
     ComparisonPlan,
 )
-from rigid_motion_batch.pipeline.comparison_steps import PAGE, About
+from rigid_motion_batch.pipeline.comparison_steps import PAGE
 from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor, processors
 from rigid_motion_batch.pipeline.explain import explain
 from rigid_motion_batch.pipeline.performing import Executor, ExecutorError
@@ -50,7 +50,9 @@ from rigid_motion_batch.progress import Progress, Stage
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import folder_names
 from rigid_motion_batch.recordings.reading import split_source
-from rigid_motion_batch.report import Gathering, Numbers, Verdict, verdict
+from rigid_motion_batch.report.numbers import Gathering, Numbers
+from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.report.verdict import Verdict, verdict
 from rigid_motion_batch.scenes.settings import MODELS, SubjectError
 from rigid_motion_batch.supervising import report
 from rigid_motion_batch.system_libraries import missing_for_rendering, way_out, without_blender
@@ -60,6 +62,9 @@ from . import terminal
 PROGRAM = program_of(SCRIPT)
 
 TABLES = (METRICS, JOINT_METRICS, DECIMATED, KEYS_NEEDED)
+
+SAYING = ("--explain", "--json", "--open", "--quiet")
+"""Options that are about what is printed, and are no part of the command that a report names."""
 
 RECORD = "comparison.json"
 """What a folder is the comparison of, among the files of the store: its recordings, as they count from there."""
@@ -74,7 +79,8 @@ def main(arguments: list[str]) -> int:
     options = parse(arguments)
     try:
         blender = _blender(options)
-        comparison = comparison_of(options, as_typed(PROGRAM, arguments, options.inputs), blender)
+        said = [argument for argument in arguments if argument not in SAYING]
+        comparison = comparison_of(options, as_typed(PROGRAM, said, options.inputs), blender)
         output = options.output or free_folder(options.inputs)
         if not options.overwrite:
             _require_same_comparison(output, options.inputs)
@@ -102,6 +108,7 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         sources=tuple(options.inputs),
         choices=tuple(options.choices),
         modes=options.modes.names,
+        against=options.against or "",
         axes=options.axes,
         reading=options.reading,
         radii=options.radius,
@@ -109,10 +116,16 @@ def comparison_of(options: argparse.Namespace, command: str, blender: str) -> Co
         form=options.format,
         count_keys=options.decimate == "adaptive",
         fit=options.fit,
-        beside_decimate=bool(blender),
         stage=stage,
         every_film=options.films == ALL,
-        about=About(f"{manifest()['name']} {manifest()['version']}", command, details),
+        about=Settings(
+            options.radius.rigid,
+            f"{manifest()['name']} {manifest()['version']}",
+            command,
+            joint_radius=options.radius.joint,
+            details=details,
+        ),
+        subject=options.subject,
         blender=blender,
     )
 
@@ -195,7 +208,7 @@ def _blender(options: argparse.Namespace) -> str:
     Refused, ExecutorError, SubjectError
         Where one is needed that there is not, with the way out.
     """
-    read = next((one for one in options.inputs if _suffix(one) in IN_BLENDER), None)
+    read = next((one for one in [*options.inputs, options.against or ""] if _suffix(one) in IN_BLENDER), None)
     if not (options.blender or blender_program() or find_spec("bpy")):
         if options.stage or read:
             raise Refused(without_blender(f"{read} is read by" if read else "Videos are made by", films=not read))
@@ -208,11 +221,11 @@ def _blender(options: argparse.Namespace) -> str:
         from rigid_motion_batch.pipeline.blender import version_of
 
         return version_of(options.blender)
-    if options.stage and options.object not in MODELS:
+    if options.stage and options.subject not in MODELS:
         # Only here is Blender loaded, which takes longer than all else before the work begins.
         from rigid_motion_batch.scenes.subject import load_subject
 
-        load_subject(options.object)
+        load_subject(options.subject)
     try:
         return version("bpy")
     except PackageNotFoundError:
@@ -289,11 +302,11 @@ class _Run:
             self._do("Reading", self.plan.reading)
             if self.outcome.interrupted or self.outcome.problem or self.options.only:
                 return self._end()
-        notes = self._look_into()
+        notes = self.plan.look_into_anew(lambda tasks: self._do("Reading", tasks))
         warnings = [
             "; ".join(filter(None, (f"{study.name}: {warning.text}", warning.way_out)))
             for study in self.plan.studies
-            for warning in study.warnings
+            for warning in study.facts.warnings
         ]
         for note in dict.fromkeys([*notes, *warnings]):
             self._note(note, "yellow" if note in warnings else "")
@@ -324,7 +337,7 @@ class _Run:
             self._show_numbers()
         return self._end()
 
-    def _do(self, title: str, tasks: Plan) -> None:
+    def _do(self, title: str, tasks: Plan) -> Outcome:
         with self.progress.stage(title, 1.0) as stage:
             shown = FarmProgress() if self.on_farm else _Shown(self.progress, stage, self.options.quiet)
             outcome = run(
@@ -341,17 +354,7 @@ class _Run:
         self.outcome.details = before.details | outcome.details
         if not self.options.only:
             self.outcome.note_failures(self.store)
-
-    def _look_into(self) -> list[str]:
-        """See what was read. What is damaged is read again."""
-        try:
-            return self.plan.look_into()
-        except Exception:
-            for task in self.plan.reading():
-                if not self.store.result(task.key, thoroughly=True):
-                    self.store.discard(task.key)
-            self._do("Reading", self.plan.reading)
-            return self.plan.look_into()
+        return outcome
 
     def _note(self, text: str, style: str = "") -> None:
         self.notes.append(text)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from rigid_motion.motion import KEYFRAME_MODES, MODES
 from rigid_motion_batch.analysis.choices import Budget, Choice, Tolerance, Uniform, distinct
@@ -13,7 +14,7 @@ from rigid_motion_batch.analysis.metrics import FORMS
 from rigid_motion_batch.analysis.modes import BEST_OF, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, JOINT, RIGID, Radii, read_radii
 from rigid_motion_batch.axes import AXES
-from rigid_motion_batch.command_line import did_you_mean, folder_path, number, parser_of
+from rigid_motion_batch.command_line import did_you_mean, folder_path, not_empty, number, parser_of
 from rigid_motion_batch.palette import THEMES
 from rigid_motion_batch.pipeline.bundle import STAGES
 from rigid_motion_batch.places import ASSETS, from_here
@@ -69,6 +70,7 @@ examples:
   python scripts/compare.py hand_left.csv --modes all,best_of
   python scripts/compare.py take.csv --tolerance 5mm
   python scripts/compare.py take.csv --budget 5,10 --rates 10
+  python scripts/compare.py take.csv --against mine.csv
   blender --background --python scripts/compare.py -- hand_left.csv --axes unity
 
 choosing keys:
@@ -85,6 +87,12 @@ choosing modes:
   best_of takes, in each segment from key to key, the one of the other modes named that comes closest to the recording
   there. Evenly spaced keys are the same for all modes; with adaptive keys it uses those of the best single mode. A
   column of best_of.keys.csv has the mode of each segment.
+
+somebody else's motion:
+  --against FILE adds a lane, a line and a row with a motion that came from elsewhere, such as the in-betweens of
+  another program, named after its file. It is read in any format, with the same options, and compared at the samples
+  of the recording, with straight lines and SLERP between its own. Its times are taken as they are: the clip is cut to
+  those that both have. A whole body needs joints of the same names and axes, as the same rig in the same format has.
 
 what is written:
   OUTPUT/report.html is one file; with more than 24 clips, each clip has a page of its own. OUTPUT/metrics.csv has all
@@ -155,6 +163,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         help=f"radius of the shell error, in metres ({RIGID}, around the joints of bodies {JOINT}); or a table "
         "joint,radius_m for joints by name",
     )
+    parser.add_argument(
+        "--against",
+        type=not_empty,
+        metavar="FILE",
+        help="a motion to show beside those of the modes: somebody else's, of the same clip, read as this is",
+    )
     add_reading_options(parser)
     workers = parser.add_mutually_exclusive_group()
     workers.add_argument(
@@ -224,6 +238,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     video.add_argument(
         "--object",
+        dest="subject",
         default="drill",
         metavar="OBJECT",
         help="the object to show: drill, controller, or FILE.blend:NAME (%(default)s)",
@@ -249,20 +264,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     video.add_argument("--samples", type=int, default=16, help="samples for eevee and cycles (%(default)s)")
     options = parser.parse_args(arguments)
     try:
-        options.stage = StageSettings(
-            engine=options.engine,
-            resolution=options.resolution,
-            fps=options.fps,
-            slow_motion=options.slow_motion,
-            subject=options.object,
-            antialiasing=options.antialiasing,
-            samples=options.samples,
-            theme=options.theme,
-            deviation=options.deviation,
-            distinct=options.modes.distinct,
-        )
-        if options.no_video:
-            options.stage = None
+        options.distinct = options.modes.distinct
+        stage = StageSettings(**{one.name: getattr(options, one.name) for one in fields(StageSettings)})
+        options.stage = None if options.no_video else stage
         if options.part != (1, 1) and not options.only:
             raise ValueError("--part is a share of one stage: add --only STAGE")
         options.choices = _choices(options)
@@ -271,6 +275,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         parser.error(str(error))
     options.inputs = options.inputs or own_recordings()
     options.inputs = [file for source in options.inputs for file in files_of(source)]
+    if options.against and len(options.inputs) != 1:
+        parser.error(f"--against is a motion of one clip, and there are {len(options.inputs)}: name one recording")
     return options
 
 
@@ -344,17 +350,22 @@ def _modes(text: str) -> Modes:
     return Modes((*modes, BEST_OF), share)
 
 
-def _jobs(text: str) -> int:
-    if not re.fullmatch(r"\d{1,3}", text, re.ASCII):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; give 0, 1, 2, ...")
-    return int(text)
+def _whole(pattern: str, what: str, fits: Callable[..., bool] = lambda *numbers: True) -> Callable[[str], Any]:
+    """How whole numbers are read: those in the groups of a pattern, or the single one."""
+
+    def parse_whole(text: str) -> int | tuple[int, ...]:
+        found = re.fullmatch(pattern, text, re.ASCII)
+        numbers = tuple(map(int, found.groups())) if found else ()
+        if not (numbers and fits(*numbers)):
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
+        return numbers if len(numbers) > 1 else numbers[0]
+
+    return parse_whole
 
 
-def _part(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text, re.ASCII)
-    if not found or not 1 <= int(found[1]) <= int(found[2]):
-        raise argparse.ArgumentTypeError(f"{text!r} is no share; give one such as 1/8")
-    return int(found[1]), int(found[2])
+_jobs = _whole(r"(\d{1,3})", "number of processes; give 0, 1, 2, ...")
+_part = _whole(r"(\d{1,6})/(\d{1,6})", "share; give one such as 1/8", lambda number, of: 1 <= number <= of)
+_resolution = _whole(r"(\d{1,5})x(\d{1,5})", "resolution; give one such as 1280x720")
 
 
 def _positive(text: str) -> float:
@@ -369,10 +380,3 @@ def _radii(text: str) -> Radii:
         return read_radii(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _resolution(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text, re.ASCII)
-    if not found:
-        raise argparse.ArgumentTypeError(f"{text!r} is no resolution; give one such as 1280x720")
-    return int(found[1]), int(found[2])

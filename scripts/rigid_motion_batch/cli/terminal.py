@@ -44,7 +44,9 @@ class Line:
     worst_mm: float
     """The largest error of all clips."""
 
-    keys_per_s: float
+    keys_per_s: float | None
+    """None of somebody else's motion, whose keys are not known."""
+
     best: bool
     """Whether no other motion has fewer errors, or fewer keys where a tolerance limits the errors."""
 
@@ -61,7 +63,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
         decide = keys if isinstance(choice, Tolerance) else rms
         # What is shown as the same is as good.
         shown = [digits(value) for value in decide.tolist()]
-        least = shown[int(np.argmin(decide))]
+        least = shown[int(np.nanargmin(decide))]
         lines += [
             Line(
                 choice.title,
@@ -69,7 +71,7 @@ def lines_of(numbers: Numbers) -> list[Line]:
                 numbers.joined(group),
                 float(rms[place]),
                 float(worst[row, columns[place]]),
-                float(keys[place]),
+                float(keys[place]) if np.isfinite(keys[place]) else None,
                 len(groups) > 1 and shown[place] == least,
             )
             for place, group in enumerate(groups)

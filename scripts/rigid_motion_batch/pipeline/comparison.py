@@ -9,28 +9,31 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from rigid_motion_batch.analysis.choices import Choice, fewest_keys
 from rigid_motion_batch.analysis.metrics import body_table_names, table_names
-from rigid_motion_batch.analysis.modes import single_modes
+from rigid_motion_batch.analysis.modes import name_of_other, single_modes
 from rigid_motion_batch.analysis.radii import EVERYWHERE, Radii
 from rigid_motion_batch.command_line import printable
 from rigid_motion_batch.recordings import TrajectoryError
 from rigid_motion_batch.recordings.clip_reading import clip_names
-from rigid_motion_batch.recordings.clips import ClipWarning
+from rigid_motion_batch.recordings.clips import ClipFacts
 from rigid_motion_batch.recordings.options import AS_THE_FILE_SAYS, ReadingOptions
 from rigid_motion_batch.recordings.reading import split_source
 from rigid_motion_batch.recordings.recordings import listed
-from rigid_motion_batch.scenes.settings import StageSettings, place_of_subject
+from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.scenes.settings import MODELS, StageSettings, place_of_subject
 from rigid_motion_batch.scenes.timeline import Timeline
 
 from . import comparison_steps as steps
 from . import values
-from .comparison_steps import About, ClipOf, ClipShown, Page, SourceFacts
+from .comparison_steps import ClipOf, Page, Part
 from .running import Outcome, Plan
 from .steps import Input, Step, Task
 from .store import Store
@@ -56,6 +59,9 @@ MOST_DECIMATED = 50_000
 RATE_MARGIN = 0.01
 """By what share a rate may be above that of a recording: 90 Hz are often 89.9 in truth."""
 
+TABLE_OF = {"measure": METRICS, "decimate": DECIMATED, "count_keys": KEYS_NEEDED}
+"""What parts of pages are parts of, too."""
+
 IN_BLENDER = (".blend", ".fbx", ".glb", ".gltf")
 """Recordings that Blender reads."""
 
@@ -69,6 +75,9 @@ class Comparison:
 
     choices: tuple[Choice, ...]
     modes: tuple[str, ...]
+    against: str = ""
+    """The source of a motion that is shown beside the modes: somebody else's, of the one clip that there is then."""
+
     axes: str | None = None
     """Of `axes.AXES`; None for those of each format."""
 
@@ -86,20 +95,21 @@ class Comparison:
     fit: bool = False
     """And how many where they may be fitted."""
 
-    beside_decimate: bool = True
-    """Whether to set adaptive keys of bodies beside those of Blender's Decimate, for which there must be a Blender."""
-
     stage: StageSettings | None = None
     """How to make the films; None for a run without."""
 
     every_film: bool = False
     """Whether there is a film of every choice of keys, or only of the one with the fewest keys."""
 
-    about: About | None = None
+    about: Settings | None = None
     """What pages say of the run; None for a run without."""
 
+    subject: str = next(iter(MODELS))
+    """The object that rigid bodies move, as `place_of_subject` takes it; on pages the first of `MODELS` without
+    Blender."""
+
     blender: str = ""
-    """The version of the Blender that films and reads; empty where there is none."""
+    """The version of the Blender that films, reads and decimates; empty where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,15 +120,12 @@ class Study:
     reader: str
     """The key of the task that reads it."""
 
-    samples: int
+    facts: ClipFacts = field(repr=False)
     choices: dict[Choice, tuple[float, float]]
     """Each with the times of the first and the last key."""
 
-    joints: int
-    """How many a whole body has; 0 for a single rigid one."""
-
-    warnings: tuple[ClipWarning, ...] = field(default=(), repr=False)
-    beside_decimate: bool = True
+    blender: bool
+    """Whether there is one."""
 
     @property
     def name(self) -> str:
@@ -126,7 +133,7 @@ class Study:
 
     @property
     def most_frames(self) -> int:
-        return min(MOST_FRAMES, MOST_POSES // max(self.joints, 1))
+        return min(MOST_FRAMES, MOST_POSES // max(self.facts.joints, 1))
 
     def frames(self, choice: Choice, stage: StageSettings) -> float:
         start, end = self.choices[choice]
@@ -135,9 +142,9 @@ class Study:
     @property
     def decimated(self) -> list[Choice]:
         """The choices that are set beside Blender's Decimate: evenly spaced keys are not chosen to be few."""
-        if not self.beside_decimate or self.samples * self.joints > MOST_DECIMATED:
+        if not self.blender or not 0 < self.facts.samples * self.facts.joints <= MOST_DECIMATED:
             return []
-        return [choice for choice in self.choices if self.joints and choice.decimation == "adaptive"]
+        return [choice for choice in self.choices if choice.decimation == "adaptive"]
 
 
 class ComparisonPlan:
@@ -162,69 +169,76 @@ class ComparisonPlan:
     def _reader(self, source: str) -> Task:
         comparison = self.comparison
         inputs: tuple[Input, ...] = ()
-        step: Step = steps.read
-        try:
-            path, _ = split_source(source)
-            inputs = (self.store.input(path),)
-            step = steps.read_in_blender if path.suffix.lower() in IN_BLENDER else step
-        except TrajectoryError:
-            pass  # Whoever reads it will say that there is no such file.
+        step, called = steps.read, ""
+        with suppress(TrajectoryError):  # Whoever reads it will say that there is no such file.
+            paths = [split_source(one)[0] for one in (source, comparison.against) if one]
+            called = name_of_other(paths[-1].stem) if comparison.against else ""
+            inputs = tuple(map(self.store.input, paths))
+            step = steps.read_in_blender if any(path.suffix.lower() in IN_BLENDER for path in paths) else step
         blender = comparison.blender if step is steps.read_in_blender else ""
-        parameters = steps.Read(source, comparison.axes, comparison.reading, blender)
+        parameters = steps.Read(source, comparison.axes, comparison.reading, blender, comparison.against, called)
         return Task(step, parameters, f"read {source}", inputs=inputs, title=source, weight=0.3)
 
     def read(self, run: Callable[[Plan], Outcome]) -> tuple[Outcome, list[str]]:
-        """Read the sources by a function that runs a plan, and see what is in them: see `look_into`.
+        """Read the sources by a function that runs a plan, and see what is in them: see `look_into`."""
+        return run(self.reading), self.look_into_anew(run)
 
-        What was read before and turns out to be damaged is read again.
-        """
-        outcome = run(self.reading)
+    def look_into_anew(self, run: Callable[[Plan], Outcome]) -> list[str]:
+        """The same as `look_into`; what was read before and turns out to be damaged is read again."""
         try:
-            return outcome, self.look_into()
+            return self.look_into()
         except Exception:
             damaged = [task.key for task in self.reading() if not self.store.result(task.key, thoroughly=True)]
             if not damaged:
                 raise
             for key in damaged:
                 self.store.discard(key)
-        return run(self.reading), self.look_into()
+        run(self.reading)
+        return self.look_into()
 
     def look_into(self) -> list[str]:
         """See what clips there are in the recordings that were read, and return what the user should know of them."""
         comparison = self.comparison
         readers = [task.key for task in self._readers]
         folders = {key: result.folder for key in dict.fromkeys(readers) if (result := self.store.result(key))}
-        facts = {key: values.read(SourceFacts, folder / "facts") for key, folder in folders.items()}
-        bodies = [(key, body) for key in readers if key in facts for body in range(len(facts[key].bodies))]
-        of_bodies = [facts[key].bodies[body] for key, body in bodies]
-        names = clip_names([(one.name, one.body) for one in of_bodies])
-        notes = [facts[key].note for key in readers if key in facts and facts[key].note]
-        notes += [f"{name}: {note}" for name, one in zip(names, of_bodies, strict=True) for note in one.repairs]
-        if unknown := comparison.radii.unknown(joint for one in of_bodies for joint in one.joints):
+        read = {
+            key: values.read(tuple[str, tuple[ClipFacts, ...]], folder / "facts") for key, folder in folders.items()
+        }
+        notes = [read[key][0] for key in readers if key in read and read[key][0]]
+        bodies = [(key, body, one) for key in readers if key in read for body, one in enumerate(read[key][1])]
+        names = clip_names([(one.name, one.body) for _, _, one in bodies])
+        if unknown := comparison.radii.unknown(joint for _, _, one in bodies for joint in one.joint_names):
             notes.append(printable(f"no body has a joint {listed(unknown)}, for which --radius has a radius"))
-        self.studies = []
-        for (key, body), name, one in zip(bodies, names, of_bodies, strict=True):
+        self.studies, of_clips = [], []
+        for name, (key, body, one) in zip(names, bodies, strict=True):
             times = np.load(folders[key] / f"{body}.times.npy")
+            notes += [f"{name}: {note}" for note in one.repairs]
             ends = {choice: choice.ends(times) for choice in comparison.choices}
-            notes += [
+            of_clips += [
                 f"{name}: too short for two keys at {choice.rate} a second; left out"
                 for choice, found in ends.items()
                 if found is None
             ]
-            notes += [f"{name}: {note}" for note in rates_above(times, comparison.choices)]
-            long_enough = {
+            of_clips += [f"{name}: {note}" for note in rates_above(times, comparison.choices)]
+            enough = {
                 choice: (float(times[found[0]]), float(times[found[1]])) for choice, found in ends.items() if found
             }
-            if long_enough:
-                clip, joints = ClipOf(name, body), len(one.joints)
-                study = Study(clip, key, len(times), long_enough, joints, one.warnings, comparison.beside_decimate)
-                self.studies.append(study)
-                notes += self._left_out(study)
-        return notes
+            if enough:
+                self.studies.append(Study(ClipOf(name, body), key, one, enough, bool(comparison.blender)))
+                of_clips += self._left_out(self.studies[-1])
+        if self._shows_object and not comparison.blender:
+            notes.append(f"the report shows a drill, for there is no Blender here that reads {comparison.subject}")
+        return notes + of_clips
+
+    @property
+    def _shows_object(self) -> bool:
+        """Whether pages show another object than the one that needs no Blender."""
+        rigid = any(not study.facts.joints for study in self.studies)
+        return rigid and self.comparison.subject != Comparison.subject
 
     def _left_out(self, study: Study) -> Iterator[str]:
         """What is not made of a clip because it is too much, for the user."""
-        stage = self.comparison.stage
+        stage, joints, samples = self.comparison.stage, study.facts.joints, study.facts.samples
         if stage and (frames := max(study.frames(choice, stage) for choice in study.choices)) > study.most_frames:
             start, end = next(iter(study.choices.values()))
             yield (
@@ -232,14 +246,13 @@ class ComparisonPlan:
                 f"{study.most_frames}; see whether its times are in seconds, cut it, or give a lower --fps or "
                 "--slow-motion"
             )
-        adaptive = any(choice.decimation == "adaptive" for choice in study.choices)
-        if study.joints and adaptive and not self.comparison.beside_decimate:
-            yield f"{study.name}: not compared with Blender's Decimate, for there is no Blender here"
-        elif study.joints and adaptive and not study.decimated:
-            yield (
-                f"{study.name}: not compared with Blender's Decimate: {study.joints} joints with {study.samples} "
-                f"samples would take too long; cut it to {MOST_DECIMATED // study.joints}"
+        if joints and not study.decimated and any(choice.decimation == "adaptive" for choice in study.choices):
+            reason = (
+                f": {joints} joints with {samples} samples would take too long; cut it to {MOST_DECIMATED // joints}"
+                if study.blender
+                else ", for there is no Blender here"
             )
+            yield f"{study.name}: not compared with Blender's Decimate{reason}"
 
     # -- comparing ----------------------------------------------------------------------------------------------------
 
@@ -248,43 +261,44 @@ class ComparisonPlan:
 
         Without `films` the pages leave room for them.
         """
-        parts: dict[str, list[tuple[str, str]]] = {}
-        """Table to the keys of the tasks that make its parts, and the names of these."""
         read = {study.reader for study in self.studies}
         yield from (task for task in self.reading() if task.key in read)
-        keys: dict[tuple[str, ...], str] = {}
-        """Of what pages show, by kind, clip and choice."""
+        keys: dict[Part, str] = {}
+        """Of the tasks whose results pages show."""
+        tables: dict[str, list[str]] = {}
+        """Table to the keys of the tasks that make its parts."""
         for study in self.studies:
-            for table, rows, address, task in self._numbers(study):
+            keys[Part("read", study.clip)] = study.reader
+            for part, task in self._numbers(study):
                 yield task
-                keys[address] = task.key
-                parts.setdefault(table, []).append((task.key, rows))
-                if address[0] == "measure" and study.joints:
-                    parts.setdefault(JOINT_METRICS, []).append((task.key, steps.JOINT_ROWS))
-        for table, made in parts.items():
-            after = tuple(key for key, _ in made)
-            parameters = steps.Join(made[0][1])
-            publish = {"table.csv": table}
-            yield Task(steps.tabulate, parameters, table, after, publish=publish, weight=0.002 * len(after))
-        if films:
-            for study in self.studies:
-                for choice in self.filmed(study):
-                    for task in self._film(study, choice, keys["measure", study.name, choice.name]):
-                        yield task
-                        keys["film", study.name, choice.name] = task.key
+                keys[part] = task.key
+                tables.setdefault(TABLE_OF[part.what], []).append(task.key)
+                if part.what == "measure" and study.facts.joints:
+                    tables.setdefault(JOINT_METRICS, []).append(task.key)
+        for table, after in tables.items():
+            parameters = steps.Join(steps.JOINT_ROWS if table == JOINT_METRICS else steps.ROWS)
+            publish, weight = {"table.csv": table}, 0.002 * len(after)
+            yield Task(steps.tabulate, parameters, table, tuple(after), publish=publish, weight=weight)
+        filmed: dict[Part, str] = {}
+        for study in self.studies:
+            for choice in self.filmed(study):
+                filmed[Part("encode", study.clip, choice.name)] = ""
+                for task in self._film(study, choice, keys[Part("measure", study.clip, choice.name)]) if films else ():
+                    yield task
+                    filmed[Part("encode", study.clip, choice.name)] = task.key
         if self.comparison.about:
-            yield from self._pages(keys, films)
+            yield from self._pages(keys, filmed, films)
 
     @property
     def tables(self) -> set[str]:
         """The tables that there will be; of others those of earlier runs are to be withdrawn."""
-        bodies = [study for study in self.studies if study.joints]
-        found = {METRICS} | ({KEYS_NEEDED} if self.comparison.count_keys else set())
-        return (
-            found
-            | ({JOINT_METRICS} if bodies else set())
-            | ({DECIMATED} if any(s.decimated for s in bodies) else set())
-        )
+        there = {
+            METRICS: True,
+            KEYS_NEEDED: self.comparison.count_keys,
+            JOINT_METRICS: any(study.facts.joints for study in self.studies),
+            DECIMATED: any(study.decimated for study in self.studies),
+        }
+        return {table for table, wanted in there.items() if wanted}
 
     def filmed(self, study: Study) -> list[Choice]:
         """The choices that there are films of."""
@@ -292,66 +306,42 @@ class ComparisonPlan:
         asked = list(study.choices) if self.comparison.every_film else fewest_keys(study.choices)
         return [choice for choice in asked if stage and study.frames(choice, stage) <= study.most_frames]
 
-    def _numbers(self, study: Study) -> Iterator[tuple[str, str, tuple[str, ...], Task]]:
-        """The tasks of a clip's numbers, with the table that they are part of, and what they are to pages."""
-        comparison, name = self.comparison, study.name
-        modes = single_modes(comparison.modes) if study.joints else comparison.modes
+    def _numbers(self, study: Study) -> Iterator[tuple[Part, Task]]:
+        """The tasks of a clip's numbers, and what they are to pages."""
+        comparison, clip, name, after = self.comparison, study.clip, study.name, (study.reader,)
+        joints, size = study.facts.joints, study.facts.samples * max(study.facts.joints, 1)
+        modes = single_modes(comparison.modes) if joints else comparison.modes
         for choice in study.choices:
-            evenly = choice.decimation == "uniform"
-            if study.joints:
-                tables = body_table_names(choice, modes)
-                weight = 0.1 + 5e-6 * study.samples * study.joints * len(modes) * (1.0 if evenly else 40.0)
-            else:
-                tables = table_names(choice, modes, comparison.form)
-                weight = 0.02 + 8e-6 * study.samples * len(modes) * (1.0 if evenly else 50.0)
-            measuring = Task(
-                steps.measure,
-                steps.Measure(study.clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form),
-                f"measure {name}/{choice.name}",
-                after=(study.reader,),
-                publish={table: f"{name}/{choice.name}/{table}" for table in tables},
-                title=f"{name} {choice.phrase}",
-                weight=weight,
-                group=name,
-            )
-            yield METRICS, steps.ROWS, ("measure", name, choice.name), measuring
+            folder, title = f"{name}/{choice.name}", f"{name} {choice.phrase}"
+            names = table_names(choice, modes, comparison.form, study.facts.against)
+            publish = {table: f"{folder}/{table}" for table in (body_table_names(choice, modes) if joints else names)}
+            parameters = steps.Measure(clip, choice, tuple(modes), comparison.radii, comparison.shared, comparison.form)
+            weight = 0.02 + 6e-6 * size * len(modes) * (1.0 if choice.decimation == "uniform" else 45.0)
+            about = {"title": title, "weight": weight, "group": name}
+            measuring = Task(steps.measure, parameters, f"measure {folder}", after, publish=publish, **about)
+            yield Part("measure", clip, choice.name), measuring
             if choice in study.decimated:
-                decimating = Task(
-                    steps.decimate,
-                    measuring.parameters,
-                    f"decimate {name}/{choice.name}",
-                    after=(study.reader, measuring.key),
-                    title=f"{name} {choice.phrase}, Decimate",
-                    weight=0.5 + 8e-3 * study.samples * study.joints,
-                    group=name,
-                )
-                yield DECIMATED, steps.ROWS, ("decimate", name, choice.name), decimating
+                about = {"title": f"{title}, Decimate", "weight": 0.5 + 8e-3 * size, "group": name}
+                decimating = Task(steps.decimate, parameters, f"decimate {folder}", (*after, measuring.key), **about)
+                yield Part("decimate", clip, choice.name), decimating
         if comparison.count_keys:
-            fit = comparison.fit and not study.joints
-            seconds = 0.003 * study.joints if study.joints else 0.03 if fit else 0.01
-            counting = Task(
-                steps.count_keys,
-                steps.CountKeys(study.clip, comparison.modes, comparison.radii, fit),
-                f"count keys {name}",
-                after=(study.reader,),
-                title=f"{name}, keys needed",
-                weight=seconds * study.samples,
-                group=name,
-            )
-            yield KEYS_NEEDED, steps.ROWS, ("needed", name), counting
+            fit = comparison.fit and not joints
+            parameters = steps.CountKeys(clip, comparison.modes, comparison.radii, fit)
+            about = {"title": f"{name}, keys needed", "weight": size * (0.03 if fit else 0.008), "group": name}
+            yield Part("count_keys", clip), Task(steps.count_keys, parameters, f"count keys {name}", after, **about)
 
     def _film(self, study: Study, choice: Choice, measured: str) -> Iterator[Task]:
         """The tasks of a film; the last one makes it."""
         comparison, stage = self.comparison, self.comparison.stage
         seconds = 0.03 + 4e-7 * stage.resolution[0] * stage.resolution[1]
         folder, title = f"{study.name}/{choice.name}", f"{study.name} {choice.phrase}"
-        subject = () if study.joints else (self.store.input(place_of_subject(stage.subject)[0]),)
+        how = comparison.radii, comparison.shared, stage, comparison.blender
         building = Task(
             steps.build,
-            steps.Build(study.clip, comparison.radii, comparison.shared, stage, comparison.blender),
+            steps.Build(study.clip, *how),
             f"build {folder}",
             after=(study.reader, measured),
-            inputs=subject,
+            inputs=() if study.facts.joints else self._subject_file(),
             publish={steps.BLEND: f"{folder}/{steps.BLEND}"},
             title=title,
             group=folder,
@@ -360,84 +350,55 @@ class ComparisonPlan:
         count = Timeline.between(*study.choices[choice], stage.fps, stage.slow_motion).count
         pieces = math.ceil(count / PIECE)
         firsts = [1 + count * number // pieces for number in range(pieces + 1)]
-        rendered = []
+        after = [building.key]
         for first, following in itertools.pairwise(firsts):
-            frames = following - first
-            rendering = Task(
-                steps.render,
-                steps.Frames(title, first, following - 1),
-                f"render {folder} from {first}",
-                after=(building.key,),
-                title=title,
-                weight=seconds * frames,
-                amount=frames,
-                unit="frame",
-                group=f"{folder} from {first}",
-            )
-            rendered.append(rendering.key)
-            yield rendering
-        yield Task(
-            steps.encode,
-            steps.Frames(title, 1, count),
-            f"encode {folder}",
-            after=(building.key, *rendered),
-            publish={steps.FILM: f"{folder}/{steps.FILM}"},
-            title=title,
-            weight=seconds * count * 0.06,
-            group=folder,
-        )
+            frames, name = following - first, f"{folder} from {first}"
+            part = steps.Frames(title, first, following - 1)
+            about = {"title": title, "weight": seconds * frames, "amount": frames, "unit": "frame", "group": name}
+            yield (rendering := Task(steps.render, part, f"render {name}", (building.key,), **about))
+            after.append(rendering.key)
+        about = {"title": title, "weight": seconds * count * 0.06, "group": folder}
+        publish = {steps.FILM: f"{folder}/{steps.FILM}"}
+        yield Task(steps.encode, steps.Frames(title, 1, count), f"encode {folder}", (*after,), publish=publish, **about)
+
+    def _subject_file(self) -> tuple[Input]:
+        return (self.store.input(place_of_subject(self.comparison.subject)[0]),)
 
     # -- pages --------------------------------------------------------------------------------------------------------
 
-    def _pages(self, keys: dict[tuple[str, ...], str], films: bool) -> Iterator[Task]:
+    def _pages(self, keys: dict[Part, str], filmed: dict[Part, str], films: bool) -> Iterator[Task]:
         """The page of a few clips, or a page for each of many and one that leads to them."""
-        if len(self.studies) <= ON_ONE_PAGE:
-            yield self._page(steps.page, self.studies, keys, films, "")
-            return
-        pages = []
-        for study in self.studies:
-            task = self._page(steps.page, [study], keys, films, study.name)
-            pages.append(task.key)
+        comparison, subject = self.comparison, self.comparison.subject
+        if comparison.blender and self._shows_object:
+            parameters = steps.Subject(subject, comparison.blender)
+            task = Task(steps.subject, parameters, f"object {subject}", inputs=self._subject_file(), title=subject)
             yield task
-        yield self._page(steps.overview, self.studies, keys, films, "", pages)
+            keys |= {Part("subject"): task.key}
+        if len(self.studies) <= ON_ONE_PAGE:
+            yield self._page(steps.page, keys | filmed, coming=not films)
+            return
+        of_clips: dict[ClipOf, dict[Part, str]] = {}
+        for part, key in (keys | filmed).items():
+            of_clips.setdefault(part.clip, {})[part] = key
+        shared, pages = of_clips.pop(ClipOf(""), {}), []
+        for clip, own in of_clips.items():
+            films_of = {part: own.pop(part) for part in [*own] if part in filmed}
+            page = {"overview": f"../{steps.PAGE}", "folder": clip.name}
+            yield (task := self._page(steps.page, own | shared | films_of, coming=not films, **page))
+            pages.append(task.key)
+        yield self._page(steps.overview, keys, pages)
 
-    def _page(
-        self,
-        step: Step,
-        studies: Iterable[Study],
-        keys: dict[tuple[str, ...], str],
-        films: bool,
-        folder: str,
-        pages: Iterable[str] = (),
-    ) -> Task:
-        shown, before, filmed = [], [], []
-        for study in studies:
-            name, of_films = study.name, [choice.name for choice in self.filmed(study)]
-            needed, decimated = keys.get(("needed", name)), [choice.name for choice in study.decimated]
-            before += [study.reader, *([needed] if needed else [])]
-            for choice in study.choices:
-                before.append(keys["measure", name, choice.name])
-                before += [keys["decimate", name, choice.name]] if choice.name in decimated else []
-            filmed += [keys["film", name, choice] for choice in of_films if films]
-            choices = tuple(choice.name for choice in study.choices)
-            shown.append(ClipShown(study.clip, choices, bool(needed), tuple(decimated), tuple(of_films)))
-        parameters = Page(
-            tuple(shown),
-            self.comparison.about,
-            self.comparison.radii,
-            coming=not films and step is steps.page,
-            overview=f"../{steps.PAGE}" if folder else "",
-            folder=folder,
-        )
-        place = f"{folder}/" if folder else ""
+    def _page(self, step: Step, parts: dict[Part, str], pages: Iterable[str] = (), **how: Any) -> Task:
+        parameters = Page(tuple(parts), self.comparison.about, **how)
+        folder, place = parameters.folder, f"{parameters.folder}/" if parameters.folder else ""
         return Task(
             step,
             parameters,
             f"page {folder}" if folder else steps.PAGE,
-            after=(*before, *(filmed if step is steps.page else pages)),
+            after=(*filter(None, parts.values()), *pages),
             publish={name: place + name for name in (steps.PAGE, steps.PAGE_DATA)},
             title=f"{place}{steps.PAGE}",
-            weight=0.02 * len(shown),
+            weight=0.02 * len(parameters.clips),
         )
 
 

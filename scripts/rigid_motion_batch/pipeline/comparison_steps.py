@@ -6,16 +6,19 @@ Blender load nothing but NumPy and bpy. Every step imports what it needs when it
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from itertools import groupby, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.radii import Radii
-from rigid_motion_batch.recordings.clips import Clip, ClipWarning
+from rigid_motion_batch.recordings.clips import Clip, ClipFacts
 from rigid_motion_batch.recordings.options import ReadingOptions
-from rigid_motion_batch.scenes.settings import StageSettings
+from rigid_motion_batch.report.settings import Settings
+from rigid_motion_batch.scenes.settings import StageSettings, SubjectError
 
 from . import values
 from .steps import Job, TaskError, step
@@ -29,9 +32,18 @@ SCENES = (*ANALYSIS, "rigid_motion/animation", "scenes", "palette.py", "hushing.
 REPORT = (*ANALYSIS, "report", "palette.py")
 
 ROWS, JOINT_ROWS, FILM, BLEND, PAGE = "rows.csv", "joints.csv", "comparison.mp4", "comparison.blend", "report.html"
-PIECE = "piece.mkv"
+PIECE, MESH = "piece.mkv", "mesh.npz"
 PAGE_DATA = "report_data/"
 """The folder of what is too large for a page."""
+
+
+@contextmanager
+def _told(what: str) -> Iterator[None]:
+    """What Blender cannot do is the task's to say."""
+    try:
+        yield
+    except (RuntimeError, SubjectError) as error:
+        raise TaskError(f"{what}: {' '.join(str(error).split())}") from None
 
 
 # -- recordings -------------------------------------------------------------------------------------------------------
@@ -47,54 +59,43 @@ class Read:
     blender: str = ""
     """The version of Blender, for formats that it reads."""
 
+    against: str = ""
+    """What somebody else has made of it, as a source."""
 
-@dataclass(frozen=True)
-class BodyFacts:
-    """What is to be known of a clip to plan its comparison."""
-
-    name: str
-    """What it would like to be called."""
-
-    body: str
-    repairs: tuple[str, ...]
-    warnings: tuple[ClipWarning, ...]
-    joints: tuple[str, ...]
-    """Of a whole body; none of a single rigid one."""
+    called: str = ""
+    """What that motion is called."""
 
 
-@dataclass(frozen=True)
-class SourceFacts:
-    note: str
-    bodies: tuple[BodyFacts, ...]
-
-
-def read_source(job: Job, parameters: Read) -> None:
+def _read(job: Job, parameters: Read) -> None:
     """Read a source, and repair its clips."""
     import numpy as np
 
-    from rigid_motion_batch.recordings import TrajectoryError, clip_reading
+    from rigid_motion_batch.recordings import TrajectoryError, against, clip_reading
 
+    source, other, how = parameters.source, parameters.against, (parameters.axes, parameters.options)
     try:
-        clips, note = clip_reading.read_source(parameters.source, parameters.axes, parameters.options)
+        clips, note = clip_reading.read_source(source, *how)
+        if other:
+            if len(clips) > 1:
+                raise TrajectoryError(source, f"{len(clips)} bodies", "name the one that --against is of")
+            clip, more = against.with_against(clips[0], other, parameters.called, *how)
+            clips, note = [clip], "; ".join(filter(None, (note, more)))
     except TrajectoryError as error:
         raise TaskError(str(error)) from None
-    bodies = []
     for number, clip in enumerate(clips):
         values.write(job.folder / f"{number}", clip)
         np.save(job.folder / f"{number}.times.npy", clip.times)
-        joints = clip.figure.joints if clip.figure else ()
-        bodies.append(BodyFacts(clip.name, clip.body, clip.repairs, clip.warnings, joints))
-    values.write(job.folder / "facts", SourceFacts(note, tuple(bodies)))
+    values.write(job.folder / "facts", (note, tuple(map(ClipFacts.of, clips))))
 
 
 @step(rooms=RECORDINGS, stage="read")
 def read(job: Job, parameters: Read) -> None:
-    read_source(job, parameters)
+    _read(job, parameters)
 
 
 @step(rooms=(*RECORDINGS, "rigid_motion/animation"), stage="read", blender=True)
 def read_in_blender(job: Job, parameters: Read) -> None:
-    read_source(job, parameters)
+    _read(job, parameters)
 
 
 @dataclass(frozen=True)
@@ -129,23 +130,16 @@ class Measure:
 def measure(job: Job, parameters: Measure) -> None:
     """Choose keys of a clip, let the modes fill them in, and measure what was lost. Before: the recording."""
     from rigid_motion_batch.analysis import body_metrics, metrics, results
-    from rigid_motion_batch.analysis.bodies import reconstruct_body
-    from rigid_motion_batch.analysis.reconstructions import reconstruct
 
-    clip, choice, modes = parameters.clip.read(job.before[0]), parameters.choice, parameters.modes
-    if clip.figure is None:
-        if made := reconstruct(clip, choice, modes, parameters.radii.rigid):
-            metrics.write_reconstruction(job.folder, made, parameters.form)
-            found = results.of_rigid_body(made)
-    else:
-        radii = parameters.radii.of(clip.figure.joints)
-        if made := reconstruct_body(clip, choice, modes, radii, shared=parameters.shared):
-            body_metrics.write_key_tables(job.folder, made)
-            found = results.of_body(made, radii)
-            body_metrics.write_joint_metrics(job.folder / JOINT_ROWS, found.joints)
+    clip, choice, radii = parameters.clip.read(job.before[0]), parameters.choice, parameters.radii
+    made = results.made_of(clip, choice, parameters.modes, radii, shared=parameters.shared)
     if made is None:
         raise TaskError(f"{clip.name}: too short for two keys {choice.phrase}")
+    found = results.measured(made, radii)
+    results.write_tables(job.folder, made, parameters.form)
     metrics.write_metrics(job.folder / ROWS, found.rows)
+    if found.joints:
+        body_metrics.write_joint_metrics(job.folder / JOINT_ROWS, found.joints)
     values.write(job.folder / "result", found)
     values.write(job.folder / "numbers", found.numbers)
 
@@ -162,14 +156,11 @@ class CountKeys:
 def count_keys(job: Job, parameters: CountKeys) -> None:
     """Find how many keys every mode needs on a clip. Before: the recording."""
     from rigid_motion_batch.analysis import needed
-    from rigid_motion_batch.analysis.body_needed import OfBody
+    from rigid_motion_batch.analysis.body_needed import ways_of
     from rigid_motion_batch.analysis.modes import single_modes
 
-    clip, done = parameters.clip.read(job.before[0]), iter(range(1, len(needed.RATES) + 1))
-    if clip.figure is None:
-        ways = needed.OfRigidBody(clip, parameters.radii.rigid, fit=parameters.fit)
-    else:
-        ways = OfBody(clip, parameters.radii.of(clip.figure.joints))
+    done = iter(range(1, len(needed.RATES) + 1))
+    ways = ways_of(parameters.clip.read(job.before[0]), parameters.radii, fit=parameters.fit)
     modes = single_modes(parameters.modes)
     found = needed.keys_needed(ways, modes, advance=lambda: job.progress(next(done), len(needed.RATES)))
     needed.write_keys_needed(job.folder / ROWS, [found])
@@ -179,17 +170,15 @@ def count_keys(job: Job, parameters: CountKeys) -> None:
 @step(rooms=SCENES, stage="measure", blender=True)
 def decimate(job: Job, parameters: Measure) -> None:
     """See what Blender's Decimate needs to be as good as the keys of a whole body. Before: recording, measurement."""
-    from rigid_motion_batch.analysis.bodies import BodyReconstruction
     from rigid_motion_batch.analysis.body_decimated import write_keys_of_bodies
+    from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.scenes.decimating import beside_decimate
 
     clip, found = parameters.clip.read(job.before[0]), result_in(job.before[1])
-    made = BodyReconstruction(clip, found.choice, dict(found.keys), parameters.shared)
-    try:
-        rows = beside_decimate(made, parameters.radii.of(clip.figure.joints), found.rows)
-    except RuntimeError as error:
-        problem = " ".join(str(error).split())
-        raise TaskError(f"{clip.name} {found.choice.phrase}: not compared with Blender's Decimate: {problem}") from None
+    made = made_again(clip, found, parameters.radii, shared=parameters.shared)
+    known = [row for row in found.rows if row.keys]
+    with _told(f"{clip.name} {found.choice.phrase}: not compared with Blender's Decimate"):
+        rows = beside_decimate(made, parameters.radii.of(clip.figure.joints), known)
     write_keys_of_bodies(job.folder / ROWS, rows)
     values.write(job.folder / "decimated", tuple(rows))
 
@@ -230,25 +219,19 @@ class Build:
 @step(rooms=SCENES, stage="build", blender=True)
 def build(job: Job, parameters: Build) -> None:
     """Build the scene of a film, and save it. Before: the recording, and what was measured."""
-    from rigid_motion_batch.analysis.bodies import BodyReconstruction
-    from rigid_motion_batch.analysis.reconstructions import fill_in
+    from rigid_motion_batch.analysis.results import made_again
     from rigid_motion_batch.scenes.body_scene import build_body_stage
     from rigid_motion_batch.scenes.film import save_blend
     from rigid_motion_batch.scenes.scene import build_stage
-    from rigid_motion_batch.scenes.settings import SubjectError
 
-    clip, found = parameters.clip.read(job.before[0]), result_in(job.before[1])
-    try:
+    clip, found, radii = parameters.clip.read(job.before[0]), result_in(job.before[1]), parameters.radii
+    with _told(f"{clip.name} {found.choice.phrase}: no video"):
+        made = made_again(clip, found, radii, shared=parameters.shared)
         if clip.figure is None:
-            keys = {mode: keys[0] for mode, keys in found.keys.items()}
-            made = fill_in(clip, found.choice, keys, parameters.radii.rigid, found.mode_of_segments)
             build_stage(made, parameters.stage)
         else:
-            made = BodyReconstruction(clip, found.choice, dict(found.keys), parameters.shared)
-            build_body_stage(made, parameters.stage, parameters.radii.of(clip.figure.joints))
+            build_body_stage(made, parameters.stage, radii.of(clip.figure.joints))
         save_blend(job.folder / BLEND)
-    except (RuntimeError, SubjectError) as error:
-        raise TaskError(f"{clip.name} {found.choice.phrase}: no video: {error}") from None
 
 
 @dataclass(frozen=True)
@@ -263,11 +246,9 @@ def render(job: Job, parameters: Frames) -> dict[str, float]:
     """Render some frames of a film. Before: its scene."""
     from rigid_motion_batch.scenes.film import render_piece
 
-    try:
-        blend, piece = job.before[0] / BLEND, job.folder / PIECE
+    blend, piece = job.before[0] / BLEND, job.folder / PIECE
+    with _told(f"{parameters.title}: no video"):
         return {"rendering": render_piece(blend, parameters.first, parameters.last, piece, job.progress)}
-    except RuntimeError as error:
-        raise TaskError(f"{parameters.title}: no video: {error}") from None
 
 
 @step(rooms=SCENES, stage="encode", blender=True)
@@ -275,14 +256,9 @@ def encode(job: Job, parameters: Frames) -> dict[str, float]:
     """Join the pieces of a film. Before: its scene, and the pieces."""
     from rigid_motion_batch.scenes.film import join_pieces
 
-    blend, *pieces = job.before
-    try:
-        places = [piece / PIECE for piece in pieces]
-        seconds = join_pieces(
-            blend / BLEND, places, job.folder / FILM, lambda done, of: job.progress(done, of, "encoding")
-        )
-    except RuntimeError as error:
-        raise TaskError(f"{parameters.title}: no video: {error}") from None
+    blend, *pieces = [folder / name for folder, name in zip_longest(job.before, (BLEND,), fillvalue=PIECE)]
+    with _told(f"{parameters.title}: no video"):
+        seconds = join_pieces(blend, pieces, job.folder / FILM, lambda *done: job.progress(*done, "encoding"))
     return {"rendering": seconds}
 
 
@@ -290,34 +266,41 @@ def encode(job: Job, parameters: Frames) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class About:
-    """What a page says of the run, but for its date."""
-
-    program: str
-    command: str
-    details: Mapping[str, str] = field(default_factory=dict)
-    names: Mapping[str, str] = field(default_factory=dict)
-    """Of modes that `MODES` does not have."""
+class Subject:
+    wanted: str
+    blender: str
+    """The version of Blender."""
 
 
-@dataclass(frozen=True)
-class ClipShown:
-    """What a page shows of a clip, in the order of the tasks before: recording, keys needed, and for every choice of
-    keys measurement, Decimate and film."""
+@step(rooms=SCENES, stage="report", blender=True)
+def subject(job: Job, parameters: Subject) -> None:
+    """Read the object that rigid bodies move, simple enough for a page."""
+    import numpy as np
 
-    clip: ClipOf
-    choices: tuple[str, ...]
-    needed: bool
-    decimated: tuple[str, ...]
-    filmed: tuple[str, ...]
-    """Names of choices."""
+    from rigid_motion_batch.scenes.simplified import simplified
+
+    with _told("the report shows a drill"):
+        np.savez(job.folder / MESH, **simplified(parameters.wanted))
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a task before a page has made."""
+
+    what: str
+    """The name of its step's function."""
+
+    clip: ClipOf = ClipOf("")
+    choice: str = ""
+    """Its name."""
 
 
 @dataclass(frozen=True)
 class Page:
-    clips: tuple[ClipShown, ...]
-    about: About
-    radii: Radii
+    parts: tuple[Part, ...]
+    """Of the tasks before it, clip by clip, and the films last; these may be still to come."""
+
+    settings: Settings
     coming: bool = False
     """Whether films are still being made."""
 
@@ -327,86 +310,73 @@ class Page:
     folder: str = ""
     """Where the page will be, in the output folder."""
 
+    @property
+    def clips(self) -> list[str]:
+        return list(dict.fromkeys(part.clip.name for part in self.parts if part.clip.name))
 
-class Clips:
-    """The results before a page, one clip in memory at a time."""
 
-    def __init__(self, job: Job, parameters: Page) -> None:
-        self.films: dict[tuple[str, str], Path | None] = {}
-        self.pages: list[bool] = []
-        self._job, self._parameters = job, parameters
+def _clips(job: Job, parameters: Page) -> Iterator[ClipResult]:
+    """The results before a page, one clip in memory at a time, without those that could not be made."""
+    from rigid_motion_batch.analysis.body_decimated import KeysOfBody
+    from rigid_motion_batch.analysis.needed import KeysNeeded
+    from rigid_motion_batch.analysis.results import clip_result
 
-    def __iter__(self) -> Iterator[ClipResult]:
-        from rigid_motion_batch.analysis.body_decimated import KeysOfBody
-        from rigid_motion_batch.analysis.needed import KeysNeeded
-        from rigid_motion_batch.analysis.results import clip_result
-
-        before = iter(self._job.before)
-        for shown in self._parameters.clips:
-            recording, needed = next(before), next(before) if shown.needed else None
-            found = []
-            for choice in shown.choices:
-                measured = next(before)
-                decimated = next(before) if choice in shown.decimated else None
-                if measured:
-                    rows = values.read(tuple[KeysOfBody, ...], decimated / "decimated") if decimated else ()
-                    found.append(replace(result_in(measured), decimated=rows))
+    before = zip(parameters.parts, job.before, strict=False)
+    for clip, parts in groupby(before, key=lambda each: each[0].clip):
+        made = {(part.what, part.choice): folder for part, folder in parts if folder}
+        found = []
+        for what, choice in made:
+            if what == "measure":
+                rows = made.get(("decimate", choice))
+                decimated = values.read(tuple[KeysOfBody, ...], rows / "decimated") if rows else ()
+                found.append(replace(result_in(made[what, choice]), decimated=decimated))
+        needed, recording = made.get(("count_keys", "")), made.get(("read", ""))
+        if recording and found:
             keys = values.read(KeysNeeded, needed / "needed") if needed else None
-            if recording and found:
-                yield clip_result(shown.clip.read(recording), found, keys)
+            yield clip_result(clip.read(recording), found, keys)
 
 
 @step(rooms=REPORT, stage="report", partial=True)
 def page(job: Job, parameters: Page) -> None:
-    """Write a page of some clips. Before: what `ClipShown` says of each, and then its films."""
-    from rigid_motion_batch.report import write_report
+    """Write a page of some clips. Before: what `Page.parts` says."""
+    import numpy as np
 
-    clips, films, folder = Clips(job, parameters), {}, Path(parameters.folder)
-    numbers = sum(1 + shown.needed + len(shown.choices) + len(shown.decimated) for shown in parameters.clips)
-    made = iter(job.before[numbers:])
-    for shown in parameters.clips:
-        for choice in shown.filmed:
-            there = parameters.coming or next(made)
-            films[shown.clip.name, choice] = Path(shown.clip.name, choice, FILM) if there else None
-    done = iter(range(1, len(parameters.clips) + 1))
+    from rigid_motion_batch.report.mesh import Mesh
+    from rigid_motion_batch.report.pages import write_report
+
+    films: dict[tuple[str, str], Path | None] = {}
+    mesh = None
+    for part, folder in zip_longest(parameters.parts, job.before):
+        if part.what == "encode":
+            there = folder or parameters.coming
+            films[part.clip.name, part.choice] = Path(part.clip.name, part.choice, FILM) if there else None
+        elif part.what == "subject" and folder:
+            mesh = Mesh(**np.load(folder / MESH))
     write_report(
         job.folder / PAGE,
-        clips,
-        _settings(parameters),
+        _clips(job, parameters),
+        parameters.settings,
         films,
-        folder=folder,
+        folder=Path(parameters.folder),
+        mesh=mesh,
         overview=parameters.overview,
-        advance=lambda: job.progress(next(done), len(parameters.clips)),
+        advance=_counted(job, parameters),
     )
 
 
 @step(rooms=REPORT, stage="report", partial=True)
 def overview(job: Job, parameters: Page) -> None:
-    """Write the page of many clips. Before: what `ClipShown` says of each, and then their pages."""
-    from rigid_motion_batch.report import write_overview
+    """Write the page of many clips. Before: what `Page.parts` says, and then their pages."""
+    from rigid_motion_batch.report.pages import write_overview
 
-    there = job.before[-len(parameters.clips) :]
-    names = [shown.clip.name for shown in parameters.clips]
-    pages = {name: f"{name}/{PAGE}" if made else None for name, made in zip(names, there, strict=True)}
-    done = iter(range(1, len(names) + 1))
-    write_overview(
-        job.folder / PAGE,
-        Clips(job, parameters),
-        _settings(parameters),
-        pages,
-        advance=lambda: job.progress(next(done), len(names)),
-    )
+    there = zip(parameters.clips, job.before[len(parameters.parts) :], strict=True)
+    pages = {name: f"{name}/{PAGE}" if made else None for name, made in there}
+    advance = _counted(job, parameters)
+    write_overview(job.folder / PAGE, _clips(job, parameters), parameters.settings, pages, advance=advance)
 
 
-def _settings(parameters: Page) -> object:
-    from rigid_motion_batch.report import Settings
-
-    about, radii = parameters.about, parameters.radii
-    return Settings(
-        radii.rigid,
-        about.program,
-        about.command,
-        joint_radius=radii.joint,
-        details=dict(about.details),
-        names=dict(about.names),
-    )
+def _counted(job: Job, parameters: Page) -> Callable[[], None]:
+    """What tells of every clip that it is on the page."""
+    total = len(parameters.clips)
+    done = iter(range(1, total + 1))
+    return lambda: job.progress(next(done), total)

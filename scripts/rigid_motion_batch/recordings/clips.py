@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigid_motion.motion import Poses
+from rigid_motion.motion import Poses, interpolate
 from rigid_motion_batch.recordings.figures import Figure
 
 
@@ -27,6 +27,24 @@ class ClipWarning:
 
     def __str__(self) -> str:
         return f"{self.text}; {self.way_out}" if self.way_out else self.text
+
+
+@dataclass(frozen=True, eq=False)
+class OtherMotion:
+    """Somebody else's motion of a clip, by its own samples; between these straight lines and SLERP."""
+
+    name: str
+    """What it is called, and its id beside those of modes."""
+
+    times: np.ndarray
+    """Seconds of the clip's clock, strictly rising, shape (m,)."""
+
+    poses: Poses
+    """As those of the clip, shape (m,) or (joints, m)."""
+
+    def at(self, times: np.ndarray) -> Poses:
+        """The poses at any times (n,), shape (n,) or (joints, n)."""
+        return interpolate(self.times, self.poses, times, "lerp_slerp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +87,9 @@ class Clip:
     calibration: int = 0
     """Samples of a T-pose or the like before the motion, which are left out."""
 
+    against: OtherMotion | None = None
+    """What the user compares with it beside the modes."""
+
     @property
     def samples_a_second(self) -> float:
         """The rate of the recording, which tells it or has it between most samples."""
@@ -79,3 +100,46 @@ class Clip:
         if self.metres_per_unit == 1.0:
             return poses
         return Poses(poses.positions * self.metres_per_unit, poses.quaternions, poses.scales)
+
+
+@dataclass(frozen=True)
+class ClipFacts:
+    """A clip without its samples."""
+
+    name: str
+    source: str
+    axes: str
+    samples: int
+    duration: float
+    """Seconds."""
+
+    repairs: tuple[str, ...]
+
+    joint_names: tuple[str, ...] = ()
+    """Of a whole body; none of a single rigid one."""
+
+    warnings: tuple[ClipWarning, ...] = ()
+    body: str = ""
+    """As the user named it."""
+
+    against: str = ""
+    """What the motion is called that the modes are compared with, if any."""
+
+    @property
+    def joints(self) -> int:
+        return len(self.joint_names)
+
+    @classmethod
+    def of(cls, clip: Clip) -> ClipFacts:
+        return cls(
+            clip.name,
+            clip.source,
+            clip.axes,
+            len(clip.times),
+            float(clip.times[-1] - clip.times[0]),
+            clip.repairs,
+            clip.figure.joints if clip.figure else (),
+            clip.warnings,
+            clip.body,
+            clip.against.name if clip.against else "",
+        )

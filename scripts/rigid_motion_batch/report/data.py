@@ -24,12 +24,11 @@ import numpy as np
 
 from rigid_motion.motion import Poses
 from rigid_motion.motion.quaternions import conjugate, multiply
-from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.analysis.metrics import NOTHING
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult, Motion
+from rigid_motion_batch.palette import full_colour
 from rigid_motion_batch.recordings.figures import carrying, short_names
 
-from .joints import full_colour
 from .mesh import Mesh
 
 MOST_SEEN = {True: 4_000_000, False: 12_000_000}
@@ -97,7 +96,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
             recording["scales"] = block.put(clip.truth.scales[seen])
     return {
         "name": clip.facts.name,
-        "joints": short_names(clip.joint_names) if body else [],
+        "joints": short_names(clip.facts.joint_names) if body else [],
         "parents": _drawn_from(clip.parents) if body else [],
         "size": size,
         "cell": cell,
@@ -108,7 +107,7 @@ def clip_data(clip: ClipResult, label: Callable[[str], str], mesh: Mesh) -> dict
                 "from": None if one.start_s is None else one.start_s - begin,
                 "to": None if one.end_s is None else one.end_s - begin,
             }
-            for one in clip.warnings
+            for one in clip.facts.warnings
         ],
         "recording": recording | {"block": block.text()},
         "choices": [_choice_data(clip, result, seen, label, size) for result in clip.choices],
@@ -127,7 +126,7 @@ def _choice_data(
     largest = max(float(motion.errors[0].max()) for motion in result.motions)
     of_joints = [motion.joint_errors for motion in result.motions if motion.joint_errors is not None]
     by_joint = np.max([errors.max(axis=1) for errors in of_joints], axis=0) if of_joints else np.zeros(1)
-    keyed = len({row.keys for row in rows}) > 1 or rows[0].decimation != "uniform"
+    keyed = len({row.keys for row in rows if row.keys}) > 1 or rows[0].decimation != "uniform"
     return {
         "name": result.choice.name,
         "title": result.choice.title,
@@ -147,7 +146,6 @@ def _choice_data(
                 "name": label(motion.modes[0]),
                 "also": [label(mode) for mode in motion.modes[1:]],
                 "rms": [1e3 * row.rms_shell_m, 1e3 * row.rms_position_m, row.rms_rotation_deg],
-                "keys_per_s": row.keys_per_s if isinstance(result.choice, Tolerance) else None,
                 "errors": [block.put(row) for row in _peaks(motion.errors, every) * [[1e3], [1e3], [1.0]]],
                 "keys": block.put(motion.keys - first, 4, 1.0),
                 **_deviations(block, clip, motion, within, first),
@@ -247,7 +245,7 @@ def _extent(places: np.ndarray) -> float:
 def _about(result: ChoiceResult, keyed: bool, every: int, *, thinned: bool) -> str:
     row = result.motions[0].metrics[0]
     if keyed:
-        counts = sorted({motion.metrics[0].keys for motion in result.motions})
+        counts = sorted({motion.metrics[0].keys for motion in result.motions} - {None})
         keys = f"{counts[0]} to {counts[-1]} keys" if len(counts) > 1 else f"{counts[0]} keys"
         keys += ", where each mode needs them"
     else:

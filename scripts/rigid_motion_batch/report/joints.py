@@ -5,23 +5,20 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigid_motion_batch.analysis.results import ChoiceResult, ClipResult
+from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.figures import short_names
 
-from .colours import error_rgb
 from .numbers import Numbers, digits
 
 COLUMNS = 240
 """Stretches of time that a picture has."""
 
 SHADES = 24
-NEARLY_ALL = 0.995
-"""The share of all errors that the colours reach up to: a single wild sample would leave no other to be seen."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
         [digits(1e3 * value) for row in of_joint for value in (row.rms_shell_m, row.max_shell_m)]
         for of_joint in zip(*by_mode, strict=True)
     ]
-    names = short_names(clip.joint_names)
+    names = short_names(clip.facts.joint_names)
     places = [int(motion.joint_errors.max(axis=1).argmax()) for motion in motions]
     worst = [f"{names[joint]} {digits(some[joint].max())} mm" for joint, some in zip(places, errors, strict=True)]
     slid = motions[0].metrics[0].recorded_slide_m
@@ -75,18 +72,13 @@ def joints_of(place: int, clip: ClipResult, result: ChoiceResult, numbers: Numbe
     return Joints(place, *facts, names, digits(top), pictures, worst, slide, rows)
 
 
-def full_colour(errors: Iterable[np.ndarray]) -> float:
-    """The error that colours reach up to, one scale for all of these (joints, n): nearly the largest."""
-    return max(float(np.quantile(some, NEARLY_ALL)) for some in errors) or 1.0
-
-
 def heat_map(errors: np.ndarray, top: float) -> str:
     """The errors (joints, n) as the address of a picture, a row for each joint, the colours ending at `top`."""
     count = errors.shape[1]
     begins = np.unique(np.arange(min(COLUMNS, count)) * count // min(COLUMNS, count))
     largest = np.maximum.reduceat(errors, begins, axis=1)
     shades = np.clip(largest / top * SHADES, 0, SHADES - 1).astype(np.uint8)
-    palette = b"".join(bytes(error_rgb(shade / (SHADES - 1))) for shade in range(SHADES))
+    palette = bytes.fromhex("".join(error_hex(shade / (SHADES - 1))[1:] for shade in range(SHADES)))
     return f"data:image/png;base64,{base64.b64encode(png(shades, palette)).decode('ascii')}"
 
 

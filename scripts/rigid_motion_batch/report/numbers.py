@@ -6,7 +6,7 @@ Values are in the units that the report shows: millimetres, degrees, keys and by
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import floor, isfinite, log10
 from typing import Any
 
@@ -70,9 +70,6 @@ class Numbers:
     groupings: tuple[frozenset[Groups], ...]
     """Of each clip, the modes that are one motion under each choice."""
 
-    names: dict[str, str] = field(default_factory=dict)
-    """Of modes that `MODES` does not have, such as somebody else's motion."""
-
     @property
     def reference(self) -> str | None:
         """The mode that others are held against."""
@@ -80,11 +77,7 @@ class Numbers:
 
     def label(self, mode: str) -> str:
         """The name of a mode, without its algebra."""
-        return self.names.get(mode) or label_of(mode).partition(" (")[0]
-
-    def full_label(self, mode: str) -> str:
-        """The name of a mode with its algebra."""
-        return self.names.get(mode) or label_of(mode)
+        return label_of(mode).partition(" (")[0]
 
     def joined(self, modes: Iterable[str]) -> str:
         """The names of modes that are one motion."""
@@ -133,7 +126,7 @@ class Gathering:
         """An equal value that was here before, so that thousands of clips share one."""
         return self._known.setdefault(value, value)
 
-    def numbers(self, names: dict[str, str] | None = None) -> Numbers:
+    def numbers(self) -> Numbers:
         """All of them. Raises ValueError where no clip had a result."""
         found = dict.fromkeys(choice for choices, _, _ in self._rows for choice in choices)
         choices = tuple(sorted(found, key=lambda choice: (KINDS.index(type(choice)), choice.size)))
@@ -144,7 +137,7 @@ class Gathering:
         for clip, (own_choices, own_modes, own) in enumerate(self._rows):
             rows, columns = [choices.index(one) for one in own_choices], [modes.index(one) for one in own_modes]
             values[:, clip, np.array(rows)[:, None], columns] = own
-        return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings), names or {})
+        return Numbers(tuple(self._clips), choices, modes, values, tuple(self._groupings))
 
 
 def digits(value: float | None, places: int = 3) -> str:

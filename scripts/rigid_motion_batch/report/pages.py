@@ -11,7 +11,7 @@ import hashlib
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, fields
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -24,28 +24,26 @@ from markupsafe import Markup
 
 from rigid_motion_batch.analysis.choices import Choice
 from rigid_motion_batch.analysis.metrics import Metrics
-from rigid_motion_batch.analysis.modes import description_of
+from rigid_motion_batch.analysis.modes import description_of, label_of
 from rigid_motion_batch.analysis.needed import KeysNeeded
-from rigid_motion_batch.analysis.radii import JOINT
-from rigid_motion_batch.analysis.results import ClipFacts, ClipResult
+from rigid_motion_batch.analysis.results import ClipResult
 from rigid_motion_batch.files import replacing, write_text
+from rigid_motion_batch.palette import ERROR_COLOURS, colours_on_pages
+from rigid_motion_batch.recordings.clips import ClipFacts
 from rigid_motion_batch.rows import line_of
 
 from . import charts, tables
-from .colours import ERROR_COLOURS, colours_of
 from .data import clip_data, json_in_page, mesh_data
 from .joints import Joints, joints_of
 from .mesh import Mesh, drill
 from .numbers import KINDS, LARGEST, MEASURES, MINUS, Gathering, Numbers, digits, percent
+from .settings import Settings
 from .verdict import Verdict, verdict
 
 HERE = Path(__file__).parent
 
 SCRIPTS = ("data", "mathematics", "state", "pointers", "drawing", "view", "chart", "tables", "page")
 """The modules of the viewer, each after those that it imports."""
-
-ON_ONE_PAGE = 24
-"""So many clips are one page; more have a page each."""
 
 IN_THE_PAGE = 5_000_000
 """Bytes of data of all clips; where they are more, each clip has a file beside the page."""
@@ -58,31 +56,6 @@ MOST_WARNINGS = 3
 
 Films = Mapping[tuple[str, str], Path | None]
 """(clip name, name of the choice) to its film, which may not be there yet; None where it could not be made."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the reader needs to know of a run, beyond the numbers themselves."""
-
-    radius: float
-    """Of the shell of a rigid body, in metres."""
-
-    program: str
-    """Name and version."""
-
-    command: str
-    """The command line, as one would type it."""
-
-    date: datetime = field(default_factory=datetime.now)
-
-    joint_radius: float = JOINT
-    """Of the shell of a joint, in metres."""
-
-    details: Mapping[str, str] = field(default_factory=dict)
-    """Whatever else is worth a line, such as Blender's version: what it is, and its value."""
-
-    names: Mapping[str, str] = field(default_factory=dict)
-    """Of modes that are not in `MODES`, such as somebody else's motion: id to name."""
 
 
 @dataclass(frozen=True)
@@ -143,9 +116,9 @@ def write_report(
         page.facts.append(clip.facts)
         if clip.choices:
             gathering.add(clip.facts.name, [result.numbers for result in clip.choices])
-            page.add(clip, settings.names)
+            page.add(clip)
         advance()
-    numbers = gathering.numbers(dict(settings.names))
+    numbers = gathering.numbers()
     start = _start(numbers, page.choices)
     context = _context(numbers, page.needed, settings) | {
         "clips": page,
@@ -198,22 +171,20 @@ def write_overview(
     gathering = Gathering()
     needed: list[KeysNeeded] = []
     facts: list[ClipFacts] = []
-    warnings: list[int] = []
     for clip in clips:
         if clip.choices:
             gathering.add(clip.facts.name, [result.numbers for result in clip.choices])
             facts.append(clip.facts)
-            warnings.append(len(clip.warnings))
         if clip.needed:
             needed.append(clip.needed)
         advance()
-    numbers = gathering.numbers(dict(settings.names))
+    numbers = gathering.numbers()
     context = _context(numbers, needed, settings) | {
         "script": script_of(("tables",)),
         "grids": tables.grids(numbers),
-        "rows": _overview_rows(numbers, facts, warnings, pages),
+        "rows": _overview_rows(numbers, facts, pages),
         "count": len(facts),
-        "warned": sum(map(bool, warnings)),
+        "warned": sum(bool(one.warnings) for one in facts),
     }
     _write(path, "overview.html.j2", context)
 
@@ -242,14 +213,14 @@ class _Clips:
         self._warned: list[tuple[str, tuple[Any, ...], float]] = []
         self._path, self._films, self._folder, self._mesh = path, films, folder, mesh
 
-    def add(self, clip: ClipResult, names: Mapping[str, str]) -> None:
+    def add(self, clip: ClipResult) -> None:
         name, place = clip.facts.name, len(self.places)
         numbers = Gathering()
         numbers.add(clip.facts.name, [result.numbers for result in clip.choices])
-        own = numbers.numbers(dict(names))
+        own = numbers.numbers()
         self.choices.append((name, tuple(result.choice for result in clip.choices)))
         self.rows += tables.every_row(clip)
-        self._warned.append((name, clip.warnings, float(clip.times[0])))
+        self._warned.append((name, clip.facts.warnings, float(clip.times[0])))
         if clip.needed:
             self.needed.append(clip.needed)
         for result in clip.choices:
@@ -317,14 +288,14 @@ def _start(numbers: Numbers, choices: Sequence[tuple[str, tuple[Choice, ...]]]) 
 
 
 def _overview_rows(
-    numbers: Numbers, facts: Sequence[ClipFacts], warnings: Sequence[int], pages: Mapping[str, str | None]
+    numbers: Numbers, facts: Sequence[ClipFacts], pages: Mapping[str, str | None]
 ) -> Iterator[dict[str, Any]]:
     groups = [group[0] for group in numbers.groups()]
     columns = [numbers.modes.index(mode) for mode in groups]
     beside = numbers.modes.index(numbers.reference or numbers.modes[0])
     shown = numbers.values[LARGEST]
     largest = shown.max(axis=(1, 2), initial=0.0, where=np.isfinite(shown))
-    order = sorted(range(len(facts)), key=lambda place: (not warnings[place], -largest[place]))
+    order = sorted(range(len(facts)), key=lambda place: (not facts[place].warnings, -largest[place]))
     for place in order:
         cells = []
         for choice in range(len(numbers.choices)):
@@ -341,7 +312,7 @@ def _overview_rows(
         yield {
             "facts": facts[place],
             "page": quote(page) if page else "",
-            "warnings": warnings[place],
+            "warnings": len(facts[place].warnings),
             "largest": digits(largest[place]),
             "cells": cells,
         }
@@ -356,10 +327,11 @@ def _context(numbers: Numbers, needed: Sequence[KeysNeeded], settings: Settings)
         "numbers": numbers,
         "verdict": said,
         "settings": settings,
+        "date": datetime.now(),
         "needed": needed,
         "measures": MEASURES,
         "deciding": numbers.deciding(0),
-        "colours": [colours_of(mode) for mode in numbers.modes],
+        "colours": [colours_on_pages(mode) for mode in numbers.modes],
         "descriptions": [description_of(mode) for mode in numbers.modes],
         "style": Markup((HERE / "templates" / "page.css").read_text(encoding="utf-8")),
         "most_tabs": MOST_TABS,
@@ -383,6 +355,7 @@ def _templates() -> jinja2.Environment:
         "every_head": tables.EVERY_HEAD,
         "needed_rows": tables.needed_rows,
         "csv": _csv,
+        "label_of": label_of,
         "hash": lambda text: base64.b64encode(hashlib.sha256(text.encode()).digest()).decode(),
     }
     environment.filters |= {"digits": digits}

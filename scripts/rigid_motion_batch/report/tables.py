@@ -114,7 +114,7 @@ def every_row(clip: ClipResult) -> list[tuple[str, str, tuple[str, ...], tuple[C
     found = []
     for result in clip.choices:
         lines = [
-            [str(row.keys), digits(row.keys_per_s)] + [digits(measure.of(row)) for measure in COUNTED]
+            [str(row.keys or NONE), digits(row.keys_per_s)] + [digits(measure.of(row)) for measure in COUNTED]
             for motion in result.motions
             for row in motion.metrics[:1]
         ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 
@@ -48,6 +49,16 @@ class Part:
 
 
 Text = tuple[Part, ...]
+
+
+def _say(template: str, *values: Part) -> Text:
+    """A text with values in the places of its braces."""
+    words = map(Part, template.split("{}"))
+    return tuple(part for both in zip_longest(words, values) for part in both if part and part.text)
+
+
+def _number(value: str) -> Part:
+    return Part(value, "number")
 
 
 @dataclass(frozen=True)
@@ -132,6 +143,7 @@ def verdict(numbers: Numbers, needed: Sequence[KeysNeeded] = ()) -> Verdict:
         if gain and gain != said[0] and said[0] != _lower_error(first):
             facts.append(gain)
         others = [_gain(contest) for contest in contests[1:]]
+        facts = [fact for fact in (_other(numbers, first),) if fact] + facts
         facts += [fact for fact in (_wins(first), *others, _best_of(numbers, first), _others(first)) if fact]
     return Verdict(said[0], tuple(facts[:3]))
 
@@ -187,16 +199,14 @@ def _keys_needed(numbers: Numbers, needed: Sequence[KeysNeeded]) -> Text | None:
     mode = together.groups[group][0]
     reference = Part(numbers.label(REFERENCE), "mode", REFERENCE)
     if shares[group, way] > 1.0 - TIE:
-        return Part("No mode needs fewer keys than "), reference, Part(" at "), Part(rate, "number"), Part(" a second.")
-    return (
+        return _say("No mode needs fewer keys than {} at {} a second.", reference, _number(rate))
+    return _say(
+        f"{{}}, with {SPACED[DECIMATIONS[way]]}, does with {{}} a second where {{}} needs {{}} evenly spaced: "
+        f"{percent(1.0 - shares[group, way])} fewer for the same error.",
         Part(numbers.label(mode), "mode", mode),
-        Part(f", with {SPACED[DECIMATIONS[way]]}, does with "),
-        Part(f"{together.keys_per_s[group, way, at]:.3g}", "number"),
-        Part(" a second where "),
+        _number(f"{together.keys_per_s[group, way, at]:.3g}"),
         Part("it") if mode == REFERENCE else reference,
-        Part(" needs "),
-        Part(f"{together.reference_keys_per_s[at]:.3g}", "number"),
-        Part(f" evenly spaced: {percent(1.0 - shares[group, way])} fewer for the same error."),
+        _number(f"{together.reference_keys_per_s[at]:.3g}"),
     )
 
 
@@ -216,10 +226,9 @@ def _fewer_keys(contest: _Contest) -> Text | None:
     own, theirs, rates = curves[:, best], curves[:, reference], contest.amounts
     if np.any(np.diff(own) >= 0.0):
         return None
-    for highest in range(len(rates) - 1, 0, -1):
-        if own[-1] <= theirs[highest] and own[highest] < theirs[highest]:
-            break
-    else:
+    crossed = (at for at in range(len(rates) - 1, 0, -1) if own[-1] <= theirs[at] and own[at] < theirs[at])
+    highest = next(crossed, None)
+    if highest is None:
         return None
     rate = float(np.exp(np.interp(-theirs[highest], -own, np.log(rates))))
     at_most = theirs[highest] > own[0]
@@ -227,15 +236,13 @@ def _fewer_keys(contest: _Contest) -> Text | None:
     if share < TIE:
         return None
     placed = " on average" if contest.kind is Budget else ""
-    return (
+    return _say(
+        f"{{}} needs {'at most ' if at_most else ''}{{}} keys a second{placed} where {{}} needs {{}}: "
+        f"{'at least ' if at_most else ''}{percent(share)} fewer keys for the same error.",
         contest.name(best),
-        Part(" needs at most " if at_most else " needs "),
-        Part(f"{rate:.3g}", "number"),
-        Part(f" keys a second{placed} where "),
+        _number(f"{rate:.3g}"),
         contest.name(reference),
-        Part(" needs "),
-        Part(f"{rates[highest]:g}", "number"),
-        Part(f": {'at least ' if at_most else ''}{percent(share)} fewer keys for the same error."),
+        _number(f"{rates[highest]:g}"),
     )
 
 
@@ -248,18 +255,15 @@ def _within(contest: _Contest) -> Text | None:
         return _nobody(contest)
     best, rival, ratios = found
     at = int(np.nanargmin(ratios))
-    fewer = percent(1.0 - ratios[at])
     phrase = contest.phrase(at)
-    return (
-        Part(f"{phrase[0].upper()}{phrase[1:]}, "),
+    return _say(
+        "{}, {} needs {} keys a second where {} needs {}: {} fewer.",
+        Part(phrase[0].upper() + phrase[1:]),
         contest.name(best),
-        Part(" needs "),
-        Part(f"{contest.means[at, best]:.3g}", "number"),
-        Part(" keys a second where "),
+        _number(f"{contest.means[at, best]:.3g}"),
         contest.name(rival),
-        Part(" needs "),
-        Part(f"{contest.means[at, rival]:.3g}", "number"),
-        Part(f": {fewer} fewer."),
+        _number(f"{contest.means[at, rival]:.3g}"),
+        Part(percent(1.0 - ratios[at])),
     )
 
 
@@ -272,64 +276,53 @@ def _lower_error(contest: _Contest) -> Text | None:
         return _nobody(contest)
     best, rival, ratios = found
     at = int(np.nanargmin(ratios))
-    name = contest.numbers.choices[contest.places[at]].amount
-    return (
+    return _say(
+        f"{{}} has {{}} less error than {{}} with the same {{}} keys a second"
+        f"{' on average' if contest.kind is Budget else ''}.",
         contest.name(best),
-        Part(" has "),
-        Part(percent(1.0 - ratios[at]), "number"),
-        Part(" less error than "),
+        _number(percent(1.0 - ratios[at])),
         contest.name(rival),
-        Part(" with the same "),
-        Part(name, "number"),
-        Part(f" keys a second{' on average' if contest.kind is Budget else ''}."),
+        _number(contest.numbers.choices[contest.places[at]].amount),
     )
 
 
 def _nobody(contest: _Contest) -> Text:
     """Where no mode is better than the reference, or than all others; the choice with the most keys speaks."""
-    means, kind = contest.means, contest.kind
+    means, within = contest.means, contest.kind is Tolerance
     known = np.flatnonzero(np.isfinite(means).all(axis=1))
-    at = int(known[0] if kind is Tolerance else known[-1])
-    unit = "keys a second" if kind is Tolerance else "mm"
-    value = Part(f"{digits(means[at].min())}\u00a0{unit}", "number")
+    at = int(known[0] if within else known[-1])
+    much, unit, off = ("keys", "keys a second", "") if within else ("error", "mm", " off (RMS)")
     phrase = contest.phrase(at)
+
+    def value(mean: float) -> Part:
+        return _number(f"{digits(mean)}\u00a0{unit}")
+
     if len(contest.groups) == 1:
-        modes = contest.groups[0]
-        count = "Both" if len(modes) == 2 else f"All {len(modes)}"
-        alike = Part(f"{count} modes are one motion: ") if len(modes) > 1 else Part("")
-        does = " needs " if kind is Tolerance else " is "
-        off = "" if kind is Tolerance else " off (RMS)"
-        return tuple(
-            part for part in (alike, contest.name(0), Part(does), value, Part(f"{off} {phrase}.")) if part.text
-        )
+        count = len(contest.groups[0])
+        alike = f"{'Both' if count == 2 else f'All {count}'} modes are one motion: " if count > 1 else ""
+        does = "needs" if within else "is"
+        return _say(f"{alike}{{}} {does} {{}}{off} {phrase}.", contest.name(0), value(means[at].min()))
     scores = np.log(means[known]).mean(axis=0)
     if np.ptp(scores) < TIE:
-        differ = "need as many keys" if kind is Tolerance else "are equally close"
-        return (
-            Part(f"The {len(contest.groups)} motions {differ}: "),
-            value,
-            Part(f"{'' if kind is Tolerance else ' off (RMS)'} {phrase}."),
-        )
+        differ = "need as many keys" if within else "are equally close"
+        return _say(f"The {len(contest.groups)} motions {differ}: {{}}{off} {phrase}.", value(means[at].min()))
+    ranked = np.argsort(scores, kind="stable").tolist()
     if contest.reference is None:
-        ranked = np.argsort(scores, kind="stable")
-        first, second = contest.name(int(ranked[0])), contest.name(int(ranked[1]))
-        return first, Part(" and "), second, Part(" are the closest, and equally close: "), value, Part(f" {phrase}.")
+        first, second = map(contest.name, ranked[:2])
+        return _say(
+            f"{{}} and {{}} are the closest, and equally close: {{}} {phrase}.", first, second, value(means[at].min())
+        )
     reference = contest.reference
-    others = np.delete(scores, reference)
-    following = int(np.flatnonzero(scores == others.min())[0])
+    following = next(group for group in ranked if group != reference)
     more = np.exp(scores[following] - scores[reference]) - 1.0
-    comes = "No mode needs fewer keys than " if kind is Tolerance else "No mode comes closer than "
-    much = "keys" if kind is Tolerance else "error"
-    beside = f"as many {much}" if kind is Tolerance else f"the same {much}"
-    next_best = f"{percent(more)} more {much}" if more >= TIE else beside
-    return (
-        Part(comes),
+    same = "as many keys" if within else "the same error"
+    comes = "needs fewer keys" if within else "comes closer"
+    return _say(
+        f"No mode {comes} than {{}}: {{}}{off} {phrase}. Next is {{}} with "
+        f"{f'{percent(more)} more {much}' if more >= TIE else same}.",
         contest.name(reference),
-        Part(": "),
-        Part(f"{digits(means[at, reference])}\u00a0{unit}", "number"),
-        Part(f"{'' if kind is Tolerance else ' off (RMS)'} {phrase}. Next is "),
+        value(means[at, reference]),
         contest.name(following),
-        Part(f" with {next_best}."),
     )
 
 
@@ -343,15 +336,9 @@ def _gain(contest: _Contest) -> Text | None:
         return None
     best, rival, ratios = found
     at = int(np.nanargmin(ratios))
-    what = "fewer keys" if contest.kind is Tolerance else "lower error"
-    return (
-        Part(f"{percent(1.0 - ratios[at])} {what}", "number"),
-        Part(" from "),
-        contest.name(best),
-        Part(" than from "),
-        contest.name(rival),
-        Part(f" {contest.phrase(at)}"),
-    )
+    less = f"{percent(1.0 - ratios[at])} {'fewer keys' if contest.kind is Tolerance else 'lower error'}"
+    said = f"{{}} from {{}} than from {{}} {contest.phrase(at)}"
+    return _say(said, _number(less), contest.name(best), contest.name(rival))
 
 
 def _wins(contest: _Contest) -> Text | None:
@@ -365,20 +352,17 @@ def _wins(contest: _Contest) -> Text | None:
     loss = 1.0 - least / values[..., best]
     lost = contest.told_apart & (loss > TIE)
     cases, won = int(contest.told_apart.sum()), int((contest.told_apart & ~lost).sum())
-    word = "Fewest keys" if contest.kind is Tolerance else "Closest"
-    beginning = (Part(f"{word} in {won} of {cases}", "number"), Part(" cases"))
+    many = _number(f"{'Fewest keys' if contest.kind is Tolerance else 'Closest'} in {won} of {cases}")
     if not lost.any():
-        return beginning
+        return _say("{} cases", many)
     clip, choice = np.unravel_index(int(np.where(lost, loss, -1.0).argmax()), loss.shape)
-    winner = int(np.nanargmin(values[clip, choice]))
-    clip_name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
-    return (
-        *beginning,
-        Part("; not in " if lost.sum() == 1 else "; farthest from it in "),
-        Part(f"{clip_name} {at.phrase}", "link", f"{clip_name},{at.name}"),
-        Part(": there "),
-        contest.name(winner),
-        Part(f" is, by {percent(loss[clip, choice])}"),
+    name, at = contest.numbers.clips[clip], contest.numbers.choices[contest.places[choice]]
+    return _say(
+        f"{{}} cases; {'not' if lost.sum() == 1 else 'farthest from it'} in {{}}: there {{}} is, "
+        f"by {percent(loss[clip, choice])}",
+        many,
+        Part(f"{name} {at.phrase}", "link", f"{name},{at.name}"),
+        contest.name(int(np.nanargmin(values[clip, choice]))),
     )
 
 
@@ -393,7 +377,23 @@ def _best_of(numbers: Numbers, contest: _Contest) -> Text | None:
         return None
     ratio = float(np.exp(np.log(np.maximum(own[possible], 1e-9) / single[possible]).mean()))
     said = f"{percent(1.0 - ratio)} lower error" if ratio < 1.0 - TIE else "No lower error"
-    return Part(said, "number"), Part(" from the best mode of each segment than from the best single one")
+    return _say("{} from the best mode of each segment than from the best single one", _number(said))
+
+
+def _other(numbers: Numbers, contest: _Contest) -> Text | None:
+    """Somebody else's motion beside the best mode, under the middle choice of keys."""
+    other = next((mode for mode in numbers.modes if mode not in MODES and mode != BEST_OF), None)
+    if other is None or contest.kind is Tolerance:
+        return None
+    at = (len(contest.places) - 1) // 2
+    own = numbers.mean()[ERROR, contest.places[at], numbers.modes.index(other)]
+    best = int(np.argmin(contest.means[at]))
+    return _say(
+        f"{{}} is {{}}, and {{}} {digits(contest.means[at, best])}\u00a0mm {contest.phrase(at)}",
+        _number(f"{digits(own)}\u00a0mm off (RMS)"),
+        Part(numbers.label(other), "mode", other),
+        contest.name(best),
+    )
 
 
 def _others(contest: _Contest) -> Text | None:
@@ -407,9 +407,9 @@ def _others(contest: _Contest) -> Text | None:
     ratios = (contest.means[:, rest] / contest.means[:, [contest.reference]]) - 1.0
     low, high = float(np.nanmin(ratios)), float(np.nanmax(ratios))
     what = "keys" if contest.kind is Tolerance else "error"
-    names = listed(contest.name(place).text for place in rest)
+    names, reference = listed(contest.name(place).text for place in rest), contest.name(contest.reference)
     if abs(low) < TIE and abs(high) < TIE:
-        return Part(f"The same {what}", "number"), Part(f" from {names} as from "), contest.name(contest.reference)
+        return _say(f"{{}} from {names} as from {{}}", _number(f"The same {what}"), reference)
     if low >= 0.0 or high <= 0.0:
         small, large = sorted((abs(low), abs(high)))
         way = ("higher" if high > 0.0 else "lower") if what == "error" else ("more" if high > 0.0 else "fewer")
@@ -417,7 +417,7 @@ def _others(contest: _Contest) -> Text | None:
         said = f"{span} {way} {what}"
     else:
         said = f"{_signed(low)} to {_signed(high)} {what}"
-    return Part(said, "number"), Part(f" from {names} beside "), contest.name(contest.reference)
+    return _say(f"{{}} from {names} beside {{}}", _number(said), reference)
 
 
 def _signed(share: float) -> str:

@@ -165,7 +165,9 @@ def _notes(made: BodyReconstruction, modes: Iterable[str]) -> dict[str, str]:
     """Mode id to its own number of keys, where the modes have different ones."""
     kind = "key poses" if made.shared else "keys"
     counts = {
-        mode: len(key_samples(made.keys[mode])) if made.shared else sum(map(len, made.keys[mode])) for mode in modes
+        mode: len(key_samples(keys)) if made.shared else sum(map(len, keys))
+        for mode in modes
+        if len((keys := made.keys[mode])[0])
     }
     return {} if len(set(counts.values())) == 1 else {mode: f"{count} {kind}" for mode, count in counts.items()}
 

@@ -128,7 +128,7 @@ def put_on_stage(
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:
     """Mode id to its own number of keys, where the modes have different ones."""
-    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items()}
+    counts = {mode: len(keys) for mode, keys in reconstruction.keys.items() if len(keys)}
     if len(set(counts.values())) == 1:
         return {}
     duration = float(np.ptp(reconstruction.times[[0, -1]]))

@@ -42,7 +42,7 @@ def test_of_a_body_the_joint_that_is_farthest_off_counts() -> None:
         assert np.allclose(motion.errors[1], apart.max(axis=0), atol=1e-6)
         assert np.array_equal(motion.errors[0], motion.joint_errors.max(axis=0))
         assert motion.errors[0].max() == motion.metrics[0].max_shell_m
-    assert len(found.joints) == len(MODES) * len(whole.joint_names)
+    assert len(found.joints) == len(MODES) * len(whole.facts.joint_names)
 
 
 def test_a_clip_that_is_too_short_for_two_keys_has_no_result() -> None:

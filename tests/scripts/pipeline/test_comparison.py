@@ -19,7 +19,7 @@ from rigid_motion_batch.analysis.choices import Choice, Tolerance, Uniform
 from rigid_motion_batch.analysis.results import compare_clip
 from rigid_motion_batch.pipeline import values
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
-from rigid_motion_batch.pipeline.comparison_steps import About, result_in
+from rigid_motion_batch.pipeline.comparison_steps import result_in
 from rigid_motion_batch.pipeline.executors import ProcessExecutor, SerialExecutor
 from rigid_motion_batch.pipeline.performing import Executor
 from rigid_motion_batch.pipeline.running import Outcome, Share, run
@@ -27,6 +27,7 @@ from rigid_motion_batch.pipeline.steps import OWN, Task
 from rigid_motion_batch.pipeline.store import OutputError, Store
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import Clip
+from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.scenes.settings import StageSettings
 from tests.scripts.bvh_bodies import write_body
 from tests.scripts.comparing import write_toss
@@ -37,12 +38,13 @@ ROOT = Path(__file__).resolve().parents[3]
 
 STAGE = StageSettings(resolution=(64, 36), fps=10)
 
-ABOUT = About("Rigid Motion", "compare toss.csv", {"Videos": "small"})
+ABOUT = Settings(0.1, "Rigid Motion", "compare toss.csv", details={"Videos": "small"})
 
 
 def wanted(*sources: Path, **fields: object) -> Comparison:
     modes = ("lerp_slerp", "motor_spline")
-    return replace(Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes), **fields)
+    comparison = Comparison(tuple(map(str, sources)), (Uniform("5"), Uniform("10")), modes, blender="this")
+    return replace(comparison, **fields)
 
 
 def compared(
@@ -162,7 +164,7 @@ def test_a_whole_body_has_joints_films_and_a_comparison_with_decimate(output: Pa
         *(f"{folder}/{name}" for name in ("lerp_slerp.keys.csv", "motor_spline.keys.csv")),
         *(f"{folder}/{name}" for name in ("comparison.blend", "comparison.mp4")),
     }
-    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), beside_decimate=False))
+    _, listener = compared(tmp_path / "without", wanted(body, choices=(Tolerance("2cm"),), blender=""))
     assert "body: not compared with Blender's Decimate, for there is no Blender here" in listener.notes
     assert {*published(tmp_path / "without")} >= {"metrics.csv", "metrics_joints.csv"}
     assert "decimated.csv" not in published(tmp_path / "without")
@@ -369,14 +371,15 @@ from pathlib import Path
 sys.modules["bpy"] = sys.modules["mathutils"] = None
 from rigid_motion_batch.analysis.choices import Tolerance
 from rigid_motion_batch.pipeline.comparison import Comparison, ComparisonPlan
-from rigid_motion_batch.pipeline.comparison_steps import About
+from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.pipeline.executors import SerialExecutor
 from rigid_motion_batch.pipeline.running import run
 from rigid_motion_batch.pipeline.store import Store
 
 with Store(Path(sys.argv[2])) as store, SerialExecutor() as executor:
     choices, modes = (Tolerance("2cm"),), ("lerp_slerp", "motor_spline")
-    plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=About("x", "y")), store)
+    about = Settings(0.1, "x", "y")
+    plan = ComparisonPlan(Comparison((sys.argv[1],), choices, modes, count_keys=True, about=about), store)
     plan.read(lambda tasks: run(tasks, store, executor))
     outcome = run(plan.tasks, store, executor)
 sys.exit(str(outcome.failures) if outcome.failures else 0)
@@ -387,3 +390,12 @@ def test_numbers_and_pages_need_no_blender(output: Path, toss: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", WITHOUT, toss, output], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     assert {"metrics.csv", "keys_needed.csv", "report.html"} <= {*published(output)}
+
+
+def test_without_blender_a_page_shows_a_drill_and_a_line_says_so(output: Path, toss: Path) -> None:
+    outcome, listener = compared(output, wanted(toss, about=ABOUT, subject="controller", blender=""))
+    assert outcome.failures == {}
+    assert "the report shows a drill, for there is no Blender here that reads controller" in listener.notes
+    assert "object controller" not in listener.done
+    _, again = compared(output, wanted(toss, about=ABOUT, subject="controller"))
+    assert again.done == {"object controller", "report.html"}

@@ -21,12 +21,13 @@ from rigid_motion_batch.analysis.body_decimated import DECIMATE, OWN, KeysOfBody
 from rigid_motion_batch.analysis.choices import Budget, Tolerance, Uniform
 from rigid_motion_batch.analysis.metrics import Metrics
 from rigid_motion_batch.analysis.results import ClipResult
+from rigid_motion_batch.palette import MODE_COLOURS, PAGES, colours_on_pages
 from rigid_motion_batch.recordings.clip_reading import read_clips
 from rigid_motion_batch.recordings.clips import ClipWarning
-from rigid_motion_batch.report import Gathering, Settings, pages, write_overview, write_report
-from rigid_motion_batch.report.colours import BACKGROUNDS, MODE_COLOURS, OTHER_COLOURS
-from rigid_motion_batch.report.numbers import ERROR, KEYS
-from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of
+from rigid_motion_batch.report import pages
+from rigid_motion_batch.report.numbers import ERROR, KEYS, Gathering
+from rigid_motion_batch.report.pages import HERE, SCRIPTS, script_of, write_overview, write_report
+from rigid_motion_batch.report.settings import Settings
 from rigid_motion_batch.report.tables import grids
 from tests.scripts.clips.bodies import swinging_body
 from tests.scripts.clips.recordings import swinging_clip
@@ -110,7 +111,7 @@ def test_no_name_gets_into_the_page_but_as_text(tmp_path: Path) -> None:
     clip = result_of(swinging_clip(), TEN, warnings=[ClipWarning(HOSTILE, HOSTILE, 101.0)])
     facts = replace(clip.facts, name=HOSTILE, source=HOSTILE, axes=HOSTILE, repairs=(HOSTILE,))
     body = result_of(swinging_body(), TEN)
-    body = replace(body, joint_names=(HOSTILE, *body.joint_names[1:]))
+    body = replace(body, facts=replace(body.facts, joint_names=(HOSTILE, *body.facts.joint_names[1:])))
     path = tmp_path / "report.html"
     page = written(path, replace(clip, facts=facts), body, program=HOSTILE, command=HOSTILE, details={HOSTILE: HOSTILE})
     assert all_text(page).count("alert(1)") >= 8
@@ -340,6 +341,8 @@ def luminance(colour: str) -> float:
 
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
 def test_names_in_the_colours_of_modes_can_be_read(theme: int) -> None:
-    for colours in (*MODE_COLOURS.values(), *OTHER_COLOURS):
-        dark, light = sorted((luminance(colours[theme]), luminance(BACKGROUNDS[theme])))
-        assert (light + 0.05) / (dark + 0.05) >= 4.5, colours
+    ground = PAGES[theme]
+    assert re.findall(r"--bg: (#\w+);", (HERE / "templates" / "page.css").read_text(encoding="utf-8"))[theme] == ground
+    for mode in (*MODE_COLOURS, *(f"motion {number}" for number in range(20))):
+        dark, light = sorted((luminance(colours_on_pages(mode)[theme]), luminance(ground)))
+        assert (light + 0.05) / (dark + 0.05) >= 4.5, mode

@@ -28,7 +28,7 @@ def numbers(
     together = [mode for group in same for mode in group]
     groups = (*same, *((mode,) for mode in modes if mode not in together))
     names = tuple(f"clip{number}" for number in range(1, len(clips) + 1))
-    return Numbers(names, tuple(choices), modes, values, (frozenset({groups}),) * len(clips), {"mine": "mine.csv"})
+    return Numbers(names, tuple(choices), modes, values, (frozenset({groups}),) * len(clips))
 
 
 def keys_needed(keys: Mapping[str, Sequence[float]], *, fitted: bool = False) -> KeysNeeded:

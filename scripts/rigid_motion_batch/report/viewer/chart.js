@@ -20,7 +20,8 @@ export function worst({ errors }) {
 }
 
 paint("chart", () => {
-  const { times, keyed, motions } = S.choice, all = shown(), rows = keyed ? all : motions.slice(0, 1);
+  const { times, keyed, motions } = S.choice, all = shown();
+  const rows = keyed ? all.filter(({ keys }) => keys.length) : motions.slice(0, 1);
   const [width, height] = [plot.clientWidth, plot.clientHeight], first = at(times, S.low)[0];
   const last = Math.min(at(times, S.high)[0] + 1, times.length - 1);
   const lines = all.map(({ errors }) => polyline(errors[S.measure], first, last, inside()));

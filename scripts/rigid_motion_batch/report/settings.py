@@ -1,0 +1,28 @@
+"""What the reader of a report needs to know of a run, beyond the numbers themselves. Plain, for tasks are told so."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from rigid_motion_batch.analysis.radii import JOINT
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a page says of a run, but for its date."""
+
+    radius: float
+    """Of the shell of a rigid body, in metres."""
+
+    program: str
+    """Name and version."""
+
+    command: str
+    """The command line, as one would type it."""
+
+    joint_radius: float = JOINT
+    """Of the shell of a joint, in metres."""
+
+    details: Mapping[str, str] = field(default_factory=dict)
+    """Whatever else is worth a line, such as Blender's version: what it is, and its value."""

@@ -1,0 +1,64 @@
+"""The object that is shown as few triangles, for the viewer of a report."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from .subject import load_subject, tinted_slots, vertices_of
+
+MOST_TRIANGLES = 4000
+"""So many are some 100 kB in a page."""
+
+TRIES = 6
+
+
+def simplified(wanted: str) -> dict[str, np.ndarray]:
+    """The surface of an object in its own axes, in metres: `vertices` (v, 3), `triangles` (t, 3), `tints` (t,).
+
+    Tints are 1 where a triangle has the colour of its mode, and 0 elsewhere. What is wanted is as in `load_subject`,
+    whose errors it raises.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    mesh = load_subject(wanted)
+    obj = bpy.data.objects.new("Subject", mesh)
+    bpy.context.scene.collection.objects.link(obj)
+    modifier = obj.modifiers.new("Fewer", "DECIMATE")
+    modifier.use_collapse_triangulate = True
+    for _ in range(TRIES):
+        found = _surface(obj)
+        if len(found["triangles"]) <= MOST_TRIANGLES:
+            return found
+        # It may leave more than it is asked to, where much hangs on nothing.
+        modifier.ratio *= 0.95 * MOST_TRIANGLES / len(found["triangles"])
+    return _welded(found)
+
+
+def _surface(obj: bpy.types.Object) -> dict[str, np.ndarray]:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh(preserve_all_data_layers=True, depsgraph=depsgraph)
+    mesh.calc_loop_triangles()
+    triangles = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+    slots = np.empty(len(mesh.loop_triangles), dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles)
+    mesh.loop_triangles.foreach_get("material_index", slots)
+    found = {
+        "vertices": vertices_of(mesh),
+        "triangles": triangles.reshape(-1, 3),
+        "tints": np.isin(slots, tinted_slots(mesh)).astype(float),
+    }
+    evaluated.to_mesh_clear()
+    return found
+
+
+def _welded(found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """With vertices that are close together as one, as coarsely as it has to be."""
+    places, triangles, tints = found.values()
+    cell = np.ptp(places, axis=0).max() / 256.0
+    while len(triangles) > MOST_TRIANGLES:
+        _, first, same = np.unique(np.floor(places / cell), axis=0, return_index=True, return_inverse=True)
+        corners = same.ravel()[triangles]
+        left = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+        places, triangles, tints, cell = places[first], corners[left], tints[left], 2.0 * cell
+    return dict(zip(found, (places, triangles, tints), strict=True))

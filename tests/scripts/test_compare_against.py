@@ -1,0 +1,295 @@
+"""compare --against: somebody else's motion of a clip, in all that a comparison shows."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation, Slerp
+
+from rigid_motion_batch.analysis.modes import BEST_OF, name_of_other
+from tests.balls import largest_displacements
+from tests.scripts.comparing import ROOT, write_toss
+from tests.scripts.test_compare import SMALL, poses_of, rows_of, run, table
+
+FAST = ("--no-video", "--rates", "10")
+
+POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+
+
+def write_poses(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    lines = [",".join(map(repr, row)) for row in zip(*(columns[name].tolist() for name in ("t", *POSE)), strict=True)]
+    path.write_text("\n".join([",".join(("t", *POSE)), *lines, ""]))
+    return path
+
+
+@pytest.fixture(scope="module")
+def toss(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_toss(tmp_path_factory.mktemp("clips") / "toss.csv", 90)
+
+
+@pytest.fixture(scope="module")
+def mine(toss: Path) -> Path:
+    """Every fourth pose of the recording but for its ends, at other moments and a little elsewhere."""
+    columns = {name: column[5:-7:4].copy() for name, column in table(toss).items()}
+    columns["t"] += 0.003
+    columns["x"] += 0.01 * np.sin(np.arange(len(columns["t"])))
+    return write_poses(toss.with_name("mine.csv"), columns)
+
+
+@pytest.fixture(scope="module")
+def compared(toss: Path, mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    output = tmp_path_factory.mktemp("output")
+    assert run(toss, "--against", mine, *FAST, "--output", output, "--tolerance", "1cm", "--modes", "all,best_of") == 0
+    return output
+
+
+def by_scipy(mine: Path, times: np.ndarray) -> tuple[np.ndarray, Rotation]:
+    """Positions on straight lines between the samples of a table, and rotations by SLERP."""
+    own = table(mine)
+    turns = Slerp(own["t"], Rotation.from_quat(poses_of(own).quaternions, scalar_first=True))
+    return np.stack([np.interp(times, own["t"], own[name]) for name in "xyz"], axis=-1), turns(times)
+
+
+def test_its_numbers_are_those_of_straight_lines_and_slerp_between_its_samples(toss, mine, compared):
+    recording, own = table(toss), table(mine)
+    rows = {(row["rate_hz"], row["mode"]): row for row in rows_of(compared / "metrics.csv")}
+    common = (recording["t"] >= own["t"][0]) & (recording["t"] <= own["t"][-1])
+    assert 0 < common.sum() < len(common)
+    for rate, folder in (("10", "10"), ("", "tolerance-1cm")):
+        row, keys = rows[rate, "mine"], rows[rate, "lerp_slerp"]
+        filled = table(compared / "toss" / folder / "mine.csv")
+        assert np.isin(filled["t"], recording["t"][common]).all()
+        assert len(filled["t"]) == int(row["samples"]) == int(keys["samples"])
+        if not rate:
+            assert len(filled["t"]) == common.sum()
+        positions, turns = by_scipy(mine, filled["t"])
+        assert np.abs(poses_of(filled).positions - positions).max() < 1e-12
+        at = np.searchsorted(recording["t"], filled["t"])
+        truth = poses_of({name: column[at] for name, column in recording.items()})
+        recorded = Rotation.from_quat(truth.quaternions, scalar_first=True)
+        offsets = positions - truth.positions
+        shell = largest_displacements(offsets, 0.1 * (turns.as_matrix() - recorded.as_matrix()))
+        assert float(row["rms_shell_m"]) == pytest.approx(np.sqrt(np.mean(shell**2)), rel=1e-9)
+        assert float(row["max_shell_m"]) == pytest.approx(shell.max(), rel=1e-9)
+        turned = np.degrees((recorded.inv() * turns).magnitude())
+        assert float(row["rms_rotation_deg"]) == pytest.approx(np.sqrt(np.mean(turned**2)), rel=1e-6)
+        assert (row["keys"], row["keys_per_s"], row["bytes_per_s"]) == ("", "", "")
+
+
+def test_the_modes_are_compared_as_on_the_stretch_that_both_have(toss, mine, compared, tmp_path):
+    recording, own = table(toss), table(mine)
+    common = (recording["t"] >= own["t"][0]) & (recording["t"] <= own["t"][-1])
+    cut = write_poses(tmp_path / "toss.csv", {name: column[common] for name, column in recording.items()})
+    assert run(cut, *FAST, "--output", tmp_path / "cut", "--tolerance", "1cm", "--modes", "all,best_of") == 0
+    alone = rows_of(tmp_path / "cut" / "metrics.csv")
+    assert [row for row in rows_of(compared / "metrics.csv") if row["mode"] != "mine"] == alone
+    assert sorted(path.name for path in (compared / "toss" / "10").iterdir()) == sorted(
+        ["mine.csv", *(path.name for path in (tmp_path / "cut" / "toss" / "10").iterdir())]
+    )
+
+
+def test_it_is_in_the_line_of_the_clip_the_table_the_verdict_and_the_page(toss, mine, tmp_path, capsys):
+    assert run(toss, "--against", mine, *FAST, "--output", tmp_path, "--json") == 0
+    said = json.loads(capsys.readouterr().out)
+    assert any(
+        re.search(r"toss: compared from [\d.]+ to [\d.]+ s alone, where mine has", note) for note in said["notes"]
+    )
+    assert [line["keys_per_s"] for line in said["table"] if line["name"] == "mine"] == [None]
+    assert any(" mm off (RMS) is mine, and " in fact for fact in said["facts"])
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    (data,) = re.findall(r'<script type="application/json" id="clip-0">(.*?)</script>', page)
+    (choice,) = json.loads(data)["choices"]
+    assert choice["motions"][-1]["modes"] == ["mine"]
+
+
+def test_a_motion_that_lasts_as_long_is_compared_from_end_to_end(toss, tmp_path, capsys):
+    rounded = table(toss)
+    rounded["t"] = np.round(rounded["t"], 3)
+    same = write_poses(tmp_path / "same.csv", rounded)
+    assert run(toss, "--against", same, *FAST, "--output", tmp_path / "output") == 0
+    assert "compared from" not in capsys.readouterr().err
+    (row,) = (row for row in rows_of(tmp_path / "output" / "metrics.csv") if row["mode"] == "same")
+    assert int(row["samples"]) > 80
+
+
+def test_options_say_of_it_what_they_say_of_the_recording(toss, mine, tmp_path):
+    """In centimetres with y up and other names, both have the numbers that they have in metres."""
+
+    def write(path: Path) -> Path:
+        columns = table(path)
+        renamed = {"when": columns["t"], **{f"p{name}": 100.0 * columns[name] for name in "xyz"}}
+        renamed |= {name: columns[name] for name in POSE[3:]}
+        lines = [
+            ",".join(map(repr, row)) for row in zip(*(column.tolist() for column in renamed.values()), strict=True)
+        ]
+        (tmp_path / path.name).write_text("\n".join([",".join(renamed), *lines, ""]))
+        return tmp_path / path.name
+
+    how = ("--scale", "0.01", "--axes", "unity", "--columns", "t=when,x=px,y=py,z=pz")
+    assert run(toss, "--against", mine, *FAST, "--output", tmp_path / "metres") == 0
+    assert run(write(toss), "--against", write(mine), *FAST, *how, "--output", tmp_path / "units") == 0
+    for one, other in zip(*(rows_of(tmp_path / name / "metrics.csv") for name in ("metres", "units")), strict=True):
+        assert one["mode"] == other["mode"]
+        assert float(one["rms_shell_m"]) == pytest.approx(float(other["rms_shell_m"]), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("stem", "called"),
+    [
+        ("mine", "mine"),
+        ("my take (2)", "my_take_2"),
+        ("lerp_slerp", "lerp_slerp-2"),
+        ("DQ_ScLERP", "DQ_ScLERP-2"),
+        (BEST_OF, f"{BEST_OF}-2"),
+        ("keys", "keys-2"),
+        ("lerp_slerp.keys", "lerp_slerp_keys"),
+    ],
+)
+def test_it_is_called_as_its_file_but_never_as_a_table_that_is_there(stem, called):
+    assert name_of_other(stem) == called
+
+
+# -- whole bodies -----------------------------------------------------------------------------------------------------
+
+PLACES = {"Hips": (0.0, 0.9, 0.0), "LeftHand": (0.6, 0.4, 0.0), "Head": (0.0, 1.2, 0.1)}
+
+
+def angles_at(times: np.ndarray) -> dict[str, np.ndarray]:
+    """Euler angles ZXY of each joint, in degrees, shape (n, 3)."""
+    return {
+        name: 30.0 * np.sin(np.outer(times, (3.0, 2.0 + joint, 4.0)) + np.arange(3.0) + joint)
+        for joint, name in enumerate(PLACES)
+    }
+
+
+def hips_at(times: np.ndarray) -> np.ndarray:
+    return np.sin(np.outer(times, (3.0, 2.0, 4.0))) * (0.3, 0.1, 0.4)
+
+
+def write_body(path: Path, times: np.ndarray, order: tuple[str, ...], unit: float = 1.0) -> Path:
+    """A root with two joints in this order, with the motion at these times, in a unit of which a metre has so many."""
+
+    def offset(name: str) -> str:
+        return "OFFSET " + " ".join(f"{unit * value:.9f}" for value in PLACES[name])
+
+    turns = "Zrotation Xrotation Yrotation"
+    lines = ["HIERARCHY", "ROOT Hips", "{", offset("Hips"), f"CHANNELS 6 Xposition Yposition Zposition {turns}"]
+    for name in order:
+        end = ["End Site", "{", f"OFFSET 0 {0.1 * unit} 0", "}"]
+        lines += [f"JOINT {name}", "{", offset(name), f"CHANNELS 3 {turns}", *end, "}"]
+    lines += ["}", "MOTION", f"Frames: {len(times)}", f"Frame Time: {times[1] - times[0]:.12f}"]
+    angles = angles_at(times)
+    rows = np.concatenate([unit * hips_at(times), *(angles[name] for name in ("Hips", *order))], axis=1)
+    path.write_text("\n".join([*lines, *(" ".join(f"{value:.12f}" for value in row) for row in rows), ""]))
+    return path
+
+
+def test_a_body_is_compared_joint_by_joint_by_name_and_in_metres(tmp_path):
+    times, own = np.arange(61) / 30.0, np.arange(16) / 7.5
+    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
+    mine = write_body(tmp_path / "mine.bvh", own, ("Head", "LeftHand"), unit=100.0)
+    output = tmp_path / "output"
+    assert run(walk, "--against", mine, *FAST, "--modes", "lerp_slerp", "--output", output, "--radius", "0.05") == 0
+
+    def placed(hips: np.ndarray, turns: dict[str, Rotation]) -> dict[str, tuple[np.ndarray, Rotation]]:
+        found = {"Hips": (hips, turns["Hips"])}
+        for name in ("LeftHand", "Head"):
+            found[name] = hips + turns["Hips"].apply(PLACES[name]), turns["Hips"] * turns[name]
+        return found
+
+    truth = placed(
+        hips_at(times), {n: Rotation.from_euler("ZXY", a, degrees=True) for n, a in angles_at(times).items()}
+    )
+    sampled = {n: Slerp(own, Rotation.from_euler("ZXY", a, degrees=True)) for n, a in angles_at(own).items()}
+    hips = np.stack([np.interp(times, own, column) for column in hips_at(own).T], axis=-1)
+    shown = placed(hips, {name: slerp(times) for name, slerp in sampled.items()})
+    shell = {}
+    for name in PLACES:
+        (there, turned), (here, turns) = truth[name], shown[name]
+        shell[name] = largest_displacements(here - there, 0.05 * (turns.as_matrix() - turned.as_matrix()))
+    joints = {row["joint"]: row for row in rows_of(output / "metrics_joints.csv") if row["mode"] == "mine"}
+    for name, errors in shell.items():
+        assert float(joints[name]["rms_shell_m"]) == pytest.approx(np.sqrt(np.mean(errors**2)), rel=1e-6)
+    (row,) = (row for row in rows_of(output / "metrics.csv") if row["mode"] == "mine")
+    assert float(row["max_shell_m"]) == pytest.approx(max(errors.max() for errors in shell.values()), rel=1e-6)
+    assert (row["joints"], row["keys"], row["key_frames"]) == ("3", "", "")
+    assert not list(output.rglob("mine*.csv"))
+
+
+# -- films ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_film_has_a_lane_of_it(toss, mine, tmp_path):
+    how = ("--rates", "10", "--modes", "lerp_slerp", "--deviation", "1", "--output", tmp_path)
+    assert run(toss, "--against", mine, *how, *SMALL) == 0
+    folder = tmp_path / "toss" / "10"
+    assert (folder / "comparison.mp4").stat().st_size > 0
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "comparison.blend"))
+    scene, start = bpy.context.scene, table(folder / "keys.csv")["t"][0]
+    assert bpy.data.objects["mine title"].data.body == "mine"
+    centre = np.array(scene["recording_centre_m"])
+    for frame in (1, 3, scene.frame_end):
+        scene.frame_set(frame)
+        positions, turns = by_scipy(mine, np.array([start + (frame - 1) / scene.render.fps]))
+        actor = bpy.data.objects["mine"]
+        assert np.abs(np.array(actor.location) - (positions[0] - centre)).max() < 1e-5
+        there = Rotation.from_quat(np.array(actor.rotation_quaternion), scalar_first=True)
+        assert (there.inv() * turns[0]).magnitude() < 1e-5
+
+
+def test_a_film_of_a_body_has_a_lane_of_it(tmp_path):
+    times = np.arange(31) / 30.0
+    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
+    mine = write_body(tmp_path / "mine.bvh", times[::5], ("LeftHand", "Head"))
+    how = ("--rates", "5", "--modes", "lerp_slerp", "--output", tmp_path / "output")
+    assert run(walk, "--against", mine, *how, *SMALL) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "output" / "walk" / "5" / "comparison.blend"))
+    rig = bpy.data.objects["mine"]
+    # Its keys are not known: it has one on every frame.
+    assert len({key.co[0] for curve in rig.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+                for key in curve.keyframe_points}) == bpy.context.scene.frame_end  # fmt: skip
+
+
+# -- refusals ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("other", "complaint"),
+    [
+        ("nowhere.csv", "nowhere.csv: no such file; check the path"),
+        (".", "this is a folder without recordings; name a file"),
+        ("broken.csv", "broken.csv:1: "),
+        ("late.csv", "late.csv: it lasts from 100.* to .* s, and .*toss.csv from .*; give both the same clock"),
+        ("body.bvh", "body.bvh: this is a body of 3 joints, and .*toss.csv a single rigid body; give the same of both"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_in_a_line(other, complaint, toss, tmp_path, capsys):
+    (tmp_path / "broken.csv").write_text("a,b\n1,2\n")
+    late = table(toss)
+    write_poses(tmp_path / "late.csv", late | {"t": late["t"] - late["t"][0] + 100.0})
+    write_body(tmp_path / "body.bvh", np.arange(31) / 30.0, ("LeftHand", "Head"))
+    assert run(toss, "--against", tmp_path / other, *FAST, "--quiet", "--output", tmp_path / "output") == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert re.search(complaint, lines[0]), lines
+    assert not (tmp_path / "output" / "metrics.csv").exists()
+
+
+def test_a_body_without_a_joint_of_the_recording_is_refused(tmp_path, capsys):
+    times = np.arange(31) / 30.0
+    walk = write_body(tmp_path / "walk.bvh", times, ("LeftHand", "Head"))
+    less = write_body(tmp_path / "less.bvh", times, ("Head",))
+    assert run(walk, "--against", less, *FAST, "--output", tmp_path / "output") == 2
+    assert f"{less}: it has no joint LeftHand; {walk} has it" in capsys.readouterr().err
+
+
+def test_it_is_of_one_clip(toss, mine, capsys):
+    with pytest.raises(SystemExit) as ended:
+        run(toss, ROOT / "assets" / "reach.csv", "--against", mine)
+    assert ended.value.code == 2
+    assert "--against is a motion of one clip, and there are 2: name one recording" in capsys.readouterr().err
