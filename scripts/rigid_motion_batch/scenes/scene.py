@@ -22,7 +22,7 @@ from . import captions, layout
 from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
 from .lanes import Actors, Cast, Lanes
-from .settings import StageSettings
+from .settings import MODELS, StageSettings
 from .solids import Shape, Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
@@ -76,6 +76,8 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
     header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
     scene = put_on_stage(settings, cast, lanes_of, Solids(cast, shape), header, motion.centre)
+    # Our own models are closed: what faces away costs time and is never seen.
+    scene.display.shading.show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation
     return scene
 
