@@ -36,7 +36,7 @@ from rigid_motion_batch.command_line import parser_of
 from rigid_motion_batch.places import ASSETS
 from rigid_motion_batch.recordings import TrajectoryError, read_trajectories
 from rigid_motion_batch.recordings.reading import FORMATS
-from rigid_motion_batch.scenes.graph_decimate import decimate
+from rigid_motion_batch.scenes.decimated_bodies import decimate
 
 ROTATION_MODES = ("QUATERNION", "XYZ")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import fields
 
 from rigid_motion_batch.command_line import number
@@ -23,14 +24,16 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--time-unit", choices=TICKS, help="unit of the times, whatever the file says")
     group.add_argument(
         "--frame-rate",
-        type=_frame_rate,
+        type=_field("frame_rate", number),
         metavar="HZ",
         help="frames a second, where a column counts frames, not seconds",
     )
-    group.add_argument("--scale", type=_scale, metavar="M", help="metres in a unit of length: 0.01 for centimetres")
+    group.add_argument(
+        "--scale", type=_field("scale", number), metavar="M", help="metres in a unit of length: 0.01 for centimetres"
+    )
     group.add_argument(
         "--euler",
-        type=_order,
+        type=_field("euler", str),
         metavar="ORDER",
         help="order of the Euler angles of CSVs: YXZ about the moved axes (intrinsic), zxy about those of the world",
     )
@@ -39,11 +42,13 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--start",
-        type=_start,
+        type=_field("start", number),
         metavar="S",
         help="begin so many seconds after the first sample; 0 keeps a T-pose that would be left out",
     )
-    group.add_argument("--end", type=_end, metavar="S", help="end so many seconds after the first sample")
+    group.add_argument(
+        "--end", type=_field("end", number), metavar="S", help="end so many seconds after the first sample"
+    )
 
 
 def reading_options(options: argparse.Namespace) -> ReadingOptions:
@@ -61,24 +66,9 @@ def _columns(text: str) -> tuple[tuple[str, str], ...]:
     return _checked(columns=columns).columns
 
 
-def _scale(text: str) -> float | None:
-    return _checked(scale=number(text)).scale
-
-
-def _frame_rate(text: str) -> float | None:
-    return _checked(frame_rate=number(text)).frame_rate
-
-
-def _start(text: str) -> float | None:
-    return _checked(start=number(text)).start
-
-
-def _end(text: str) -> float | None:
-    return _checked(end=number(text)).end
-
-
-def _order(text: str) -> str | None:
-    return _checked(euler=text).euler
+def _field(name: str, convert: Callable[[str], object]) -> Callable[[str], object]:
+    """Return what reads one field of `ReadingOptions`."""
+    return lambda text: getattr(_checked(**{name: convert(text)}), name)
 
 
 def _checked(**said: object) -> ReadingOptions:

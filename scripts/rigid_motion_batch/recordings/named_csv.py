@@ -60,14 +60,22 @@ class _Body:
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """The bodies that are wanted. One without a name of its own has the file's."""
     header, layout = _find_header(path, options)
+    way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
+    return read_below(path, selection, options, header, layout, f"{way_out}, or split the file")
+
+
+def read_below(
+    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout, way_out: str
+) -> list[Trajectory]:
+    """The bodies that are wanted, of the rows below a header; `way_out` is what to do with devices that are mixed."""
     try:
-        return _read(path, selection, options, header, layout)
+        return _read(path, selection, options, header, layout, way_out)
     except ColumnProblem as problem:
         raise problem.at(path, header.number) from None
 
 
 def _read(
-    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout
+    path: Path, selection: Selection, options: ReadingOptions, header: HeaderLine, layout: Layout, way_out: str
 ) -> list[Trajectory]:
     bodies = _bodies(path, header, layout, "device" in dict(options.columns))
     taken = set(selection.of([body.name for body in bodies]))
@@ -90,12 +98,11 @@ def _read(
         for body in wanted:
             require_seconds(table, numbers["t"][body.rows], layout.time_unit)
         times = seconds_of(table, numbers["t"], layout.time_unit)
-    way_out = f"name the column that tells them apart, --columns device=NAME (found {columns_found(header.cells)})"
     trajectories = []
     for body in wanted:
         held = {one: numbers[body.label(one)][body.rows] for one in body.columns}
         trajectory = replace(_trajectory(body, times[body.rows], held, layout, options), dated=kind is not None)
-        require_one_body(trajectory, path, f"{way_out}, or split the file", header.number)
+        require_one_body(trajectory, path, way_out, header.number)
         trajectories.append(trajectory)
     return trajectories
 

@@ -17,13 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rigid_motion.motion import Poses
-
-from .recordings import Trajectory, TrajectoryError, shown
+from .recordings import TrajectoryError, shown
 from .vector_cells import expanded, flattened, is_number
-
-Columns = Mapping[str, Sequence[str]]
-"""What a column means, to the names that it goes by."""
 
 SEPARATORS = (",", ";", "\t")
 
@@ -91,13 +86,6 @@ class Table:
             line = line.strip(" ")
             if line and not line.isspace() and line[0] != "#":
                 yield number, flattened(line, self.separator) if self.vectors else line
-
-    def trajectory(self, name: str) -> Trajectory:
-        """The columns t, x, y, z, qw, qx, qy, qz and, if there, scale."""
-        names = ["t", "x", "y", "z", "qw", "qx", "qy", "qz", "scale"]
-        numbers = self.parse([name for name in names if name in self.columns])
-        scales = numbers[:, 8] if "scale" in self.columns and np.any(numbers[:, 8] != 1.0) else None
-        return Trajectory(name, numbers[:, 0], Poses(numbers[:, 1:4], numbers[:, 4:8], scales))
 
 
 def encoding_of(head: bytes) -> str:
@@ -243,41 +231,6 @@ def lines_above_numbers(path: Path) -> Iterator[HeaderLine]:
             above = None
         else:
             above = HeaderLine.of(path, number, text)
-
-
-def read_table(path: Path, names: Columns, optional: Columns, default: Sequence[str] = ()) -> Table:
-    """The table whose header, one of `header_lines`, names all the columns in `names`.
-
-    Parameters
-    ----------
-    path : Path
-    names, optional : mapping from meaning to names
-        Names are lower case, without their unit in brackets.
-    default : sequence of str
-        The meanings of the columns, in order, of a file without a header; such a file is separated by white space.
-    """
-    meaning_of = {alias: meaning for meaning, aliases in {**names, **optional}.items() for alias in aliases}
-    nearest: tuple[list[str], int] | None = None
-    for line in header_lines(path):
-        meanings = [meaning_of.get(cell.partition("[")[0].strip().lower()) for cell in line.cells]
-        columns = {meaning: index for index, meaning in enumerate(meanings) if meaning}
-        missing = [meaning for meaning in names if meaning not in columns]
-        if not missing:
-            if repeated := [meaning for meaning in columns if meanings.count(meaning) > 1]:
-                way_out = "rename or delete one of them"
-                raise TrajectoryError(path, f"two columns mean {repeated[0]}", way_out, line.number)
-            return Table(path, line.separator, columns, len(meanings), line.number)
-        if columns and (nearest is None or len(missing) < len(nearest[0])):
-            nearest = missing, line.number
-    if default and not (nearest and nearest[1] == line.number):
-        columns = {meaning: index for index, meaning in enumerate(default)}
-        return Table(path, None, columns, len(default), line.number - 1)
-    expected = ", ".join(aliases[0] for aliases in names.values())
-    if nearest is None:
-        way_out = f"the first line has to name {expected}"
-        raise TrajectoryError(path, "no column has a known name", way_out, line.number)
-    absent = ", ".join(names[meaning][0] for meaning in nearest[0])
-    raise TrajectoryError(path, f"no column named {absent}", f"the header has to name {expected}", nearest[1])
 
 
 def split_row(line: str, separator: str | None) -> list[str]:

@@ -6,26 +6,15 @@ order, the names are believed.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
+from . import named_csv
+from .columns import ColumnProblem, layout_of
 from .options import ReadingOptions
 from .recordings import Selection, Trajectory, TrajectoryError
-from .sense import require_one_body
-from .tables import read_table
-from .times import require_seconds, seconds_of
+from .tables import HeaderLine, header_lines
 
-NAMES = {
-    "t": ("t", "time", "timestamp"),
-    "x": ("x", "tx"),
-    "y": ("y", "ty"),
-    "z": ("z", "tz"),
-    "qx": ("qx",),
-    "qy": ("qy",),
-    "qz": ("qz",),
-    "qw": ("qw",),
-}
-OPTIONAL_NAMES = {"scale": ("s", "scale")}
+NAMES = ["t", "x", "y", "z", "qx", "qy", "qz", "qw"]
 
 
 def recognises(head: list[str]) -> bool:
@@ -41,17 +30,24 @@ def recognises(head: list[str]) -> bool:
 
 def read(path: Path, selection: Selection, options: ReadingOptions) -> list[Trajectory]:
     """The one body of the file, which has the file's name."""
-    (name,) = selection.of([path.stem])
-    table = read_table(path, NAMES, OPTIONAL_NAMES, default=tuple(NAMES))
-    line, row = next(table.rows(), (0, ""))
+    header = _header(path, options)
+    line, row = next(header.table(path, {}).rows(), (0, ""))
     if len(row.split()) == 4:
         problem = "positions only, and rotations are needed"
         raise TrajectoryError(path, problem, "write t x y z qx qy qz qw in every line", line)
-    trajectory, unit = table.trajectory(name), options.time_unit or ""
-    if options.frame_rate:
-        trajectory = replace(trajectory, times=trajectory.times / options.frame_rate)
-    else:
-        require_seconds(table, trajectory.times, unit)
-        trajectory = replace(trajectory, times=seconds_of(table, trajectory.times, unit))
-    require_one_body(trajectory, path, "write a file for each", table.header + 1)
-    return [trajectory]
+    return named_csv.read_below(
+        path, selection, options, header, layout_of(header.cells, options), "write a file for each"
+    )
+
+
+def _header(path: Path, options: ReadingOptions) -> HeaderLine:
+    """The line that names the columns, or one before the first row with the usual names."""
+    for line in header_lines(path):
+        try:
+            layout_of(line.cells, options)
+            return line
+        except ColumnProblem as problem:
+            last = problem
+    if last.known:
+        raise last.at(path, line.number)
+    return HeaderLine(line.number - 1, None, NAMES)

@@ -18,17 +18,17 @@ from rigid_motion.motion import Poses, interpolate, shell_error
 from rigid_motion_batch.analysis.bodies import BLOCK, BodyReconstruction, identical_body_modes
 from rigid_motion_batch.analysis.body_metrics import key_samples
 from rigid_motion_batch.axes import to_blender
-from rigid_motion_batch.palette import THEMES, error_hex, full_colour
+from rigid_motion_batch.palette import error_hex, full_colour
 from rigid_motion_batch.recordings.figures import short_names
 
 from . import captions, layout
 from .armature import Rest
 from .bodies import SHADES, Bodies, BodyMotion, flashes
 from .framing import SMOOTHING, Framing, Jointed
-from .lanes import Cast, names_of
+from .lanes import Cast
 from .materials import ink
 from .physique import Physique, figure_size
-from .scene import LEGEND, Header, put_on_stage
+from .scene import LEGEND, Header, begin, put_on_stage
 from .settings import StageSettings
 from .timeline import Timeline
 
@@ -58,11 +58,7 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
     radii : array, shape (joints,)
         Of the balls by which errors are measured, in metres.
     """
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.name = f"{made.clip.name} {made.choice.name}"
-    theme = THEMES[settings.theme]
-    timeline = Timeline.between(float(made.times[0]), float(made.times[-1]), settings.fps, settings.slow_motion)
+    timeline = begin(made, settings)
     lanes_of = identical_body_modes(made) if settings.distinct else tuple((mode,) for mode in made.keys)
     rest = Rest.of(made.clip.figure, made.clip.metres_per_unit, made.clip.axes)
     motion, centre = shown_motion(made, [group[0] for group in lanes_of], timeline, rest, radii)
@@ -73,23 +69,17 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
     extent = replace(
         extent, low=extent.low - size * np.array((MARGIN, MARGIN + GROUND, MARGIN)), high=extent.high + MARGIN * size
     )
-    width, height = settings.resolution
-    notes = _notes(made, motion.modes)
-    named = any(names_of(modes, notes) for modes in lanes_of)
-    plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
-    cast = Cast(
+    cast = Cast.arranged(
+        settings,
+        lanes_of,
+        extent,
+        _notes(made, motion.modes),
         timeline=timeline,
         framing=framing,
         framing_steps=1,
-        layout=plan,
-        extent=extent,
         errors={mode: 1e3 * errors.max(axis=0) for mode, errors in motion.errors.items()},
         sampled={mode: 1e3 * _sampled_errors(made, mode, radii) for mode in motion.modes},
         sample_frames=timeline.frames_of(made.times),
-        notes=notes,
-        theme=theme,
-        ink=ink("Ink", theme.ink),
-        faint=ink("Faint", theme.faint),
         joints=tuple(short_names(made.clip.figure.joints)),
         worst={mode: errors.argmax(axis=0) for mode, errors in motion.errors.items()},
     )
@@ -99,10 +89,8 @@ def build_body_stage(made: BodyReconstruction, settings: StageSettings, radii: n
     header = Header(made.clip.name, made.choice.title, _legend(made, settings), bar.width + 2.0 * BAR_GAP)
     with _extension():
         actors = Bodies(cast, motion, shape, full)
-        put_on_stage(scene, settings, cast, lanes_of, actors, header)
+        scene = put_on_stage(settings, cast, lanes_of, actors, header, centre)
     bar.put(cast)
-    scene["recording_centre_m"] = centre.tolist()
-    scene["recording_start_s"] = timeline.start
     return scene
 
 

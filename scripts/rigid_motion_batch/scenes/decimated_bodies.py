@@ -1,4 +1,5 @@
-"""Blender's Decimate of a whole rig: the fewest keys that it leaves where an error must not become larger than asked.
+"""Blender's Decimate of the Graph Editor, of a whole rig: the fewest keys that it leaves where an error must not become
+larger than asked.
 
 Users give it one error margin for all F-curves, in the units of these. Which margin an error needs is searched for, and
 what was tried for one error is known when another is asked for.
@@ -13,7 +14,6 @@ import bpy
 import numpy as np
 
 from rigid_motion import animation
-from rigid_motion_batch.scenes.graph_decimate import decimate
 
 FREE, STRAIGHT = 6, 2
 """The numbers of a key with free handles, and of one between straight lines."""
@@ -55,6 +55,28 @@ class Left:
     """A pose is a frame, and a value for each channel of the joint that varies; a key of an F-curve is six."""
 
     largest: float
+
+
+def decimate(obj: bpy.types.Object, **options: object) -> None:
+    """Decimate all keys of an object and its bones: `mode`, and `factor` or `remove_error_margin`.
+
+    Raises
+    ------
+    RuntimeError
+        Where Blender cannot: it has no window for its Graph Editor, or nothing in that to decimate.
+    """
+    for fcurve in animation.channelbag_of(obj).fcurves:
+        fcurve.select = True
+        fcurve.keyframe_points.foreach_set("select_control_point", np.ones(len(fcurve.keyframe_points), dtype=bool))
+    window = next(iter(bpy.context.window_manager.windows), None)
+    if window is None:
+        raise RuntimeError("this Blender has no window for a Graph Editor")
+    area = window.screen.areas[0]
+    area.type = "GRAPH_EDITOR"
+    area.spaces[0].dopesheet.show_only_selected = False
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.graph.decimate(**options)
 
 
 def fcurves_of(obj: bpy.types.Object) -> dict[Curve, bpy.types.FCurve]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import bpy
 import numpy as np
@@ -16,12 +16,14 @@ import numpy as np
 from rigid_motion.animation import write_channel
 from rigid_motion.motion.quaternions import rotate
 from rigid_motion_batch.analysis.modes import label_of
-from rigid_motion_batch.palette import Theme, colour_on
+from rigid_motion_batch.analysis.reconstructions import Groups
+from rigid_motion_batch.palette import THEMES, Theme, colour_on
 
 from . import captions, layout, trails
 from .framing import Extent, Framing
 from .materials import ink
 from .nodes import apply_group
+from .settings import StageSettings
 from .timeline import Timeline, peaks
 
 TITLE, NAME, NUMBER, UNIT, SMALL = 0.044, 0.026, 0.05, 0.032, 0.028
@@ -68,6 +70,17 @@ class Cast:
 
     worst: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Mode id to the joint that the error is of, at each frame."""
+
+    @classmethod
+    def arranged(
+        cls, settings: StageSettings, lanes_of: Groups, extent: Extent, notes: Mapping[str, str], **own: Any
+    ) -> Cast:
+        """With lanes arranged for what is seen of the motion; `own` are the fields that are left."""
+        theme, (width, height) = THEMES[settings.theme], settings.resolution
+        named = any(names_of(modes, notes) for modes in lanes_of)
+        plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
+        inks = {"ink": ink("Ink", theme.ink), "faint": ink("Faint", theme.faint)}
+        return cls(layout=plan, extent=extent, notes=notes, theme=theme, **inks, **own)
 
     @property
     def largest_error(self) -> float:

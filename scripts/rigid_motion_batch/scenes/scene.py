@@ -14,15 +14,15 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.reconstructions import Groups, Reconstruction, identical_modes
-from rigid_motion_batch.palette import DARK, THEMES, linear
+from rigid_motion_batch.palette import DARK, linear
 
 from . import captions, layout
 from .deviations import largest_deviation, magnification, magnified
 from .framing import SMOOTHING, Framing, Solid
-from .lanes import Actors, Cast, Lanes, names_of
-from .materials import ink
-from .settings import StageSettings
+from .lanes import Actors, Cast, Lanes
+from .settings import MODELS, StageSettings
 from .solids import Shape, Solids
 from .subject import load_subject, vertices_of
 from .timeline import ShownMotion, Timeline
@@ -42,11 +42,7 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     SubjectError
         Where the object to show cannot be had.
     """
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.name = f"{reconstruction.clip.name} {reconstruction.choice.name}"
-    theme = THEMES[settings.theme]
-    timeline = Timeline.of(reconstruction, settings.fps, settings.slow_motion)
+    timeline = begin(reconstruction, settings)
     motion = ShownMotion.of(reconstruction, timeline)
     lanes_of = identical_modes([reconstruction]) if settings.distinct else tuple((mode,) for mode in motion.modes)
 
@@ -63,33 +59,34 @@ def build_stage(reconstruction: Reconstruction, settings: StageSettings) -> bpy.
     deviation = settings.deviation or magnification(farthest, size)
     deviated = {mode: magnified(poses, motion.recording, deviation, middle) for mode, poses in motion.modes.items()}
     extent = framing.extent(Solid(motion.recording, outline), [Solid(poses, outline) for poses in deviated.values()])
-    width, height = settings.resolution
-    notes = _notes(reconstruction)
-    named = any(names_of(modes, notes) for modes in lanes_of)
-    plan = layout.arrange(len(lanes_of), extent.size, width / height, named=named)
     sampled = {mode: 1e3 * errors.shell for mode, errors in reconstruction.errors.items()}
     times = timeline.times_of(timeline.frames)
-    cast = Cast(
+    cast = Cast.arranged(
+        settings,
+        lanes_of,
+        extent,
+        _notes(reconstruction),
         timeline=timeline,
         framing=framing,
         framing_steps=timeline.steps,
-        layout=plan,
-        extent=extent,
         errors={mode: np.interp(times, reconstruction.times, errors) for mode, errors in sampled.items()},
         sampled=sampled,
         sample_frames=timeline.frames_of(reconstruction.times),
-        notes=notes,
-        theme=theme,
-        ink=ink("Ink", theme.ink),
-        faint=ink("Faint", theme.faint),
     )
     shape = Shape(motion, deviated, mesh, layout.telling_point(motion.recording, outline))
     header = Header(reconstruction.clip.name, reconstruction.choice.title, _legend(cast, settings, deviation, enlarged))
-    put_on_stage(scene, settings, cast, lanes_of, Solids(cast, shape), header)
-    scene["recording_centre_m"] = motion.centre.tolist()
-    scene["recording_start_s"] = timeline.start
+    scene = put_on_stage(settings, cast, lanes_of, Solids(cast, shape), header, motion.centre)
+    # Our own models are closed: what faces away costs time and is never seen.
+    scene.display.shading.show_backface_culling = settings.subject in MODELS
     scene["deviation_shown_times"] = deviation
     return scene
+
+
+def begin(made: Reconstruction | BodyReconstruction, settings: StageSettings) -> Timeline:
+    """Empty the file, and name its scene after what is compared."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.scene.name = f"{made.clip.name} {made.choice.name}"
+    return Timeline.of(made, settings.fps, settings.slow_motion)
 
 
 @dataclass(frozen=True)
@@ -107,14 +104,10 @@ class Header:
 
 
 def put_on_stage(
-    scene: bpy.types.Scene,
-    settings: StageSettings,
-    cast: Cast,
-    lanes_of: Groups,
-    actors: Actors,
-    header: Header,
-) -> None:
-    """Make the lanes, what is written around them, camera and lights."""
+    settings: StageSettings, cast: Cast, lanes_of: Groups, actors: Actors, header: Header, centre: np.ndarray
+) -> bpy.types.Scene:
+    """Make the lanes, what is written around them, camera and lights; `centre` (3,) of the recording is the origin."""
+    scene = bpy.context.scene
     plan = cast.layout
     frame = make_frame(plan.metres)
     lanes = Lanes(cast, frame, actors)
@@ -124,6 +117,8 @@ def put_on_stage(
     make_camera(scene, plan.metres, 2.0 * cast.extent.depth)
     make_lights(scene)
     set_up_render(scene, settings, cast.timeline.count, cast.theme.background)
+    scene["recording_centre_m"], scene["recording_start_s"] = centre.tolist(), cast.timeline.start
+    return scene
 
 
 def _notes(reconstruction: Reconstruction) -> dict[str, str]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_motion.motion import Poses, interpolate
+from rigid_motion_batch.analysis.bodies import BodyReconstruction
 from rigid_motion_batch.analysis.reconstructions import Reconstruction
 from rigid_motion_batch.axes import to_blender
 
@@ -37,10 +38,9 @@ class Timeline:
     """Fine frames for a frame."""
 
     @classmethod
-    def of(cls, reconstruction: Reconstruction, fps: int, slow_motion: float) -> Timeline:
+    def of(cls, made: Reconstruction | BodyReconstruction, fps: int, slow_motion: float) -> Timeline:
         """All frames from the first key to the last, `slow_motion` times slower than life."""
-        times = reconstruction.times
-        return cls.between(float(times[0]), float(times[-1]), fps, slow_motion)
+        return cls.between(float(made.times[0]), float(made.times[-1]), fps, slow_motion)
 
     @classmethod
     def between(cls, start: float, end: float, fps: int, slow_motion: float) -> Timeline:

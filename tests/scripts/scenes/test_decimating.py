@@ -21,7 +21,7 @@ from rigid_motion_batch.cli import compare
 from rigid_motion_batch.pipeline.comparison import DECIMATED
 from rigid_motion_batch.recordings.clips import Clip
 from rigid_motion_batch.recordings.figures import Figure
-from rigid_motion_batch.scenes import decimated_bodies, graph_decimate
+from rigid_motion_batch.scenes import decimated_bodies
 from rigid_motion_batch.scenes.decimated_bodies import Decimations, Left
 from rigid_motion_batch.scenes.decimating import DecimatedBody, beside_decimate, frames_of
 from tests.balls import largest_displacements
@@ -97,7 +97,7 @@ def test_errors_of_decimated_curves_are_those_of_what_blender_shows() -> None:
     assert body.errors().max() < 1e-6
     assert errors_by_hand(recorded, recorded, truth).max() < 2e-6
     for margin in (0.003, 0.05):
-        graph_decimate.decimate(body.rig.obj, mode="ERROR", remove_error_margin=margin)
+        decimated_bodies.decimate(body.rig.obj, mode="ERROR", remove_error_margin=margin)
         found = errors_by_hand(as_blender_shows(body), recorded, truth)
         np.testing.assert_allclose(body.errors(), found, atol=3e-6)
         assert body.left().largest == pytest.approx(found.max(), abs=3e-6)
