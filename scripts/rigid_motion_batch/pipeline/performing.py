@@ -99,12 +99,12 @@ class Executor(Protocol):
     """Who does orders. A context; may be used again after `stop`."""
 
     capacity: int
-    """How many orders it takes at a time."""
+    """How many orders it takes at a time; 0 where there is nobody to do one yet."""
 
     def submit(self, order: Order) -> None: ...
 
     def wait(self, tell: Callable[[Order, Told | Made | Failed | Lost], object], seconds: float) -> None:
-        """Pass on what has happened, or wait for it for so long."""
+        """Pass on what has happened, or wait for it for so long. Raises ExecutorError where nothing can any more."""
 
     def stop(self) -> None:
         """End what is at work, and forget what is waiting, within a second."""

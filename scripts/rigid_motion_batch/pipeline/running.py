@@ -18,7 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from .performing import FULL_OR_FORBIDDEN, Executor, Failed, Lost, Made, Order, Told, perform
+from .performing import FULL_OR_FORBIDDEN, Executor, ExecutorError, Failed, Lost, Made, Order, Told, perform
 from .steps import Task
 from .store import OutputError, Result, Store, not_written
 
@@ -311,7 +311,7 @@ class _Run:
             self._work()
             if self.share == EVERYTHING and not outcome.failures:
                 self.store.sweep(key for key in self.settled.values() if key)
-        except _Hopeless as error:
+        except (_Hopeless, ExecutorError) as error:
             outcome.problem = str(error)
             self._stop()
         except KeyboardInterrupt:
@@ -332,7 +332,7 @@ class _Run:
                     self._meet(found)
             while self.ready and len(self.at_work) < self.executor.capacity:
                 self._begin(heapq.heappop(self.ready)[1])
-            if self.at_work:
+            if self.at_work or not self.executor.capacity:
                 self.executor.wait(self._hear, PATIENCE)
 
     def _meet(self, found: Found) -> None:
@@ -381,13 +381,10 @@ class _Run:
             self.store.withdraw(task.publish.values())
             self._close(opened, State.SKIPPED)
         else:
-            self._submit(opened)
-
-    def _submit(self, opened: _Open) -> None:
-        order = self._order(opened.task)
-        self.at_work[order.folder], opened.share = opened, 0.0
-        self._show(opened.task.shown)
-        self.executor.submit(order)
+            order = self._order(task)
+            self.at_work[order.folder], opened.share = opened, 0.0
+            self._show(task.shown)
+            self.executor.submit(order)
 
     def _order(self, task: Task) -> Order:
         return Order(
@@ -423,7 +420,7 @@ class _Run:
             opened.losses += 1
             if opened.losses <= self.retries:
                 self.progress.note(f"{shown}: {message.message}; trying again")
-                self._submit(opened)
+                heapq.heappush(self.ready, (opened.number, opened))
             else:
                 self._failed(opened, Failed(f"{shown}: {message.message}; given up after {opened.losses} attempts"))
 

@@ -432,12 +432,6 @@ def test_tasks_are_done_by_as_many_processes_as_there_are_jobs(output: Path) -> 
     assert str(os.getpid()) not in workers
 
 
-def test_a_worker_is_replaced_after_so_many_tasks(output: Path) -> None:
-    tasks = [task(name, steps.process_id, Write(name)) for name in "abcdef"]
-    run_in(output, *tasks, executor=ProcessExecutor(1, max_tasks=2))
-    assert len(set(contents(output).values())) == 3
-
-
 @needs_signals
 def test_a_worker_that_dies_is_replaced_and_its_task_done_again(output: Path, tmp_path: Path) -> None:
     dying = task("b", steps.die, Die(str(tmp_path / "marker"), 2))
