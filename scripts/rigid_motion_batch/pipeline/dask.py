@@ -11,9 +11,9 @@ import asyncio
 import logging
 import os
 import queue
-import threading
 import time
 import uuid
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
@@ -50,8 +50,8 @@ LOADED = version_here()
 
 # -- what a worker does -----------------------------------------------------------------------------------------------
 
-_idle: dict[str, list[ProcessExecutor]] = {}
-_lock = threading.Lock()
+_idle: dict[str, deque[ProcessExecutor]] = {}
+"""Session to the processes that wait for its next task."""
 
 
 def identify(folder: str) -> str:
@@ -61,9 +61,7 @@ def identify(folder: str) -> str:
 
 def retire(session: str) -> None:
     """End the processes of a run that is over."""
-    with _lock:
-        executors = _idle.pop(session, [])
-    for executor in executors:
+    for executor in _idle.pop(session, ()):
         executor.__exit__()
 
 
@@ -83,9 +81,11 @@ def do(order: Order, session: str) -> Made | Failed | Lost:
         else:
             ended.append(message)
 
-    with _lock:
-        idle = _idle.get(session)
-        executor = idle.pop() if idle else ProcessExecutor(1)
+    idle = _idle.setdefault(session, deque())
+    try:
+        executor = idle.pop()
+    except IndexError:
+        executor = ProcessExecutor(1)
     try:
         executor.submit(replace(order, folder=f"{order.folder}-{uuid.uuid4().hex[:8]}"))
         while not ended:
@@ -95,8 +95,7 @@ def do(order: Order, session: str) -> Made | Failed | Lost:
                 return Lost("it was stopped")
     finally:
         if ended:
-            with _lock:
-                _idle.setdefault(session, []).append(executor)
+            idle.append(executor)
         else:
             executor.__exit__()
     return ended[0]
