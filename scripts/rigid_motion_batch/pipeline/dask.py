@@ -154,7 +154,7 @@ class DaskExecutor:
         future.add_done_callback(self._ended.put)
 
     def wait(self, tell: Tell, seconds: float) -> None:
-        self._look(tell)
+        self._look()
         try:
             future = self._ended.get(timeout=min(seconds, PROGRESS))
         except queue.Empty:
@@ -195,7 +195,7 @@ class DaskExecutor:
         try:
             if (said := self._client.run_on_scheduler(_asker(), "")).startswith("No module"):
                 raise ExecutorError(f"{self._address}: the scheduler: {said}")
-            self._look(lambda *_: None)
+            self._look()
             if self._unfit and not self._workers:
                 raise ExecutorError(f"{self._address}: none of its workers is fit")
         except BaseException:
@@ -209,7 +209,7 @@ class DaskExecutor:
             self._client.run(retire, self._session, workers=self.workers, on_error="ignore")
             self._client.close(timeout=2.0)
 
-    def _look(self, tell: Tell) -> None:
+    def _look(self) -> None:
         """See which workers have come and gone. Raises ExecutorError where the scheduler has."""
         if time.monotonic() - self._looked_at < LOOK:
             return
@@ -222,10 +222,11 @@ class DaskExecutor:
         if strangers := threads.keys() - self._workers.keys() - self._unfit:
             self._welcome({address: threads[address] for address in strangers})
         for future, (order, workers) in [*self._at_work.items()]:
+            # Of those that could have done it none is left: that is no fault of the task.
             if self._workers and not workers.intersection(self._workers):
                 del self._at_work[future]
                 self._client.cancel([future], force=True)
-                tell(order, Lost("the workers that could do it are gone"))
+                self.submit(order)
         if not self._alone and not threads:
             self._note(f"{self._address} has no worker; waiting for one: `dask worker {self._address}`")
         self._alone = not threads

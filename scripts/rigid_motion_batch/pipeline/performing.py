@@ -127,6 +127,8 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     tell : callable, optional
         Takes the share that is done and what is being done; written into a file for `progress_of` unless given.
     """
+    if order.here and os.path.isdir(order.here):
+        os.chdir(order.here)
     if order.step.blender and order.blender:
         from .blender import perform_in_blender
 
@@ -140,8 +142,6 @@ def perform(order: Order, tell: Callable[[float, str], object] | None = None) ->
     started = time.perf_counter()
     done: Made | Failed | None = None
     try:
-        if order.here and os.path.isdir(order.here):
-            os.chdir(order.here)
         for one in order.inputs:
             if os.path.exists(one.path) and not os.path.isfile(one.path):
                 raise TaskError(f"{one.path}: this is no file, but a folder, pipe or device; give a file")
