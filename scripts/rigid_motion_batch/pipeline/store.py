@@ -149,6 +149,8 @@ class Store:
 
     def note(self, name: str, content: Any) -> None:
         """Write a file of the store's own, of JSON; of nothing there is none."""
+        if (self.own / name).is_dir():
+            shutil.rmtree(self.own / name)
         if content:
             write_text(self.own / name, json.dumps(content, indent=1))
         else:
